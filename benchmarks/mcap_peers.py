@@ -28,15 +28,6 @@ def gathered(content: Content, messages: Iterator[tuple[str, Any]], member: Call
     return {f"{topic} {field}": np.array(next(found[topic])[1], dtype=np.float64) for topic, field in content.wanted}
 
 
-def by_mcap_ros2_support(path: Path, content: Content) -> Columns:
-    from mcap_ros2.decoder import DecoderFactory
-
-    with path.open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        rows = reader.iter_decoded_messages(log_time_order=False)
-        return gathered(content, ((channel.topic, message) for _, channel, _, message in rows), getattr)
-
-
 def by_rosbags(path: Path, content: Content) -> Columns:
     from rosbags.highlevel import AnyReader
 
@@ -66,28 +57,3 @@ def by_protobuf(path: Path, content: Content) -> Columns:
             ((channel.topic, made[channel.topic].FromString(row.data)) for _, channel, row in rows),
             getattr,
         )
-
-
-def decompression(path: Path) -> Callable[[], None]:
-    """Decompress every chunk, already in memory, with only its package."""
-    import lz4.frame
-    import zstandard
-
-    from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, chunk_header
-    from cdtool.formats.mcap.container.log import Log
-
-    content = path.read_bytes()
-    chunks = []
-    for at in Log(path).summary.chunks:
-        header = chunk_header(at, memoryview(content)[at : at + HEADER_LENGTH])
-        chunks.append((content[header.data : header.data + header.size], header.uncompressed_size, header.compression))
-    zstd = zstandard.ZstdDecompressor()
-
-    def run() -> None:
-        for packed, size, compression in chunks:
-            if compression == "zstd":
-                zstd.decompress(packed, max_output_size=size)
-            else:
-                lz4.frame.decompress(packed)
-
-    return run

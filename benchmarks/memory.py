@@ -80,20 +80,21 @@ def _prepare(folder: Path) -> Recording:
 
 def _measured(folder: Path, logs: Mapping[str, Path]) -> bool:
     machine = ["--machine", str(folder / "machine.toml")]
-    detect = {
+    mapped = {
         f"detect {name}": ["detect", "LOG", *machine, "--signature", str(folder / f"{name}.json")] for name in DETECTORS
     }
-    detect["detect gm --plot"] = [*detect["detect gm"], "--plot", str(folder / "plot.png")]
+    mapped["detect gm --plot"] = [*mapped["detect gm"], "--plot", str(folder / "plot.png")]
+    for suffix in (".parquet", ".mcap"):
+        convert = ["convert", "LOG", str(folder / f"out{suffix}"), *machine, "--force"]
+        mapped[f"convert --machine to {suffix}"] = convert
     bounded = {
         "info": ["info", "LOG"],
         "convert to .parquet": ["convert", "LOG", str(folder / "out.parquet"), "--force"],
         "convert to .mcap": ["convert", "LOG", str(folder / "out.mcap"), "--force"],
-        "convert --machine to .parquet": ["convert", "LOG", str(folder / "out.parquet"), *machine, "--force"],
-        "convert --machine to .mcap": ["convert", "LOG", str(folder / "out.mcap"), *machine, "--force"],
         "recover": ["recover", "LOG", "-o", str(folder / "recovered.mcap"), "--unverified", "--force"],
     }
     held, rows = True, []
-    for task, arguments in (detect | bounded).items():
+    for task, arguments in (mapped | bounded).items():
         peaks = {}
         for length, log in logs.items():
             peaks[length] = _peak([str(log) if part == "LOG" else part for part in arguments])
@@ -101,7 +102,7 @@ def _measured(folder: Path, logs: Mapping[str, Path]) -> bool:
             figures = (f"{megabytes:.0f}" for megabytes in (peak.whole, peak.own, peak.files))
             rows.append((task, length, *figures, f"{peak.seconds:.1f}"))
         hour, growth = peaks["1 h"].whole, peaks["1 h"].whole - peaks["10 min"].whole
-        if task in detect:
+        if task in mapped:
             held &= _verdict(f"{task} of 1 h, peak MB", hour, DETECT_AT_MOST_MB)
         else:
             held &= _verdict(f"{task}: 1 h over 10 min, MB more", growth, GROWTH_AT_MOST_MB)

@@ -14,7 +14,7 @@ from pathlib import Path
 QUESTIONS = (
     *("friction_ekf", "momentum", "robot_dynamics", "detectors"),
     *("start_up", "whole_benchmark", "reports", "interval_coverage", "compare_builds"),
-    *("mcap_reading", "csv_reading"),
+    *("reading",),
     *("gate_accuracy", "arm_accuracy", "explain_causes", "missing_force", "time_bounds", "structure"),
 )
 

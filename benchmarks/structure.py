@@ -59,9 +59,7 @@ UTILITIES: Mapping[str, str] = {
     "cdtool.plain_text": "how any module writes a number",
     "cdtool.units": "a table of units that is looked up",
     "cdtool.registry": "a table of names that is looked up",
-    "cdtool.cores": "how many threads may be used",
     "cdtool.kernels": "how a compiled loop is called",
-    "cdtool.instructions": "instructions of the processor",
     "cdtool.channels": "a value: what the machine file maps",
     "cdtool.recording": "a value: what has been read so far",
 }

@@ -114,12 +114,13 @@ class Activation:
         alarms: list[Alarm] = []
         crossings: list[Alarm] = []
         time, nearer = statistic.time, inner or band
-        outside, calm = (np.empty(len(time), dtype=np.bool_) for _ in range(2))
         for joint in range(statistic.values.shape[1]):
             value, lower, upper = (_column(item, joint) for item in (statistic.values, band.lower, band.upper))
             inner_lower, inner_upper = (_column(item, joint) for item in (nearer.lower, nearer.upper))
-            if not _mark(value, lower, upper, inner_lower, inner_upper, outside, calm):
+            outside = (value > upper) | (value < lower)
+            if not outside.any():
                 continue
+            calm = ~(outside | (value > inner_upper) | (value < inner_lower))
             status = np.ascontiguousarray(statistic.status[:, joint])
             debounce = needed() if needed else self.needed(time)
             at, armed = crossings_of(time, outside, calm, status, debounce, self.wait, begins_at(time, begins))
@@ -163,25 +164,6 @@ class Activation:
 
 def _column(values: FloatArray, joint: int) -> FloatArray:
     return np.ascontiguousarray(values[:, joint], dtype=np.float64)
-
-
-@kernel(f"boolean({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, b1[::1], b1[::1])")
-def _mark(
-    value: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-    inner_lower: FloatArray,
-    inner_upper: FloatArray,
-    outside: BoolArray,
-    calm: BoolArray,
-) -> bool:
-    """Mark the values `outside` their limits, and those inside the inner limits too; return whether any is outside."""
-    any_outside = False
-    for k in range(len(value)):
-        outside[k] = (value[k] > upper[k]) | (value[k] < lower[k])
-        calm[k] = not (outside[k] | (value[k] > inner_upper[k]) | (value[k] < inner_lower[k]))
-        any_outside |= outside[k]
-    return any_outside
 
 
 @kernel(

@@ -96,8 +96,10 @@ class Judgement:
         judged = np.zeros(met.shape, dtype=bool)
         for share in self._shares:
             statistic, own = share.met_at
-            status = np.ascontiguousarray(statistic.status, dtype=np.uint8)
-            lower_factors(own, status, share.judges, share.rows.start, met, judged)
+            valid = share.judges[:, np.newaxis] & (statistic.status == Status.VALID)
+            rows = slice(share.rows.start, share.rows.start + len(own))
+            met[rows] = np.where(valid & ((own < met[rows]) | np.isnan(own)), own, met[rows])
+            judged[rows] |= valid
         met[~judged] = -np.inf
         return met
 
@@ -138,9 +140,8 @@ class Judgement:
         part = self.signal.part(rows)
         judges = judges[rows]
         if not judges.all():
-            status = np.empty(part.status.shape, dtype=np.uint8)
-            mark_elsewhere(np.ascontiguousarray(part.status), judges, status)
-            part = part.changed(status=status)
+            elsewhere = part.valid & ~judges[:, np.newaxis]
+            part = part.changed(status=np.where(elsewhere, np.uint8(Status.OTHER_SPEED), part.status))
         return _Share(threshold, recording, part, rows, judges)
 
     def _merged(self, evaluated: Sequence[tuple[Signal, Band]]) -> tuple[Signal, Band]:
@@ -151,12 +152,6 @@ class Judgement:
         signal, shape = self.signal, self.signal.values.shape
         recent = speed_is_recent(self.recording, self.classes, signal.time, self.hold)
         values, unit = np.array(signal.values, order="C"), signal.unit
-        if len(shares) == 1 and shares[0].rows == slice(0, len(signal.time)):
-            lower, upper, status = np.empty(shape), np.empty(shape), np.empty(shape, dtype=np.uint8)
-            own, unit = contiguous(*evaluated[0]), evaluated[0][0].unit
-            seen = np.ascontiguousarray(signal.status)
-            take_only_class(*own, shares[0].judges, seen, recent, values, status, lower, upper)
-            return signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
         elsewhere = np.where(recent, np.uint8(Status.OTHER_SPEED), np.uint8(Status.GAP))[:, np.newaxis]
         status = np.ascontiguousarray(np.where(signal.valid, elsewhere, signal.status))
         lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
@@ -192,47 +187,6 @@ def class_of(threshold: FittedThreshold) -> MotionClass | None:
     """Return the class of motion that a threshold was learned for; None if it applies to any motion."""
     motion: MotionClass | None = getattr(threshold, "motion", None)
     return motion
-
-
-@kernel(f"void({_STATUS}, {_ROWS}, uint8[:,::1])")
-def mark_elsewhere(status: StatusArray, judges: BoolArray, marked: StatusArray) -> None:
-    """Fill `marked` (n, J): `status`, with OTHER_SPEED where a valid sample is not one that a class `judges` (n,)."""
-    for j in range(status.shape[1]):
-        for k in range(status.shape[0]):
-            elsewhere = (status[k, j] == Status.VALID) & (not judges[k])
-            marked[k, j] = Status.OTHER_SPEED.value if elsewhere else status[k, j]
-
-
-@kernel(
-    f"void({_MATRIX}, {_STATUS}, {_MATRIX}, {_MATRIX}, {_ROWS}, {_STATUS}, {_ROWS}, "
-    "float64[:,::1], uint8[:,::1], float64[:,::1], float64[:,::1])"
-)
-def take_only_class(  # noqa: PLR0913  a kernel: one loop, arrays one by one
-    own_values: FloatArray,
-    own_status: StatusArray,
-    own_lower: FloatArray,
-    own_upper: FloatArray,
-    judges: BoolArray,
-    signal_status: StatusArray,
-    recent: BoolArray,
-    values: FloatArray,
-    status: StatusArray,
-    lower: FloatArray,
-    upper: FloatArray,
-) -> None:
-    """Fill `values`, `status` and limits (n, J) where the only class judges (n,), and what holds elsewhere.
-
-    There, a valid sample of the signal is of another speed, or missing without a `recent` speed (n,).
-    """
-    for j in range(status.shape[1]):
-        for k in range(status.shape[0]):
-            taken = judges[k] & (own_status[k, j] == Status.VALID)
-            values[k, j] = own_values[k, j] if taken else values[k, j]
-            lower[k, j] = own_lower[k, j] if taken else math.nan
-            upper[k, j] = own_upper[k, j] if taken else math.nan
-            elsewhere = Status.OTHER_SPEED.value if recent[k] else Status.GAP.value
-            state = elsewhere if signal_status[k, j] == Status.VALID else int(signal_status[k, j])
-            status[k, j] = own_status[k, j] if judges[k] & (taken | (state == Status.OTHER_SPEED.value)) else state
 
 
 @kernel(
@@ -275,17 +229,3 @@ def merge_share(  # noqa: PLR0913  a kernel: one loop, arrays one by one
                 marks[k, j] |= OPEN_ABOVE
             if math.isfinite(low) or math.isfinite(high):
                 marks[k, j] |= LIMITED
-
-
-@kernel(f"void({_MATRIX}, {_STATUS}, {_ROWS}, int64, float64[:,::1], b1[:,::1])")
-def lower_factors(
-    own_met: FloatArray, own_status: StatusArray, judges: BoolArray, first: int, met: FloatArray, judged: BoolArray
-) -> None:
-    """Take a class's factors where they are lower than those so far, and mark the samples that any class judges."""
-    for j in range(own_met.shape[1]):
-        for i in range(own_met.shape[0]):
-            if judges[i] and own_status[i, j] == Status.VALID:
-                k = first + i
-                if own_met[i, j] < met[k, j] or math.isnan(own_met[i, j]):
-                    met[k, j] = own_met[i, j]
-                judged[k, j] = True

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RoundedIntegers
 from cdtool.recording import FloatArray
 
 # float64 represents every integer up to the first value; 64-bit integers are below the second.
@@ -24,4 +23,4 @@ def rounded_integers(values: FloatArray) -> int:
 
 def rounding_finding(column: str, count: int, severity: Literal["note", "warning"] = "warning") -> list[Finding]:
     """Return the finding on a column with that many rounded values; empty for none."""
-    return [Finding(RoundedIntegers(count), column, severity)] if count else []
+    return [Finding("rounded_integers", column, {"count": count}, severity)] if count else []

@@ -10,7 +10,6 @@ from earlier samples only (`motion.strokes`).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -19,8 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError, UsageError, nearest
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.median_kernel import quantile_of
 from cdtool.motion import MotionClass, leading_joint, motion_class
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.short_repr import short_repr
@@ -130,8 +127,7 @@ def _motion_spans(recording: Recording) -> list[tuple[float, float]]:
     speed = np.ascontiguousarray(series.values[:, joint])
     if not len(speed):
         return []
-    sign = np.empty(len(speed), dtype=np.int8)
-    find_directions(speed, sign)
+    sign = _directions(speed)
     strokes: list[list[float]] = []
     direction = 0
     for first, last in _runs(sign):
@@ -169,15 +165,11 @@ def _with_margins(strokes: list[list[float]], recording: Recording) -> list[tupl
     return spans
 
 
-@kernel(f"void({READ_ONLY}, int8[::1])", exact=True)
-def find_directions(speed: FloatArray, direction: npt.NDArray[np.int8]) -> None:
-    """Fill the direction (n,) in which a speed moves: 1, -1, or 0 at rest, also where it is missing.
+def _directions(speed: FloatArray) -> npt.NDArray[np.int8]:
+    """Return the direction (n,) in which a speed moves: 1, -1, or 0 at rest, also where it is missing.
 
     It is at rest up to a share of the magnitude that 99 % of the samples do not exceed.
     """
-    size = np.empty(len(speed))
-    for k in range(len(speed)):
-        size[k] = 0.0 if math.isnan(speed[k]) else min(abs(speed[k]), _LARGEST)
-    rest = _REST_SHARE * quantile_of(size, len(size), 0.99)
-    for k in range(len(speed)):
-        direction[k] = 1 if speed[k] > rest else (-1 if -speed[k] > rest else 0)
+    size = np.minimum(np.abs(np.where(np.isnan(speed), 0.0, speed)), _LARGEST)
+    rest = _REST_SHARE * np.quantile(size, 0.99)
+    return np.asarray((speed > rest).astype(np.int8) - (-speed > rest).astype(np.int8))

@@ -17,8 +17,6 @@ from typing import Any, Self
 import numpy as np
 
 from cdtool.findings import Finding
-from cdtool.findings.channels import ImplausibleValues, Leap, LeapingValues, LearnedInOtherUnit
-from cdtool.findings.plausibility import ChannelCheck
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
 
@@ -77,7 +75,7 @@ class PlausibleRanges:
     """The plausible values of each channel, and the checks of channels that contradict the machine file."""
 
     channels: Mapping[str, ChannelRange]
-    contradicted: tuple[ChannelCheck, ...] = ()
+    contradicted: tuple[Finding, ...] = ()
 
     __repr__ = short_repr
 
@@ -114,7 +112,7 @@ class PlausibleRanges:
                 continue
             series = recording[name]
             if (series.unit, series.joint_count) != (known.unit, len(known.centre)):
-                findings.append(Finding(LearnedInOtherUnit(series.unit, known.unit), name))
+                findings.append(Finding("learned_in_other_unit", name, {"logged": series.unit, "learned": known.unit}))
                 continue
             of_channel = factors.get(name, ())
             if not to_learn and _is_usual(series, known, FAR.get(name, _FAR_ELSE)):
@@ -129,10 +127,17 @@ class PlausibleRanges:
                 factor = of_channel[j] if of_channel else 0.0
                 behind, leaps = _leapt(series.time, values[:, j], known, known.centre[j], factor)
                 if wrong[:, j].any():
-                    findings.append(Finding(_far_values(series, j, wrong[:, j], known, joint), name, "loss"))
+                    far = _far_values(series, j, wrong[:, j], known, joint)
+                    findings.append(Finding("implausible_values", name, far))
                 if behind.any():
                     masked = int(np.count_nonzero(behind))
-                    findings.append(Finding(LeapingValues(masked, joint, tuple(leaps), series.unit), name, "loss"))
+                    findings.append(
+                        Finding(
+                            "leaping_values",
+                            name,
+                            {"count": masked, "joint": joint, "leaps": tuple(leaps), "unit": series.unit},
+                        )
+                    )
                 values[behind, j] = np.nan
             if wrong.any() or not np.array_equal(values, series.values, equal_nan=True):
                 channels[name] = Series(series.time, values, series.unit)
@@ -140,8 +145,8 @@ class PlausibleRanges:
 
     def contradicted_by(self, checks: Iterable[Finding]) -> PlausibleRanges:
         """Return the ranges with the checks that are contradictions."""
-        lost = (item.fact for item in checks if item.severity == "loss")
-        return replace(self, contradicted=tuple(fact for fact in lost if isinstance(fact, ChannelCheck)))
+        lost = (item for item in checks if item.severity == "loss")
+        return replace(self, contradicted=tuple(item for item in lost if item.kind == "channel_check"))
 
     def without_contradicted(self, recording: Recording) -> Recording:
         """Return the recording without values of the channels that a check contradicts, and a loss for each."""
@@ -149,14 +154,13 @@ class PlausibleRanges:
         channels = dict(recording.channels)
         for check in checks:
             series = channels[check.channel]
-            wrong = np.array([check.joint in ("", joint) for joint in recording.joints])
+            wrong = np.array([check.numbers["joint"] in ("", joint) for joint in recording.joints])
             channels[check.channel] = series.with_values(np.where(wrong, np.nan, series.values), series.unit)
-        losses = tuple(Finding(check, check.channel, "loss") for check in checks)
-        return replace(recording, channels=channels, findings=(*recording.findings, *losses)) if checks else recording
+        return replace(recording, channels=channels, findings=(*recording.findings, *checks)) if checks else recording
 
     def to_dict(self) -> dict[str, Any]:
         """Return the ranges as JSON values."""
-        checks = {_CHECKS: [asdict(item) for item in self.contradicted]} if self.contradicted else {}
+        checks = {_CHECKS: [dict(item.numbers) for item in self.contradicted]} if self.contradicted else {}
         return {name: asdict(item) for name, item in self.channels.items()} | checks
 
     @classmethod
@@ -177,7 +181,8 @@ class PlausibleRanges:
             figures = [*item.centre, item.reach, item.rate, item.extreme]
             if not (np.isfinite(figures).all() and item.reach > 0.0 <= min(item.rate, item.extreme)):
                 raise ValueError(f"a plausible range of {name} with reach {item.reach:g} and rate {item.rate:g}")
-        return cls(channels, tuple(ChannelCheck(**item) for item in values.get(_CHECKS, ())))
+        checks = [Finding("channel_check", item["channel"], item, "loss") for item in values.get(_CHECKS, ())]
+        return cls(channels, tuple(checks))
 
 
 @dataclass(frozen=True)
@@ -289,7 +294,7 @@ def _spikes(values: FloatArray, known: ChannelRange, far: float) -> BoolArray:
 
 def _leapt(
     time: FloatArray, values: FloatArray, known: ChannelRange, centre: float, factor: float
-) -> tuple[BoolArray, list[Leap]]:
+) -> tuple[BoolArray, list[dict[str, Any]]]:
     """Return True (n,) for the values of a joint after a leap, and its leaps: steps impossible for the machine."""
     index = np.flatnonzero(np.isfinite(values))
     step = np.abs(np.diff(values[index]))
@@ -305,15 +310,16 @@ def _leapt(
     return wrong, leaps
 
 
-def _far_values(series: Series, j: int, wrong: BoolArray, known: ChannelRange, joint: str) -> ImplausibleValues:
+def _far_values(series: Series, j: int, wrong: BoolArray, known: ChannelRange, joint: str) -> dict[str, Any]:
     rows = np.flatnonzero(wrong)
     first, time = float(series.values[rows[0], j]), float(series.time[rows[0]])
-    return ImplausibleValues(len(rows), joint, first, time, known.centre[j], known.reach, series.unit)
+    usual = {"centre": known.centre[j], "reach": known.reach, "unit": series.unit}
+    return {"count": len(rows), "joint": joint, "first": first, "time": time, **usual}
 
 
 def _behind_leaps(
     time: FloatArray, values: FloatArray, is_leap: BoolArray, near: float, usual: tuple[float, float] | None
-) -> tuple[BoolArray, list[Leap]]:
+) -> tuple[BoolArray, list[dict[str, Any]]]:
     """Return True (n,) for the values after a leap, and the leaps; `is_leap` (n - 1,): the steps that are leaps.
 
     A value is back if it is within `near` of the one before the leap. With `usual` (centre and reach) a position may
@@ -326,16 +332,16 @@ def _behind_leaps(
     for number, at in enumerate(places):
         if at < end:
             continue
-        leap = Leap(float(time[at + 1]), float(values[at]), float(values[at + 1]))
+        leap = {"time": float(time[at + 1]), "before": float(values[at]), "after": float(values[at + 1])}
         if at < _EDGE and end == 0 and len(values) > 2 * _EDGE:
             wrong[: at + 1] = True
-            leaps.append(leap)
+            leaps.append({**leap, "new_zero": math.nan})
             end = at + 2
             continue
         end, moves_on = _end(time, values, [*places[number:], len(values) - 1], near, usual)
         wrong[at + 1 : end] = True
         new_zero = float(time[end]) if moves_on else math.nan
-        leaps.append(Leap(leap.time, leap.before, leap.after, new_zero))
+        leaps.append({**leap, "new_zero": new_zero})
     return wrong, leaps
 
 

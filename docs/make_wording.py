@@ -4,11 +4,11 @@ FILE ends in .html: messages, help pages, pages of the documentation and the rep
 columns; this runs both revisions. FILE ends in .md: a table of the messages only.
 
 A message is the text of an error, finding or line on screen, or the help of an option, with two consecutive words: the
-string arguments of a raised error, `fault`, `Finding`, `Remark`, `Skipped`, `echo` and `say`, the `words` of a fact or
-what its `sentence` returns, and `help=`. It has changed if its words are nowhere among the messages of the other
-revision. A changed message of the revision before is paired with the most similar one of the revision after, first
-within a hunk of `git diff -U0`, then in the whole package, where at least half of the words must be the same. All pairs
-are chosen with equal probability; messages without a counterpart are only counted.
+string arguments of a raised error, `fault`, `Remark`, `remark`, `Skipped`, `echo` and `say`, the `words` of a fact or
+what its `sentence` returns, the texts of `kinds.toml`, and `help=`. It has changed if its words are nowhere among the
+messages of the other revision. A changed message of the revision before is paired with the most similar one of the
+revision after, first within a hunk of `git diff -U0`, then in the whole package, where at least half of the words must
+be the same. All pairs are chosen with equal probability; messages without a counterpart are only counted.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MESSAGES, HELP_PAGES, PAGES = 20, 5, 3
 BENCHMARK = "sample_logs/gate/benchmark.toml"
 
 # Calls with a message: these take one in their first argument, errors and faults in all.
-_FIRST = ("Finding", "Remark", "echo", "say")
+_FIRST = ("Finding", "Remark", "remark", "echo", "say")
 _ALL = ("fault", "Skipped", "RecordingFinding")
 _KEYWORDS = ("message", "hint", "reason")
 _TWO_WORDS = re.compile(r"[A-Za-z]{2,},? [A-Za-z]{2,}")
@@ -48,6 +48,8 @@ _LEAST_IN_HUNK, _LEAST = 0.3, 0.5
 _LONGEST_EXPRESSION = 40
 # A field of a template.
 _FIELD = re.compile(r"\{[\w.:!]*\}")
+# A number in a sentence of `kinds.toml`, with its format.
+_NAMED = re.compile(r"\{[^{}]*\}")
 _HUNK = re.compile(r"^@@ -(\d+)(?:,(\d+))? \+(\d+)(?:,(\d+))? @@")
 
 _LIST_COMMANDS = """
@@ -116,8 +118,11 @@ class Revision:
 
     def messages(self) -> list[Message]:
         """Return the messages of the package in order of file and line."""
-        files = sorted(name for name in self.names if name.startswith("cdtool/") and name.endswith(".py"))
-        return [message for name in files for message in messages_in(self.text(name), name)]
+        files = sorted(name for name in self.names if name.startswith("cdtool/"))
+        found = [message for name in files if name.endswith(".py") for message in messages_in(self.text(name), name)]
+        for name in files:
+            found += _kinds(self.text(name), name) if name.endswith("/kinds.toml") else []
+        return found
 
     def pages(self) -> list[str]:
         """Return the names of the pages of the documentation."""
@@ -140,6 +145,14 @@ def messages_in(source: str, file: str) -> list[Message]:
                 words = tuple(_FIELD.sub(" ", " ".join(literals)).lower().split())
                 found[first, parts[0].col_offset] = Message(file, first, last, text, words)
     return [found[place] for place in sorted(found)]
+
+
+def _kinds(source: str, file: str) -> Iterator[Message]:
+    """Yield the sentences of the kinds of findings, each on a line of its own."""
+    for number, line in enumerate(source.splitlines(), 1):
+        text = line.partition(" = ")[2].strip("\"'")
+        if _TWO_WORDS.search(text) and not line.startswith("#"):
+            yield Message(file, number, number, text, tuple(_NAMED.sub(" ", text).lower().split()))
 
 
 def _texts(node: ast.AST) -> Iterator[list[ast.expr]]:

@@ -60,10 +60,10 @@ NESTED = "[" * 200_000
 PARSED_ELSEWHERE = {
     "cdtool/machine_file.py": "the parameters of a machine, encoded two lines above",
     "cdtool/cli/console.py": "the result of a command, encoded two lines above",
-    "cdtool/messages/columns/json.py": "one message of a log, whose nesting is a reason",
-    "cdtool/messages/columns/json_shape.py": "one message of a log, whose nesting is a reason",
+    "cdtool/messages/json_messages.py": "one message of a log, whose nesting is a reason",
     "cdtool/report/protocol/words.py": "a file of the package",
     "cdtool/cli/init.py": "one value of an option",
+    "cdtool/findings/kinds.py": "a file of the package",
 }
 
 

@@ -1,9 +1,8 @@
-"""Compiled kernels: lazy, linked, cached, and without a writable cache."""
+"""Compiled kernels: lazy, linked, cached; a damaged cache, one that cannot be written, and first starts at once."""
 
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,14 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-import cdtool.activation
-import cdtool.machines.tree_inverse_kernel
-import cdtool.machines.tree_kernel
-import cdtool.thresholds.first_order
-from cdtool import kernel_warm_up, kernels
-from cdtool.kernel_warm_up import compile_package, shares
-from cdtool.kernels import Kernel, kernel, read_only
+from cdtool import kernels
+from cdtool.kernels import fields_of, kernel, read_only
 from cdtool.recording import FloatArray
+
+_PROJECT = Path(__file__).parents[1]
 
 
 @kernel("float64(float64)")
@@ -45,7 +41,7 @@ class _Scale(NamedTuple):
     values: FloatArray
 
 
-@kernel("float64(_Scale, int64)")
+@kernel(f"float64({fields_of(_Scale)}, int64)")
 def _scaled(scale: _Scale, k: int) -> float:
     return scale.factor * scale.values[k]
 
@@ -70,25 +66,73 @@ def no_cache_folder(monkeypatch):
 
     implementation = getattr(caching, "_CacheImpl", None) or caching.CacheImpl
     monkeypatch.setattr(implementation, "_locator_classes", [])
-    monkeypatch.setattr(kernels, "_told", False)
+    kernels._tell_not_stored.cache_clear()
 
 
-def test_without_a_writable_cache_it_compiles_and_warns_once(no_cache_folder):
+@pytest.mark.parametrize(("folder", "named"), [("/cache/numba", "in /cache/numba: "), ("", "the folder of cdtool or")])
+def test_a_cache_that_cannot_be_written_is_reported_once(no_cache_folder, monkeypatch, folder, named):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", folder)
     first = kernel("float64(float64)")(lambda x: x + 1.0)
     second = kernel("float64(float64)")(lambda x: x + 2.0)
-    with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
+    with pytest.warns(UserWarning, match="Set NUMBA_CACHE_DIR") as told:
         assert (first(1.0), second(1.0)) == (2.0, 3.0)
-    assert len(told) == 1
+    (line,) = [str(item.message) for item in told]
+    assert named in line and "\n" not in line
 
 
-@pytest.mark.parametrize(
-    ("folder", "named"), [("/cache/numba", "(NUMBA_CACHE_DIR = /cache/numba)"), ("", "(neither that of cdtool nor one")]
-)
-def test_the_warning_names_the_folder_that_cannot_be_written(no_cache_folder, monkeypatch, folder, named):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", folder)
-    with pytest.warns(UserWarning, match=re.escape(named)) as told:
-        assert kernel("float64(float64)")(lambda x: x + 3.0)(1.0) == 4.0
-    assert "\n" not in str(told[0].message)
+_DOUBLE = "from cdtool.kernels import kernel\n@kernel('float64(float64)')\ndef double(x):\n    return 2.0 * x\n"
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory) -> Path:
+    file = tmp_path_factory.mktemp("source") / "own_kernels.py"
+    file.write_text(_DOUBLE)
+    return file
+
+
+def _start(source: Path, folder: Path, before: str = "") -> subprocess.Popen[str]:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": f"{_PROJECT}:{source.parent}"}
+    run = [sys.executable, "-B", "-c", f"{before}from own_kernels import double\nprint(double(1.5))"]
+    return subprocess.Popen(run, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+@pytest.fixture(scope="module")
+def filled_cache(source, tmp_path_factory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("cache")
+    assert _start(source, folder).communicate() == ("3.0\n", "")
+    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*.nb?")}
+
+
+@pytest.mark.parametrize("kind", [".nbi", ".nbc"])
+@pytest.mark.parametrize("left", [lambda _: b"", lambda data: data[: len(data) // 2], lambda data: bytes(len(data))])
+def test_a_damaged_cache_is_removed_and_compiled_again(left, kind, filled_cache, source, tmp_path):
+    for name, data in filled_cache.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(left(data) if name.endswith(kind) else data)
+    damaged = {file: file.read_bytes() for file in tmp_path.rglob(f"*{kind}")}
+    assert damaged
+    assert _start(source, tmp_path).communicate() == ("3.0\n", "")
+    assert not [file for file, data in damaged.items() if file.read_bytes() == data]
+
+
+def test_three_first_starts_at_once_give_the_same(source, tmp_path):
+    assert {process.communicate() for process in [_start(source, tmp_path) for _ in range(3)]} == {("3.0\n", "")}
+
+
+def test_with_numba_switched_off_a_kernel_runs_as_python(source, tmp_path):
+    switched_off = "import os\nos.environ['NUMBA_DISABLE_JIT'] = '1'\n"
+    assert _start(source, tmp_path, switched_off).communicate() == ("3.0\n", "")
+
+
+def test_a_folder_that_becomes_full_or_read_only_later_does_not_end_the_work(source, tmp_path):
+    full = (
+        "from numba.core.caching import IndexDataCacheFile as file\n"
+        "def full(*_): raise OSError(28, 'No space left on device')\n"
+        "file.save = full\n"
+    )
+    result, told = _start(source, tmp_path, full).communicate()
+    assert result == "3.0\n"
+    assert told.count("Set NUMBA_CACHE_DIR") == 1 and "Traceback" not in told
 
 
 _DEFINE = "from cdtool.kernels import kernel\n@kernel('float64(float64)')\ndef "
@@ -108,8 +152,7 @@ _DEFINE = "from cdtool.kernels import kernel\n@kernel('float64(float64)')\ndef "
 )
 def test_a_cached_kernel_is_recompiled_when_what_it_imports_has_changed(outer, inner, tmp_path):
     (tmp_path / "outer.py").write_text(f"from inner import inner\n{outer}print(outer(3.0))")
-    project = str(Path(__file__).parents[1])
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": project}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(_PROJECT)}
     said = []
     for factor in (2, 2, 5):
         (tmp_path / "inner.py").write_text(inner.format(factor))
@@ -120,11 +163,11 @@ def test_a_cached_kernel_is_recompiled_when_what_it_imports_has_changed(outer, i
 
 def test_a_cached_kernel_is_recompiled_when_a_field_of_its_named_tuple_has_another_name(tmp_path):
     (tmp_path / "outer.py").write_text(
-        "from cdtool.kernels import kernel\nfrom inner import inner\n"
-        "@kernel('float64(inner)')\ndef outer(x):\n    return 2.0 * x.value\nprint(outer(inner(3.0, 5.0)))\n"
+        "from cdtool.kernels import fields_of, kernel\nfrom inner import inner\n"
+        "@kernel(f'float64({fields_of(inner)})')\ndef outer(x: inner):\n    return 2.0 * x.value\n"
+        "print(outer(inner(3.0, 5.0)))\n"
     )
-    project = str(Path(__file__).parents[1])
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": project}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(_PROJECT)}
     said = []
     for fields in ("value: float\n    other: float", "other: float\n    value: float"):
         (tmp_path / "inner.py").write_text(f"from typing import NamedTuple\nclass inner(NamedTuple):\n    {fields}\n")
@@ -137,122 +180,8 @@ def test_importing_modules_with_kernels_does_not_load_numba():
     code = (
         "import sys, cdtool.detectors.friction_ekf, cdtool.activation, cdtool.clock; sys.exit('numba' in sys.modules)"
     )
-    assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1]).returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], cwd=_PROJECT).returncode == 0
 
 
 def test_what_kernels_call_can_be_called_from_python_too():
     assert (_twice_and_one(3.0), _double(3.0)) == (7.0, 6.0)
-
-
-def test_compiling_all_loaded_kernels_leaves_none_to_compile_later(monkeypatch):
-    monkeypatch.setattr(kernel_warm_up, "import_kernels", lambda: None)
-    absent = kernel_warm_up.missing()
-    assert compile_package() == len(absent)
-    assert kernel_warm_up.missing() == []
-    assert _twice_and_one in kernels.entries()
-    assert _double not in kernels.entries()
-
-
-def test_instructions_without_a_caller_are_nothing_to_compile():
-    code = "import cdtool.instructions; from cdtool.kernel_warm_up import missing; print(len(missing()))"
-    run = [sys.executable, "-c", code]
-    done = subprocess.run(run, cwd=Path(__file__).parents[1], capture_output=True, text=True, check=True)
-    assert done.stdout == "0\n"
-
-
-def _ours() -> list[Kernel]:
-    modules = ("cdtool.activation", "cdtool.machines.tree_kernel", "cdtool.machines.tree_inverse_kernel")
-    return [
-        item for item in kernels.entries() if item.function.__module__ in (*modules, "cdtool.thresholds.first_order")
-    ]
-
-
-def _callees(items: list[Kernel]) -> set[Kernel]:
-    return {part for item in items for part in kernel_warm_up._parts(item) - {item}}
-
-
-def test_no_kernel_is_compiled_by_two_processes(monkeypatch):
-    monkeypatch.setattr(kernel_warm_up, "_WORTH_A_PROCESS", 500)
-    made = shares(_ours(), 3)
-    assert len(made) == 3
-    assert sorted(id(item) for share in made for item in share) == sorted(map(id, _ours()))
-    assert sum(len(_callees(share)) for share in made) == len(_callees(_ours())) > 10
-
-
-def test_kernels_of_plug_ins_stay_with_the_process_that_has_them(monkeypatch):
-    monkeypatch.setattr(kernel_warm_up, "_WORTH_A_PROCESS", 500)
-    own, *others = shares([*_ours(), _twice_and_one], 3)
-    assert others
-    assert _twice_and_one in own
-
-
-def test_one_core_and_little_to_compile_make_one_share():
-    assert len(shares(_ours(), 1)) == 1
-    assert len(shares([cdtool.thresholds.first_order._recursion], 8)) == 1
-
-
-_WARM_UP = """
-import sys
-import cdtool.activation, cdtool.thresholds.first_order
-from cdtool import kernel_warm_up
-kernel_warm_up.usable_cores, kernel_warm_up._WORTH_A_PROCESS, kernel_warm_up._START = lambda: 2, 100, 0
-kernel_warm_up.import_kernels = lambda: None
-{change}
-missing = kernel_warm_up.missing()
-own, others = kernel_warm_up.shares(missing, 2)
-print(bool(own), bool(others), kernel_warm_up.compile_package() == len(missing))
-print(*(set(len(item.compiled.stats.cache_hits) for item in share) for share in (own, others)))
-kernel_warm_up.subprocess.Popen = None  # all is in the cache: no process is started
-print(kernel_warm_up.compile_package(), len(kernel_warm_up._not_cached(own + others)))
-"""
-
-
-@pytest.mark.parametrize(
-    ("change", "taken"),
-    [
-        ("", 1),
-        ("kernel_warm_up._CHILD = 'print(1); raise SystemExit(1)'", 0),
-        ("sys.executable = 'no such program'", 0),
-    ],
-    ids=["another process", "one that dies", "none that starts"],
-)
-def test_what_another_process_compiled_is_taken_from_the_cache_and_the_rest_compiled_here(change, taken, tmp_path):
-    run = [sys.executable, "-c", _WARM_UP.format(change=change)]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    project = Path(__file__).parents[1]
-    done = subprocess.run(run, cwd=project, env=environment, capture_output=True, text=True, check=False)
-    assert done.stdout.splitlines() == ["True True True", f"{{0}} {{{taken}}}", "0 0"], done.stderr
-
-
-@pytest.mark.parametrize("name", ["kernel", "<lambda>"])
-def test_a_kernel_is_not_in_the_cache_before_it_is_compiled_and_after_its_file_has_changed(name, tmp_path):
-    source = tmp_path / "own_kernels.py"
-    source.write_text("def f(x):\n    return x + 1.0\ng = lambda x: x + 1.0\n")
-    namespace: dict = {"__name__": "own_kernels"}
-    exec(compile(source.read_text(), str(source), "exec"), namespace)
-    item = kernel("float64(float64)")(namespace["f" if name == "kernel" else "g"])
-    assert kernel_warm_up._not_cached([item]) == [item]
-    assert item(1.0) == 2.0
-    assert kernel_warm_up._not_cached([item]) == []
-    later = source.stat().st_mtime + 3600.0
-    os.utime(source, (later, later))
-    assert kernel_warm_up._not_cached([item]) == [item]
-
-
-def test_without_a_writable_cache_no_process_is_started(no_cache_folder):
-    assert kernel_warm_up._not_cached(_ours()) == []
-
-
-def test_kernels_in_the_cache_that_an_upgrade_left_valid_are_announced_once(tmp_path):
-    code = "import cdtool.activation; from cdtool import kernel_warm_up as w; w.import_kernels = lambda: 0; "
-    run = [sys.executable, "-c", f"{code}print(w.compile_package() > 0)"]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    project = Path(__file__).parents[1]
-    announced = []
-    for _ in range(3):
-        done = subprocess.run(run, cwd=project, env=environment, capture_output=True, text=True, check=True)
-        announced.append(done.stdout)
-        if len(announced) == 1:
-            for index in tmp_path.rglob("*.nbi"):
-                os.utime(index, (1.0, 1.0))  # older than its file, which is installed again with the same content
-    assert announced == ["True\n", "True\n", "False\n"]

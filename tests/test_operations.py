@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError, UsageError
 from cdtool.motion import motion_class
-from cdtool.operations import find_directions, operations_of
+from cdtool.operations import _directions, operations_of
 from cdtool.recording import Recording, Series
 from tests.bits import samples
 
@@ -93,8 +93,7 @@ def test_directions_are_those_of_numpy_alone(data, count):
         random = np.random.default_rng(data.draw(st.integers(0, 2**31)))
         speed = 0.2 * np.sin(np.linspace(0.0, 7.0, count)) + random.normal(0.0, 0.01, count)
         speed[random.uniform(size=count) < 0.1] = data.draw(st.sampled_from([np.nan, 0.0, np.inf]))
-    found = np.empty(len(speed), dtype=np.int8)
-    find_directions(np.ascontiguousarray(speed), found)
+    found = _directions(speed)
     known = np.nan_to_num(speed)
     rest = 0.05 * np.percentile(np.abs(known), 99.0)
     np.testing.assert_array_equal(found, np.where(np.abs(known) <= rest, 0, np.sign(known)))

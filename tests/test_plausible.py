@@ -91,7 +91,7 @@ def test_an_impossible_value_is_masked_only_in_its_own_row(runs, channel, raw, r
     assert sum(int(mask.sum()) for mask in found.values()) == 1
     finding = ranges.masked(wrong.recording, wrong.factors).findings[-1]
     assert (finding.channel, finding.severity) == (channel, "loss")
-    assert finding.fact.count == 1
+    assert finding.numbers["count"] == 1
 
 
 @pytest.mark.parametrize("raw", [-32768.0, 32767.0, 65535.0])

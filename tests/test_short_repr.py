@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.frozen import frozen
 from cdtool.short_repr import short_repr
 
 
@@ -59,13 +58,3 @@ def test_a_long_value_ends_in_dots():
 def test_a_long_text_keeps_its_end():
     shown = repr(Curve(np.zeros(1), str(Path("folder") / ("x" * 80) / "03.csv")))
     assert "03.csv'" in shown and len(shown) < 100
-
-
-def test_frozen_facts_keep_it():
-    @frozen
-    class Fact:
-        values: np.ndarray
-
-        __repr__ = short_repr
-
-    assert repr(Fact(np.zeros(2))).endswith("Fact(values=<2 floats>)")

@@ -23,7 +23,6 @@ from typer.core import TyperGroup
 from cdtool.cli.streams import lost_output, open_standard_streams
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
-from cdtool.kernel_cache import before_compiling
 from cdtool.plain_text import counted, one_line
 
 COMMANDS: Mapping[str, str] = {
@@ -52,8 +51,8 @@ COMMANDS: Mapping[str, str] = {
 }
 """Every command in the order of the help: the function that defines its options, or the app with its subcommands."""
 
-# The logger on which `cdtool.kernel_cache` reports that it compiles.
-_LOGGER = logging.getLogger("cdtool.kernel_cache")
+# The logger on which `cdtool.kernels` reports that it compiles.
+_LOGGER = logging.getLogger("cdtool.kernels")
 
 # In typer's default mode the help drops text in brackets, such as units.
 _LOOK: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": "markdown"}
@@ -174,38 +173,25 @@ def _end_of(number: int) -> BaseException:
 
 
 class _Line(logging.Handler):
-    """Print each message as a line on stderr, above a progress bar if there is one; progress in the place of it."""
+    """Print each message as a line on stderr, above a progress bar if there is one."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print the message of a record."""
-        if record.levelno >= logging.INFO:
-            typer.echo(one_line(record.getMessage()), err=True)
-        elif os.environ.get("TERM") != "dumb":
-            terminal = getattr(sys.stderr, "rich_proxied_file", sys.stderr)
-            terminal.write(f"\r\x1b[2K{record.getMessage()}")
-            terminal.flush()
+        typer.echo(one_line(record.getMessage()), err=True)
 
 
 @contextmanager
-def compilation_at_once() -> Iterator[None]:
-    """Compile all kernels when one must be, and show it in the block; nothing is shown if stderr is not a terminal."""
+def showing_first_use() -> Iterator[None]:
+    """Show in the block that kernels are compiled; nothing is shown if stderr is not a terminal."""
     before, handler = _LOGGER.level, _Line()
-    before_compiling.append(_compile_package)
     if sys.stderr.isatty():
         _LOGGER.addHandler(handler)
-        _LOGGER.setLevel(logging.DEBUG)
+        _LOGGER.setLevel(logging.INFO)
     try:
         yield
     finally:
-        before_compiling.clear()
         _LOGGER.setLevel(before)
         _LOGGER.removeHandler(handler)
-
-
-def _compile_package() -> None:
-    from cdtool.kernel_warm_up import compile_package
-
-    compile_package()
 
 
 def main() -> None:
@@ -221,7 +207,7 @@ def main() -> None:
 def _run_app(came: list[int]) -> Any:
     """Run the app and return its status. A signal ends it even if a library replaced the exception during an import."""
     try:
-        with compilation_at_once():
+        with showing_first_use():
             return app(standalone_mode=False)
     except (KeyboardInterrupt, SystemExit, typer.Abort):
         raise

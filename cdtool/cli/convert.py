@@ -44,7 +44,6 @@ def convert(
 
     Example: cdtool convert sample_logs/gate/stiff/03.csv stiff-03.mcap -m sample_logs/gate/machine.toml
     """
-    from cdtool.findings.containers import Unverified
     from cdtool.workflows.convert.converting import convert as write
 
     with late_progress("converting", quiet=quiet) as advance:
@@ -58,6 +57,6 @@ def convert(
         for path in done.machine_files:
             typer.echo(f"{plain(path)}: machine file for it")
     for finding in done.findings:
-        if finding.severity != "note" or isinstance(finding.fact, Unverified):
+        if finding.severity != "note" or finding.kind == "unverified":
             typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
     leave_with(done.findings)

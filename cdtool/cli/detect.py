@@ -137,10 +137,11 @@ class _Run:
         """Print the results and exit with their status."""
         from cdtool.evaluation.results import RecordingFinding
         from cdtool.findings import Finding
-        from cdtool.findings.scoring import LearnedFromIt
         from cdtool.workflows.runs import absent_truth
 
-        learned = [RecordingFinding.of(str(log), Finding(LearnedFromIt())) for log, found in self.done if found.learned]
+        learned = [
+            RecordingFinding.of(str(log), Finding("learned_from_it")) for log, found in self.done if found.learned
+        ]
         absent = [
             RecordingFinding.of(str(log), item) for log, found in self.done for item in absent_truth(found.recording)
         ]

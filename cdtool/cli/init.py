@@ -16,7 +16,6 @@ from cdtool.cli.logs_argument import logs_argument
 from cdtool.cli.options import JsonOption, QuietOption
 from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
-from cdtool.findings.clocks import SteadyHeader
 
 if TYPE_CHECKING:
     from cdtool.workflows.init.drafting import Drafted, DraftedStudy
@@ -138,7 +137,7 @@ def _warn(drafted: Drafted) -> None:
     for name in drafted.left_out:
         typer.echo(f"warning: {name}: the log contradicts the guess: written as a comment", err=True)
     for finding in drafted.findings:
-        if finding.severity == "loss" or isinstance(finding.fact, SteadyHeader):
+        if finding.severity == "loss" or finding.kind == "steady_header":
             typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
 
 

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from cdtool.clock.held_samples import HOLD_PERIODS, previous_value
+from cdtool.clock.held_samples import HOLD_PERIODS, hold_last, previous_value
 from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Series
@@ -45,20 +45,10 @@ def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:
 
 def integrate(series: Series, unit: str) -> Series:
     """Return the causal integral of a speed from 0 (trapezoidal rule); a missing sample repeats the last speed."""
-    travel = np.empty(series.values.shape)
-    _integrate(series.time, series.values, travel)
+    speed = hold_last(series.values, ~np.isfinite(series.values))
+    travel = np.zeros(speed.shape)
+    np.cumsum(np.diff(series.time)[:, np.newaxis] * 0.5 * (speed[1:] + speed[:-1]), axis=0, out=travel[1:])
     return series.with_values(travel, unit)
-
-
-@kernel(f"void({READ_ONLY}, Array(float64, 2, 'C', readonly=True), float64[:,::1])", exact=True)
-def _integrate(time: FloatArray, speed: FloatArray, travel: FloatArray) -> None:
-    for j in range(speed.shape[1]):
-        before = 0.0  # the speed before the first known one
-        for k in range(speed.shape[0]):
-            now = speed[k, j] if math.isfinite(speed[k, j]) else before
-            step = (time[k] - time[k - 1]) * 0.5 * (now + before) if k > 0 else 0.0
-            travel[k, j] = travel[k - 1, j] + step if k > 1 else step
-            before = now
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[:])")

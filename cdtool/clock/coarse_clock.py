@@ -42,20 +42,12 @@ def fit_line(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
     usual = float(steps[:2].min())
     step = np.concatenate(([usual], recent_medians(steps, usual)))
     time = np.full(len(stamps), np.nan)
-    _follow(distinct, counts, step, time)
+    # The log may begin within a stamp, with too few samples: of the first two stamps, the shorter period counts.
+    near = steps[:2] <= _PAUSE * usual
+    periods = steps[:2][near] / counts[: len(steps)][:2][near]
+    last = [usual / counts[1]] if len(distinct) == 2 else []
+    _follow(distinct, counts, step, float(min(*periods, *last, np.inf)), time)
     return time, np.isfinite(time)
-
-
-@kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY})")
-def _first_period(stamps: FloatArray, counts: FloatArray, step: FloatArray) -> float:
-    """Return the sample period from the first stamps, where the log may begin within a stamp, with too few samples."""
-    period = math.inf
-    for i in range(min(2, len(stamps) - 1)):
-        if stamps[i + 1] - stamps[i] <= _PAUSE * step[0]:
-            period = min(period, (stamps[i + 1] - stamps[i]) / counts[i])
-    if len(stamps) == 2:
-        period = min(period, step[0] / counts[1])
-    return period
 
 
 @kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64, float64)")
@@ -66,14 +58,13 @@ def _anchor(stamps: FloatArray, counts: FloatArray, step: FloatArray, i: int, pe
     return float(min(max(stamps[i + 1] - counts[i] * period, stamps[i]), stamps[i] + step[i]))
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64[:])")
-def _follow(stamps: FloatArray, counts: FloatArray, step: FloatArray, time: FloatArray) -> None:
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64, float64[:])")
+def _follow(stamps: FloatArray, counts: FloatArray, step: FloatArray, period: float, time: FloatArray) -> None:
     """Fill `time` by recursive least squares over the stamp changes; it stays NaN where a sample is not kept.
 
     The covariance (a, b; b, c) of the line's value and slope is in units of the variance of one stamp change, which is
     uniformly distributed over a period.
     """
-    period = _first_period(stamps, counts, step)
     value = _anchor(stamps, counts, step, 0, period)
     a, b, c = 1.0, 0.0, 12.0 / (step[0] / period) ** 2
     last = -math.inf

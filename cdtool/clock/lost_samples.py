@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from cdtool.clock.held_samples import ONE_BY_ONE, READ_MARKS, is_on_clock, search
+from cdtool.clock.held_samples import is_on_clock
 from cdtool.clock.recent_steps import RECENT_STEPS, usual_steps
-from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # A channel is late if its newest sample is older than this many times its longest usual step.
@@ -50,47 +50,21 @@ def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray:
     missing: BoolArray = ~np.isfinite(series.values)
     if is_on_clock(series, clock):
         return missing
-    lost = np.empty((len(clock), series.joint_count), dtype=np.bool_)
-    _fill_lost(series.time, usual_steps(series.time), missing, np.ascontiguousarray(clock), lost)
-    return lost
+    time, usual = series.time, usual_steps(series.time)
+    if not len(time):
+        return np.zeros((len(clock), series.joint_count), dtype=bool)
+    at = np.searchsorted(time, clock, side="right") - 1
+    age = clock - time[np.maximum(at, 0)]
+    # How many of the last 20 times before each one have a sample.
+    shared = np.concatenate((np.zeros(_SHARED_WINDOW + 1), np.cumsum(age == 0.0)))
+    due = (shared[_SHARED_WINDOW:-1] - shared[: -_SHARED_WINDOW - 1] >= _SHARED_SAMPLES) & (age > 0.0)
+    longest = _longest_recent_steps(time)
+    late = due | ((at > 0) & (age > _LATE * np.minimum(longest, _USUAL * usual)[at]))
+    return np.asarray((at >= 0)[:, np.newaxis] & (late[:, np.newaxis] | missing[at]))
 
 
-@kernel(f"float64({READ_ONLY}, int64)")
-def _longest_recent_step(time: FloatArray, at: int) -> float:
-    """Return the longest of the last 9 steps up to sample `at`, which is not the first."""
-    longest = 0.0
-    for k in range(max(at - RECENT_STEPS + 1, 1), at + 1):
-        longest = max(longest, time[k] - time[k - 1])
+def _longest_recent_steps(time: FloatArray) -> FloatArray:
+    """Return the longest of the last 9 steps up to each sample (n,); 0 at the first."""
+    steps = np.concatenate((np.zeros(RECENT_STEPS), np.diff(time)))
+    longest: FloatArray = sliding_window_view(steps, RECENT_STEPS).max(axis=1)
     return longest
-
-
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_MARKS}, {READ_ONLY}, b1[:, ::1])")
-def _fill_lost(time: FloatArray, usual: FloatArray, missing: BoolArray, clock: FloatArray, lost: BoolArray) -> None:
-    """Fill `lost` (m, J); `usual` (n,): the median step up to each sample, `missing` (n, J): which have no value.
-
-    The longest usual step is the longest recent one, at most twice the median: never less than the median itself, so
-    that it is determined only for a sample older than 1.5 times that.
-    """
-    at = -1
-    # One bit for each of the last 20 times of the clock: whether the channel has a sample there.
-    shared = 0
-    count = 0
-    for k in range(len(clock)):
-        now = clock[k]
-        if at >= 0 and now < time[at]:
-            at = search(time, now, -1, at)
-        passed = 0
-        while at + 1 < len(time) and time[at + 1] <= now:
-            at += 1
-            passed += 1
-            if passed == ONE_BY_ONE:
-                at = search(time, now, at, len(time))
-        age = now - time[max(at, 0)]
-        late = count >= _SHARED_SAMPLES and age > 0.0
-        if at > 0 and not late and age > _LATE * usual[at]:
-            late = age > _LATE * min(_longest_recent_step(time, at), _USUAL * usual[at])
-        for j in range(missing.shape[1]):
-            lost[k, j] = at >= 0 and (late or missing[at, j])
-        now_shared = 1 if age == 0.0 else 0
-        count += now_shared - ((shared >> (_SHARED_WINDOW - 1)) & 1)
-        shared = ((shared << 1) | now_shared) & ((1 << _SHARED_WINDOW) - 1)

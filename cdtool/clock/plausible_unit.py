@@ -7,10 +7,10 @@ time stamp 3,000 years after its zero is not.
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 
-from cdtool.findings.clocks import TwoReadings
 from cdtool.recording import FloatArray
 
 # A clock that counts from 1970 in one of these units lies between the years 2001 and 2100.
@@ -47,10 +47,10 @@ def contradicted_by_epoch(stamp: float, factor: float) -> str:
     return unit_since_1970(stamp) if stamp * factor > _LONGEST else ""
 
 
-def both_readings(stamp: float, factor: float, stated: str, meant: str) -> TwoReadings:
+def both_readings(stamp: float, factor: float, stated: str, meant: str) -> dict[str, Any]:
     """Return a first time stamp as read in the stated unit (`factor` s), and in the unit `meant` since 1970."""
     day = datetime.fromtimestamp(stamp * SECONDS[meant], tz=UTC).date().isoformat()
-    return TwoReadings(stamp, stated, stamp * factor / _YEAR, meant, day)
+    return {"stamp": stamp, "stated": stated, "years": stamp * factor / _YEAR, "meant": meant, "day": day}
 
 
 def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float]:
@@ -72,5 +72,5 @@ def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float
     step = float(np.median(steps))
     if _SHORTEST_STEP <= step * factor <= _LONGEST_STEP:
         return "", 0.0
-    fitting = [name for name, one in SECONDS.items() if _SLOWEST <= 1.0 / (step * one) <= _FASTEST]
+    fitting = [name for name, one in SECONDS.items() if _SLOWEST * (step * one) <= 1.0 <= _FASTEST * (step * one)]
     return min(fitting, key=lambda name: abs(np.log(step * SECONDS[name] / 1e-3)), default=""), step * factor

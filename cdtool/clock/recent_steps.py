@@ -6,15 +6,10 @@ import weakref
 
 import numpy as np
 
-from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
 
 RECENT_STEPS = 9
 _BEFORE = RECENT_STEPS - 1
-# Samples whose medians are computed together: their work arrays fit into the fastest cache.
-_BLOCK = 512
-# A window of nine is three triples, the oldest of them six samples before the newest.
-_TRIPLES_BACK = 6
 # Up to this many samples the usual steps are kept with the array of times; beyond, memory is worth more than time.
 _MOST_KEPT = 1 << 20
 
@@ -72,45 +67,19 @@ def recent_medians(steps: FloatArray, before: float) -> FloatArray:
 
 
 def _take_medians(padded: FloatArray, medians: FloatArray) -> None:
-    """Fill `medians` (n,) with those of nine consecutive steps (n + 8,)."""
-    unknown = _fill_medians(padded, *np.empty((3, _BLOCK + _TRIPLES_BACK)), medians)
-    if unknown and len(medians):
-        windows = np.lib.stride_tricks.sliding_window_view(np.isnan(padded), RECENT_STEPS)
-        medians[windows.any(axis=1)] = np.nan
-
-
-@kernel(f"int64({READ_ONLY}, float64[::1], float64[::1], float64[::1], float64[::1])")
-def _fill_medians(steps: FloatArray, low: FloatArray, middle: FloatArray, high: FloatArray, medians: FloatArray) -> int:
-    """Fill `medians` (n,) of nine consecutive `steps` (n + 8,); return how many steps are NaN.
+    """Fill `medians` (n,) with those of nine consecutive steps (n + 8,).
 
     The median of nine is the median of three numbers: the largest of the smallest of three triples, the median of their
-    medians, and the smallest of their largest. Each triple is sorted once, into a row of the three work arrays.
+    medians, and the smallest of their largest. Each triple is sorted once.
     """
-    unknown = 0
-    for k in range(len(steps)):
-        unknown += 1 if steps[k] != steps[k] else 0
-    for begin in range(0, len(medians), _BLOCK):
-        count = min(_BLOCK, len(medians) - begin)
-        for i in range(count + _TRIPLES_BACK):
-            a, b, c = steps[begin + i], steps[begin + i + 1], steps[begin + i + 2]
-            less, more = (a, b) if a < b else (b, a)
-            least, rest = (less, c) if less < c else (c, less)
-            low[i] = least
-            middle[i] = more if more < rest else rest
-            high[i] = rest if more < rest else more
-        for i in range(count):
-            a, b, c = low[i], low[i + 3], low[i + 6]
-            a = b if a < b else a
-            largest_low = c if a < c else a
-            a, b, c = high[i], high[i + 3], high[i + 6]
-            a = a if a < b else b
-            smallest_high = a if a < c else c
-            a, b, c = middle[i], middle[i + 3], middle[i + 6]
-            less, more = (a, b) if a < b else (b, a)
-            more = more if more < c else c
-            middle_median = more if less < more else less
-            a, b, c = largest_low, middle_median, smallest_high
-            less, more = (a, b) if a < b else (b, a)
-            more = more if more < c else c
-            medians[begin + i] = more if less < more else less
-    return unknown
+    if not len(medians):
+        return
+    triples = [padded[i : len(padded) - 2 + i] for i in range(3)]
+    low, middle, high = np.minimum.reduce(triples), _middle(*triples), np.maximum.reduce(triples)
+    count = len(medians)
+    lows, middles, highs = ([row[i : i + count] for i in (0, 3, 6)] for row in (low, middle, high))
+    medians[:] = _middle(np.maximum.reduce(lows), _middle(*middles), np.minimum.reduce(highs))
+
+
+def _middle(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    return np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))

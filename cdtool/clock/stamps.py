@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,20 +18,6 @@ from cdtool.clock.coarse_clock import fit_line
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.channels import MissingValues
-from cdtool.findings.clocks import (
-    BackwardStamps,
-    ClockRestart,
-    CoarseClock,
-    DroppedStamps,
-    Gap,
-    Jitter,
-    RepeatedStamps,
-    SampleGaps,
-    StrayStamps,
-    StuckStamps,
-    UnknownStamps,
-)
 from cdtool.recording import BoolArray, FloatArray
 
 # A standard deviation of the steps above this share of the period is jitter.
@@ -107,8 +94,8 @@ def clean_time(
         index = index[~backward]
         line, on_line = fit_line(rising)
         step = 1e3 * _median_step(rising)
-        findings.append(Finding(CoarseClock(float(repeated.mean()), step), "time"))
-        stuck = _RowCount(StuckStamps)
+        findings.append(Finding("coarse_clock", "time", {"share": float(repeated.mean()), "step_ms": step}))
+        stuck = _RowCount("stuck_stamps")
         stuck.add(index[~on_line], 0)
         findings += stuck.findings(len(stamps), first_row, row_name)
         index, kept = index[on_line], line[on_line]
@@ -134,37 +121,24 @@ class ClockCleaner:
     """Cleans time stamps [s] piece by piece; drops those that are missing, stray, repeated or run backward.
 
     The last rows of a piece are returned with the next one, or with `final`, as later rows determine whether they are
-    stray. A coarse clock, whose time stamps repeat, is not regularised as in clean_time; `is_coarse` reports it.
+    stray. A coarse clock, whose time stamps repeat, is not regularised as in clean_time.
     """
 
     def __init__(self) -> None:
         self._dropped, self._restart = _DroppedStampCounts(), _RestartDetector()
         self._stray_marker = StrayStampMarker()
         self._steps, self._last = Distribution(), np.empty(0)
-        self._waiting: tuple[FloatArray, FloatArray, FloatArray] | None = None
+        self._waiting = np.empty(0), np.empty(0)
 
     def times(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> FloatArray:
         """Return the times of the rows that are decided and kept; `counted` are the time stamps as in the file."""
-        return self.rows(stamps, counted, np.empty((len(stamps), 0)), final)[0]
-
-    def rows(
-        self, stamps: FloatArray, counted: FloatArray, values: FloatArray, final: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the times of the rows that are decided and kept, and their values (n, J)."""
         is_stray = self._stray_marker.add(stamps[np.isfinite(stamps)], final)
-        if self._waiting is not None:
-            waiting = self._waiting
-            stamps, counted = np.concatenate((waiting[0], stamps)), np.concatenate((waiting[1], counted))
-            values = np.concatenate((waiting[2], values))
+        stamps, counted = np.concatenate((self._waiting[0], stamps)), np.concatenate((self._waiting[1], counted))
         known = np.flatnonzero(np.isfinite(stamps))
         decided = len(stamps) if len(is_stray) == len(known) else int(known[len(is_stray)])
-        if final:
-            self._waiting = None
-        else:  # copies, as a view would keep the whole piece in memory
-            self._waiting = stamps[decided:].copy(), counted[decided:].copy(), values[decided:].copy()
-        stamps, values = stamps[:decided], values[:decided]
-        keep = self._keep(stamps, counted[:decided], is_stray)
-        return stamps[keep], values if keep.all() else values[keep]
+        # Copies, as a view would keep the whole piece in memory.
+        self._waiting = stamps[decided:].copy(), counted[decided:].copy()
+        return stamps[:decided][self._keep(stamps[:decided], counted[:decided], is_stray)]
 
     def _keep(self, stamps: FloatArray, counted: FloatArray, is_stray: BoolArray) -> BoolArray:
         """Return which of the decided rows are kept; `is_stray` is for the rows with a finite time stamp."""
@@ -177,11 +151,6 @@ class ClockCleaner:
         keep = np.zeros(len(stamps), dtype=bool)
         keep[index[~(backward | repeated)]] = True
         return keep
-
-    @property
-    def is_coarse(self) -> bool:
-        """True if so many time stamps repeat that clean_time would replace the clock by a straight line."""
-        return self._dropped.is_coarse
 
     def findings(self, first_row: int) -> list[Finding]:
         """Return the findings on dropped rows; `first_row` is the file's line of the first sample (0: unknown)."""
@@ -207,7 +176,7 @@ def epoch_start(stamps: FloatArray, factor: float) -> float:
 def missing_findings(absent: int, values: int, channel: str, masked: int = 0) -> list[Finding]:
     """Return the finding on `absent` ones of `values`, without the `masked` ones, which have a separate finding."""
     missing = absent - masked
-    return [Finding(MissingValues(missing, values), channel)] if missing else []
+    return [Finding("missing_values", channel, {"count": missing, "values": values})] if missing else []
 
 
 class GapStatistics:
@@ -216,7 +185,7 @@ class GapStatistics:
     def __init__(self, period: float, channel: str) -> None:
         self._period, self._channel = period, channel
         self._last, self._total, self._count = np.empty(0), 0, 0
-        self._first: list[Gap] = []
+        self._first: list[dict[str, Any]] = []
         self._regular, self._mean, self._squares = 0, 0.0, 0.0  # steps without gaps: count, mean, sum of squares
 
     def add(self, times: FloatArray) -> None:
@@ -226,7 +195,7 @@ class GapStatistics:
         steps = np.diff(time)
         gaps = np.flatnonzero(steps > GAP_PERIODS * self._period)
         self._count += len(gaps)
-        self._first += [Gap(float(time[i]), float(steps[i])) for i in gaps[: _LISTED - len(self._first)]]
+        self._first += [{"time": float(time[i]), "length": float(steps[i])} for i in gaps[: _LISTED - len(self._first)]]
         usual = steps[steps <= GAP_PERIODS * self._period]
         if len(usual):
             share = len(usual) / (self._regular + len(usual))
@@ -241,10 +210,10 @@ class GapStatistics:
         if self._total <= 2:  # too few for a usual step
             return findings
         if self._count:
-            findings.append(Finding(SampleGaps(self._count, tuple(self._first)), self._channel))
+            findings.append(Finding("sample_gaps", self._channel, {"count": self._count, "first": tuple(self._first)}))
         jitter = float(np.sqrt(self._squares / self._regular)) / self._period if self._regular else 0.0
         if jitter > _JITTER:
-            findings.append(Finding(Jitter(jitter, self._period), self._channel))
+            findings.append(Finding("jitter", self._channel, {"share": jitter, "period": self._period}))
         return findings
 
 
@@ -271,9 +240,9 @@ def _is_regular(times: FloatArray, period: float) -> bool:
 
 
 class _RowCount:
-    """The rows dropped for one reason, the `kind` of fact: their number, and the first ones."""
+    """The rows dropped for one reason, the `kind` of finding: their number, and the first ones."""
 
-    def __init__(self, kind: type[DroppedStamps]) -> None:
+    def __init__(self, kind: str) -> None:
         self.kind, self.count = kind, 0
         self._first: list[int] = []
 
@@ -282,14 +251,18 @@ class _RowCount:
         self.count += len(rows)
         self._first += (rows[: _LISTED - len(self._first)] + before).tolist()
 
-    def findings(self, rows: int, first_row: int, row_name: str, restart: ClockRestart | None = None) -> list[Finding]:
+    def findings(
+        self, rows: int, first_row: int, row_name: str, restart: dict[str, Any] | None = None
+    ) -> list[Finding]:
         """Return the finding, given the total of `rows`: a loss if there is a cause, or if many rows are dropped."""
         if not self.count:
             return []
-        known = self.count, rows, tuple(row + first_row for row in self._first), row_name
-        fact = BackwardStamps(*known, restart) if restart else self.kind(*known)
-        is_loss = bool(fact.cause) or self.count / rows > _LOSS_SHARE
-        return [Finding(fact, "time", "loss" if is_loss else "warning")]
+        first = tuple(row + first_row for row in self._first)
+        numbers = {"count": self.count, "rows": rows, "first": first, "row_name": row_name}
+        if self.kind == "backward_stamps":
+            numbers["restart"] = restart
+        is_loss = restart or self.kind == "stuck_stamps" or self.count / rows > _LOSS_SHARE
+        return [Finding(self.kind, "time", numbers, "loss" if is_loss else "warning")]
 
 
 class _DroppedStampCounts:
@@ -297,9 +270,9 @@ class _DroppedStampCounts:
 
     def __init__(self) -> None:
         self.rows = 0
-        self.repeated = _RowCount(RepeatedStamps)
-        self._unknown, self._stray = _RowCount(UnknownStamps), _RowCount(StrayStamps)
-        self._backward = _RowCount(BackwardStamps)
+        self.repeated = _RowCount("repeated_stamps")
+        self._unknown, self._stray = _RowCount("unknown_stamps"), _RowCount("stray_stamps")
+        self._backward = _RowCount("backward_stamps")
         self._highest = -np.inf
 
     def sort_out(self, stamps: FloatArray, is_stray: BoolArray) -> tuple[npt.NDArray[np.intp], BoolArray, BoolArray]:
@@ -327,7 +300,7 @@ class _DroppedStampCounts:
         known = self.rows - self._unknown.count - self._stray.count
         return known > 0 and self.repeated.count / known > COARSE_SHARE
 
-    def findings(self, first_row: int, row_name: str, restart: ClockRestart | None = None) -> list[Finding]:
+    def findings(self, first_row: int, row_name: str, restart: dict[str, Any] | None = None) -> list[Finding]:
         """Return the findings, except on repeated time stamps, which a coarse clock keeps.
 
         `restart` is the cause of time stamps that run backward.
@@ -364,7 +337,7 @@ class _RestartDetector:
         self._run = (runs[-1] if runs and edges[-1] == len(backward) else 0) if len(backward) else self._run
         self._last = known[-1:]
 
-    def cause(self, usual_step: Callable[[], float]) -> ClockRestart | None:
+    def cause(self, usual_step: Callable[[], float]) -> dict[str, Any] | None:
         """Return the cause; None for stray time stamps. `usual_step` returns the median forward step, 0 if unknown."""
         if self._step_back is None:
             return None
@@ -372,8 +345,8 @@ class _RestartDetector:
         for bits in _COUNTER_BITS if self._whole else ():
             modulus = 2.0**bits
             if self._largest < modulus and 0.0 < after - before + modulus <= GAP_PERIODS * usual_step():
-                return ClockRestart(wrapped_bits=bits)
-        return ClockRestart() if self._longest >= _RESTART_ROWS else None
+                return {"wrapped_bits": bits}
+        return {"wrapped_bits": 0} if self._longest >= _RESTART_ROWS else None
 
 
 def _median_step(stamps: FloatArray) -> float:

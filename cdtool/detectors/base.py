@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from cdtool.clock import previous_value
-from cdtool.clock.held_samples import fill_held, is_on_clock
+from cdtool.clock.held_samples import hold_last
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.dynamics import Gain, Machine
@@ -422,13 +422,9 @@ def held_on(clock: FloatArray, series: Series) -> tuple[FloatArray, BoolArray]:
     >>> held[:, 0].tolist(), missing[:, 0].tolist()
     ([0.0, 5.0, 5.0, 7.0], [True, False, True, False])
     """
-    if is_on_clock(series, clock):
-        missing: BoolArray = ~np.isfinite(series.values)
-        return hold_last(series.values, missing), missing
-    held = np.empty((len(clock), series.joint_count))
-    missing = np.empty(held.shape, dtype=np.bool_)
-    fill_held(series.time, series.values, np.ascontiguousarray(clock), True, held, missing)
-    return held, missing
+    values = previous_value(series, clock)
+    missing: BoolArray = ~np.isfinite(values)
+    return hold_last(values, missing), missing
 
 
 def missing_after_first(missing: BoolArray) -> BoolArray:
@@ -475,35 +471,6 @@ def for_every_joint(missing: BoolArray) -> BoolArray:
     if not missing.any():
         return missing
     return np.repeat(np.any(missing, axis=1, keepdims=True), missing.shape[1], axis=1)
-
-
-def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:
-    """Hold the last present value where one is missing.
-
-    Parameters
-    ----------
-    values : ndarray of float, shape (n, J)
-        Values, in any unit.
-    missing : ndarray of bool, shape (n, J)
-        Where a value is missing.
-
-    Returns
-    -------
-    ndarray of float, shape (n, J)
-        The values; 0 before the first present one. Without a missing value it is `values` itself, not a copy.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> values = np.array([[np.nan], [2.0], [np.nan], [3.0]])
-    >>> hold_last(values, np.isnan(values))[:, 0].tolist()
-    [0.0, 2.0, 2.0, 3.0]
-    """
-    if not missing.any():
-        return values
-    last = np.maximum.accumulate(np.where(missing, 0, np.arange(len(values))[:, np.newaxis]), axis=0)
-    started = np.logical_or.accumulate(~missing, axis=0)
-    return np.where(started, np.take_along_axis(values, last, axis=0), 0.0)
 
 
 def observe_momentum(

@@ -8,12 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from cdtool.clock import previous_value
+from cdtool.clock.held_samples import hold_last
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
     for_every_joint,
     gain,
     held_on,
-    hold_last,
     missing_after_first,
     per_joint,
     require_channels,

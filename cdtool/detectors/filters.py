@@ -8,25 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock import GAP_PERIODS, HOLD_PERIODS
-from cdtool.clock.held_samples import READ_MARKS, READ_TABLE
 from cdtool.clock.recent_steps import usual_steps
 from cdtool.detectors.base import BRIDGED
-from cdtool.instructions import aligned_zeros, part_of, widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 # Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
 _SETTLE = 3.0 * math.sqrt(2.0)
-# The samples whose cubics are computed at once, and the fewest that determine a cubic with one to spare.
-BLOCK, _FEWEST = 32, 5
-# Rows of the work space of a cubic: sums of powers; factors and matrix of its elimination; right-hand side.
-_SPAN, _COUNT, _FOURTH, _FIFTH = range(0, 4 * BLOCK, BLOCK)
-_S1, _S2, _S3, _S4, _S5, _S22, _S33 = range(4 * BLOCK, 11 * BLOCK, BLOCK)
-_F10, _F20, _F30, _F21, _F31, _F32 = range(11 * BLOCK, 17 * BLOCK, BLOCK)
-_M11, _M12, _M13, _M22, _M23, _M33 = range(17 * BLOCK, 23 * BLOCK, BLOCK)
-_R0, _R1, _R2, _R3, _ROWS = range(23 * BLOCK, 28 * BLOCK, BLOCK)
-# Rows of the powers of x of one sample of the window.
-_WEIGHT, _X, _SQUARE, _CUBE, _POWERS = range(0, 5 * BLOCK, BLOCK)
+# The fewest samples that determine a cubic with one to spare.
+_FEWEST = 5
 # No gap is cut into more steps than this.
 _MOST_PIECES = 10_000
 
@@ -149,10 +139,26 @@ def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
     >>> np.flatnonzero(unsettled(time, lost, longest=0.02)).tolist()
     [7, 8]
     """
+    if len(time) <= 2:
+        return np.zeros(lost.shape, dtype=bool)
     result = np.zeros(lost.shape, dtype=bool)
-    if len(time) > 2:
-        _mark_unsettled(time, usual_steps(time), np.ascontiguousarray(lost), longest, result)
+    lost = lost if lost.any() else lost[:, :1]  # then it is the same in every column
+    now, usual = time[:, np.newaxis], usual_steps(time)
+    period = np.concatenate((usual[1:2], usual[1:2], usual[1:-1]))[:, np.newaxis]
+    since = now - np.maximum(_last_before(now, lost), time[0])
+    ends_gap = (since > GAP_PERIODS * period) & ~lost
+    if not ends_gap.any():
+        return result
+    until = now + np.minimum(since - period, longest)
+    until = np.maximum.accumulate(np.where(ends_gap, until, -np.inf))
+    result[:] = now < until - 0.5 * period
     return result
+
+
+def _last_before(now: FloatArray, lost: BoolArray) -> FloatArray:
+    """Return the time of the last sample before each one that is not lost (n, J); -inf without any."""
+    known = np.maximum.accumulate(np.where(lost, -np.inf, now)) if lost.any() else np.broadcast_to(now, lost.shape)
+    return np.concatenate((np.full((1, lost.shape[1]), -np.inf), known[:-1]))
 
 
 def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | float) -> FloatArray:
@@ -178,10 +184,11 @@ def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | f
     >>> started_at(np.array([0.0, 1.0, 2.0, 9.0]), np.array([[True], [False], [False], [False]]), 5.0)[:, 0].tolist()
     [inf, 1.0, 1.0, 9.0]
     """
-    starts = np.empty(missing.shape)
-    longest = np.array(np.broadcast_to(longest_gap, missing.shape[1]), dtype=np.float64)
-    _fill_starts(time, np.ascontiguousarray(missing), longest, starts)
-    return starts
+    now = time[:, np.newaxis]
+    before = _last_before(now, missing)
+    begins = ~missing & (np.isinf(before) | (now - before > longest_gap))
+    starts = np.maximum.accumulate(np.where(begins, now, -np.inf))
+    return np.where(np.isinf(starts), np.inf, starts)
 
 
 def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
@@ -216,14 +223,13 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
     if samples >= _FEWEST:
-        work = aligned_zeros(samples * _POWERS), aligned_zeros(_ROWS), np.empty((2, BLOCK + samples - 1))
-        _polynomial_rates(time, np.ascontiguousarray(values), samples, *work, first, second)
+        _fill_rates(time, np.ascontiguousarray(values), samples, np.empty(4 * values.shape[1]), first, second)
     return first, second
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_TABLE}, {READ_MARKS}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64[::1], "
-    "float64[:, ::1], float64[:, ::1])",
+    f"void({READ_ONLY}, Array(float64, 2, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), {READ_ONLY}, "
+    f"{READ_ONLY}, {READ_ONLY}, int64[::1], float64[:, ::1], float64[:, ::1])",
 )
 def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
@@ -283,163 +289,47 @@ def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
             rate[k, j] = slope
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_MARKS}, float64, b1[:, ::1])")
-def _mark_unsettled(time: FloatArray, usual: FloatArray, lost: BoolArray, longest: float, result: BoolArray) -> None:
-    for j in range(lost.shape[1]):
-        newest, until = time[0], -math.inf
-        for k in range(len(time)):
-            period = usual[max(k - 1, 1)]
-            since = time[k] - newest
-            if since > GAP_PERIODS * period and not lost[k, j]:
-                until = max(until, time[k] + min(since - period, longest))
-            result[k, j] = time[k] < until - 0.5 * period
-            if not lost[k, j]:
-                newest = time[k]
-
-
-@kernel(f"void({READ_ONLY}, {READ_MARKS}, {READ_ONLY}, float64[:, ::1])")
-def _fill_starts(time: FloatArray, missing: BoolArray, longest_gap: FloatArray, starts: FloatArray) -> None:
-    for j in range(missing.shape[1]):
-        start, last = math.inf, -math.inf
-        for k in range(len(time)):
-            if not missing[k, j]:
-                if start == math.inf or time[k] - last > longest_gap[j]:
-                    start = time[k]
-                last = time[k]
-            starts[k, j] = start
-
-
-@kernel(f"void({READ_ONLY}, int64, int64, float64[:, ::1], float64[::1], float64[::1])")
-def _fill_powers(
-    time: FloatArray, begin: int, before: int, window: FloatArray, powers: FloatArray, rows: FloatArray
-) -> None:
-    """Fill the powers of x = (t - t_k) / span of a block of windows, which end at `begin` and later, and their sums.
-
-    The sample is innermost, and its rows are at distances known at compile time: otherwise one instruction handles one
-    sample. In a window that begins before the first sample, what is missing there does not count: weight and x are 0.
-    """
-    widest_vectors()
-    clock = window[0]
-    for i in range(BLOCK + before):
-        clock[i] = time[min(max(begin - before + i, 0), len(time) - 1)]
-    for k in range(BLOCK):
-        rows[_SPAN + k] = clock[before + k] - clock[k]
-        rows[_COUNT + k] = min(begin + k, before) + 1.0
-    for k in range(_S1, _S33 + BLOCK):
-        rows[k] = 0.0
-    for m in range(before + 1):
-        own = powers[m * _POWERS : (m + 1) * _POWERS]
-        for k in range(BLOCK):
-            own[_WEIGHT + k] = 1.0 if begin + k + m >= before else 0.0
-            x = own[_WEIGHT + k] * ((clock[m + k] - clock[before + k]) / rows[_SPAN + k])
-            own[_X + k] = x
-            own[_SQUARE + k] = x * x
-            own[_CUBE + k] = x * x * x
-            rows[_FOURTH + k] = x * (x * x * x)
-            rows[_FIFTH + k] = (x * x) * (x * x * x)
-        for k in range(BLOCK):
-            rows[_S1 + k] += own[_X + k]
-            rows[_S2 + k] += own[_SQUARE + k]
-            rows[_S3 + k] += own[_CUBE + k]
-            rows[_S4 + k] += rows[_FOURTH + k]
-            rows[_S5 + k] += rows[_FIFTH + k]
-            rows[_S22 + k] += own[_SQUARE + k] * own[_SQUARE + k]
-            rows[_S33 + k] += own[_CUBE + k] * own[_CUBE + k]
-
-
-@kernel(f"void({READ_TABLE}, int64, int64, float64[::1])", inline=True)
-def _take_window(values: FloatArray, begin: int, joint: int, column: FloatArray) -> None:
-    """Fill `column` with the samples of one joint from `begin` on, those beyond the ends as the last one there."""
-    count, joints = values.shape
-    if begin >= 0 and begin + len(column) <= count:
-        own = part_of(values, begin * joints + joint, (len(column) - 1) * joints + 1)
-        for i in range(len(column)):
-            column[i] = own[i * joints]
-    else:
-        for i in range(len(column)):
-            column[i] = values[min(max(begin + i, 0), count - 1), joint]
-
-
-@kernel("void(float64[::1], int64, int64, float64[:, ::1], float64[:, ::1])", inline=True)
-def _give_rates(rows: FloatArray, begin: int, joint: int, first: FloatArray, second: FloatArray) -> None:
-    """The rates of one joint in a block of samples, where there are enough before them."""
-    count, joints = first.shape
-    size = (min(BLOCK, count - begin) - 1) * joints + 1
-    at = begin * joints + joint
-    speeds, accelerations = part_of(first, at, size), part_of(second, at, size)
-    for k in range(max(_FEWEST - 1 - begin, 0), min(BLOCK, count - begin)):
-        speeds[k * joints] = rows[_R0 + k]
-        accelerations[k * joints] = rows[_R1 + k]
-
-
 @kernel(
-    f"void({READ_ONLY}, {READ_TABLE}, int64, float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], "
-    "float64[:, ::1])",
+    f"void({READ_ONLY}, Array(float64, 2, 'C', readonly=True), int64, float64[::1], float64[:, ::1], float64[:, ::1])"
 )
-def _polynomial_rates(  # noqa: PLR0913  a kernel: one loop, arrays one by one
-    time: FloatArray,
-    values: FloatArray,
-    samples: int,
-    powers: FloatArray,
-    rows: FloatArray,
-    window: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
+def _fill_rates(
+    time: FloatArray, values: FloatArray, samples: int, right: FloatArray, first: FloatArray, second: FloatArray
 ) -> None:
-    """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting.
+    """Solve the normal equations of a cubic in the scaled time x = (t - t_k) / span; definite, so without pivoting.
 
-    All joints have the same matrix, which is eliminated once per sample, and a block of samples is computed at once.
-    `powers`, `rows` and `window` are work space; what `first` and `second` (n, J) hold stays where x is too short.
+    All joints share the matrix, which is eliminated once per sample. `right` (4 J,) is overwritten.
     """
-    widest_vectors()
-    before = samples - 1
-    column = window[1]
-    for begin in range(0, len(time), BLOCK):
-        _fill_powers(time, begin, before, window, powers, rows)
-        _eliminate(rows)
-        for j in range(values.shape[1]):
-            _take_window(values, begin - before, j, column)
-            for k in range(_R0, _R3 + BLOCK):
-                rows[k] = 0.0
-            # Two samples of a window at once; the newest one, whose change is 0, may be left out.
-            for m in range(0, samples - 1, 2):
-                own, newest = powers[m * _POWERS : (m + 2) * _POWERS], column[before : before + BLOCK]
-                pair = column[m : m + BLOCK + 1]
-                for k in range(BLOCK):
-                    older, newer = pair[k] - newest[k], pair[k + 1] - newest[k]
-                    rows[_R0 + k] = rows[_R0 + k] + own[_WEIGHT + k] * older + own[_POWERS + _WEIGHT + k] * newer
-                    rows[_R1 + k] = rows[_R1 + k] + own[_X + k] * older + own[_POWERS + _X + k] * newer
-                    rows[_R2 + k] = rows[_R2 + k] + own[_SQUARE + k] * older + own[_POWERS + _SQUARE + k] * newer
-                    rows[_R3 + k] = rows[_R3 + k] + own[_CUBE + k] * older + own[_POWERS + _CUBE + k] * newer
-            for k in range(BLOCK):
-                r0 = rows[_R0 + k]
-                r1, r2 = rows[_R1 + k] - rows[_F10 + k] * r0, rows[_R2 + k] - rows[_F20 + k] * r0
-                r3 = rows[_R3 + k] - rows[_F30 + k] * r0
-                r2, r3 = r2 - rows[_F21 + k] * r1, r3 - rows[_F31 + k] * r1
-                cubic = (r3 - rows[_F32 + k] * r2) / rows[_M33 + k]
-                square = (r2 - rows[_M23 + k] * cubic) / rows[_M22 + k]
-                linear = (r1 - rows[_M12 + k] * square - rows[_M13 + k] * cubic) / rows[_M11 + k]
-                rows[_R0 + k] = linear / rows[_SPAN + k]
-                rows[_R1 + k] = 2.0 * square / (rows[_SPAN + k] * rows[_SPAN + k])
-            _give_rates(rows, begin, j, first, second)
-
-
-@kernel("void(float64[::1])")
-def _eliminate(rows: FloatArray) -> None:
-    """Eliminate (n, s1, s2, s3), (s1, s2, s3, s4), (s2, s3, s22, s5), (s3, s4, s5, s33): factors and upper rows."""
-    widest_vectors()
-    for k in range(BLOCK):
-        n, s1, s2, s3 = rows[_COUNT + k], rows[_S1 + k], rows[_S2 + k], rows[_S3 + k]
-        s4, s5, s22, s33 = rows[_S4 + k], rows[_S5 + k], rows[_S22 + k], rows[_S33 + k]
-        f10, f20, f30 = s1 / n, s2 / n, s3 / n
+    joints = values.shape[1]
+    for k in range(_FEWEST - 1, len(time)):
+        begin = max(k - samples + 1, 0)
+        span = time[k] - time[begin]
+        s1 = s2 = s3 = s4 = s5 = s6 = 0.0
+        right[:] = 0.0
+        for i in range(begin, k):
+            x = (time[i] - time[k]) / span
+            square = x * x
+            cube = square * x
+            s1, s2, s3 = s1 + x, s2 + square, s3 + cube
+            s4, s5, s6 = s4 + square * square, s5 + square * cube, s6 + cube * cube
+            for j in range(joints):
+                change = values[i, j] - values[k, j]
+                right[4 * j] += change
+                right[4 * j + 1] += x * change
+                right[4 * j + 2] += square * change
+                right[4 * j + 3] += cube * change
+        count = k + 1.0 - begin
+        f10, f20, f30 = s1 / count, s2 / count, s3 / count
         m11, m12, m13 = s2 - f10 * s1, s3 - f10 * s2, s4 - f10 * s3
-        m21, m22, m23 = s3 - f20 * s1, s22 - f20 * s2, s5 - f20 * s3
-        m31, m32, m33 = s4 - f30 * s1, s5 - f30 * s2, s33 - f30 * s3
-        f21, f31 = m21 / m11, m31 / m11
-        m22, m23 = m22 - f21 * m12, m23 - f21 * m13
-        m32, m33 = m32 - f31 * m12, m33 - f31 * m13
-        f32 = m32 / m22
-        rows[_F10 + k], rows[_F20 + k], rows[_F30 + k] = f10, f20, f30
-        rows[_F21 + k], rows[_F31 + k], rows[_F32 + k] = f21, f31, f32
-        rows[_M11 + k], rows[_M12 + k], rows[_M13 + k] = m11, m12, m13
-        rows[_M22 + k], rows[_M23 + k], rows[_M33 + k] = m22, m23, m33 - f32 * m23
+        m22, m23, m33 = s4 - f20 * s2, s5 - f20 * s3, s6 - f30 * s3
+        f21, f31 = m12 / m11, m13 / m11
+        m22, m23, m33 = m22 - f21 * m12, m23 - f21 * m13, m33 - f31 * m13
+        f32 = m23 / m22
+        m33 -= f32 * m23
+        for j in range(joints):
+            r0 = right[4 * j]
+            r1, r2, r3 = right[4 * j + 1] - f10 * r0, right[4 * j + 2] - f20 * r0, right[4 * j + 3] - f30 * r0
+            r2, r3 = r2 - f21 * r1, r3 - f31 * r1
+            cubic = (r3 - f32 * r2) / m33
+            quadratic = (r2 - m23 * cubic) / m22
+            first[k, j] = (r1 - m12 * quadratic - m13 * cubic) / m11 / span
+            second[k, j] = 2.0 * quadratic / (span * span)

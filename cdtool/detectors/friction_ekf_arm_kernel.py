@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from cdtool.detection import Status, StatusArray
 from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, progress_of_settling
-from cdtool.kernels import kernel
+from cdtool.kernels import fields_of, kernel
 from cdtool.recording import FloatArray
 
 State = tuple[float, float, float, float]
@@ -114,7 +114,10 @@ def correct(
     return corrected, update_covariance(p, column, k, innovation)
 
 
-@kernel("void(Samples, Link, Variances, AngleVariances, Bounds, float64[::1], uint8[::1])")
+@kernel(
+    f"void({fields_of(Samples)}, {fields_of(Link)}, {fields_of(Variances)}, {fields_of(AngleVariances)}, "
+    f"{fields_of(Bounds)}, float64[::1], uint8[::1])"
+)
 def run_arm_filter(
     samples: Samples,
     link: Link,

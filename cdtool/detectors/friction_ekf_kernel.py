@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from cdtool.detection import Status, StatusArray
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.kernels import READ_ONLY, fields_of, kernel
 from cdtool.recording import FloatArray
 
 Covariance = tuple[float, float, float, float, float, float]
@@ -139,7 +139,10 @@ def progress_of_settling(
     return 0.0 if time - last_applicable > glitch else settled, against, forward, last_applicable
 
 
-@kernel(f"void(Samples, {READ_ONLY}, float64, Variances, Bounds, float64[::1], uint8[::1])")
+@kernel(
+    f"void({fields_of(Samples)}, {READ_ONLY}, float64, {fields_of(Variances)}, {fields_of(Bounds)}, float64[::1], "
+    "uint8[::1])"
+)
 def run_filter(
     samples: Samples,
     inertia: FloatArray,

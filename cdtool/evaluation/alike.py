@@ -78,15 +78,12 @@ def grouped_findings(items: Sequence[Finding]) -> list[tuple[str, str]]:
 
     Examples
     --------
-    >>> from cdtool.findings.channels import StuckChannel
-    >>> grouped_findings([Finding(StuckChannel(""), channel) for channel in ("speed", "torque", "force", "position")])
+    >>> stuck = [Finding("stuck_channel", name, {"joint": ""}) for name in ("speed", "torque", "force", "position")]
+    >>> grouped_findings(stuck)
     [('speed', 'the value never changes while the machine moves: stuck?; 3 more like it (torque, force, position)')]
     """
     return grouped(
-        [
-            Entry(item.channel, item.message, (item.kind, item.fact.variant), item.channel or item.fact.subject)
-            for item in items
-        ]
+        [Entry(item.channel, item.message, (item.kind, item.variant), item.channel or item.subject) for item in items]
     )
 
 

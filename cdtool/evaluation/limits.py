@@ -14,7 +14,6 @@ from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.results import LimitResult, RecordingFinding
 from cdtool.evaluation.summary import COUNTED_ALWAYS, FIGURES, Summary, kind_group
 from cdtool.findings import Finding
-from cdtool.findings.scoring import LimitsUnchecked
 from cdtool.tables import Table
 
 ALL = "*"
@@ -157,8 +156,8 @@ def unchecked(rules: Sequence[LimitRule], detectors: Sequence[str], file: str) -
     '1 of 1 limits not checked (gm not run)'
     """
     absent = [rule.detector for rule in rules if rule.detector not in (ALL, *detectors)]
-    fact = LimitsUnchecked(len(absent), len(rules), ", ".join(dict.fromkeys(absent)))
-    return [RecordingFinding.of(file, Finding(fact))] if absent else []
+    fact = {"count": len(absent), "limits": len(rules), "detectors": ", ".join(dict.fromkeys(absent))}
+    return [RecordingFinding.of(file, Finding("limits_unchecked", "", fact))] if absent else []
 
 
 def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:

@@ -7,13 +7,12 @@ together with its meaning, from which the published schema is made.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import PureWindowsPath
 from typing import Any, Self
 
 from cdtool.evaluation.rows import picked, values_of
 from cdtool.findings import Finding
-from cdtool.frozen import frozen
 from cdtool.short_repr import short_repr
 
 SCHEMA_VERSION = 4
@@ -50,7 +49,7 @@ def onset_words(provenance: Mapping[str, Any]) -> str:
     return f"{rule}; label file {PureWindowsPath(str(labels)).name}" if labels else str(rule)
 
 
-@frozen
+@dataclass(frozen=True)
 class RecordingResult:
     """One log that was scored."""
 
@@ -67,7 +66,7 @@ class RecordingResult:
     )
 
 
-@frozen
+@dataclass(frozen=True)
 class ContactResult:
     """One contact seen by one detector."""
 
@@ -120,7 +119,7 @@ class ContactResult:
         return self.outcome == _IN_PROGRESS
 
 
-@frozen
+@dataclass(frozen=True)
 class FalseAlarmResult:
     """One alarm without a contact."""
 
@@ -134,7 +133,7 @@ class FalseAlarmResult:
     limit: float | None = meant("limit, in the detector's unit", default=None)
 
 
-@frozen
+@dataclass(frozen=True)
 class ExposureResult:
     """How long and how often a detector monitored a group: the denominator of its false alarms."""
 
@@ -149,7 +148,7 @@ class ExposureResult:
     __repr__ = short_repr
 
 
-@frozen
+@dataclass(frozen=True)
 class ConditionResult:
     """One group of recordings of the machine under a changed condition: it is scored, and counts nowhere else."""
 
@@ -159,7 +158,7 @@ class ConditionResult:
     impact_free: bool = meant("whether its recordings have no contacts")
 
 
-@frozen
+@dataclass(frozen=True)
 class ForceStepResult:
     """One step of a force profile, compared with one contact or one test point."""
 
@@ -172,7 +171,7 @@ class ForceStepResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@frozen
+@dataclass(frozen=True)
 class ForceResult:
     """One contact against a force profile."""
 
@@ -190,7 +189,7 @@ class ForceResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@frozen
+@dataclass(frozen=True)
 class PointResult:
     """The tests at one point against a force profile, averaged as the profile asks."""
 
@@ -204,7 +203,7 @@ class PointResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@frozen
+@dataclass(frozen=True)
 class SweepResult:
     """One detector in one group with all its limits moved: a point of the latency against false-alarm curve."""
 
@@ -222,7 +221,7 @@ class SweepResult:
     in_use: bool = meant("the benchmark's own limits", default=False)
 
 
-@frozen
+@dataclass(frozen=True)
 class CalibrationResult:
     """How a detector's safety factor was set for a false-alarm budget."""
 
@@ -234,7 +233,7 @@ class CalibrationResult:
     alarms: int = meant("operations that alarm with that factor; of a budget by hour: alarms")
 
 
-@frozen
+@dataclass(frozen=True)
 class LimitResult:
     """One limit of the benchmark file, checked against one metric."""
 
@@ -249,7 +248,7 @@ class LimitResult:
     reason: str | None = meant("why it is not met", default=None)
 
 
-@frozen
+@dataclass(frozen=True)
 class ConclusionResult:
     """What follows from limits, force profiles, missed contacts and what could not be assessed, taken together."""
 
@@ -270,7 +269,7 @@ class ConclusionResult:
     __repr__ = short_repr
 
 
-@frozen
+@dataclass(frozen=True)
 class Skipped:
     """What was left out: a recording, a part of one, or a detector."""
 
@@ -278,7 +277,7 @@ class Skipped:
     reason: str = meant("why it was left out")
 
 
-@frozen
+@dataclass(frozen=True)
 class RecordingFinding:
     """A finding about a recording, or a detector, that was used."""
 
@@ -299,7 +298,7 @@ class RecordingFinding:
         return self.severity == _LOSS
 
 
-@frozen
+@dataclass(frozen=True)
 class Results:
     """All of it, in the order of the benchmark file; rows of which there may be many are tuples, or `Rows`."""
 

@@ -194,15 +194,6 @@ def highest_held(met: FloatArray, needed: npt.NDArray[np.int64]) -> float:
     return best
 
 
-@kernel(f"b1({READ_ONLY}, {_STATUS}, int64, int64)")
-def has_unknown(met_at: FloatArray, status: StatusArray, joint: int, joints: int) -> bool:
-    """Return whether the exceedance of an assessable sample of a joint is NaN."""
-    unknown = 0
-    for k in range(joint, len(met_at), joints):
-        unknown += np.isnan(met_at[k]) and status[k] == Status.VALID
-    return unknown > 0
-
-
 @kernel(
     f"void({READ_ONLY}, {READ_ONLY}, {_STATUS}, int64[::1], int64[::1], {READ_ONLY}, {READ_ONLY}, float64, "
     f"{READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, b1[::1], int64[::1], float64[:, ::1])"
@@ -235,14 +226,17 @@ def count_alarms(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     if count == 0:
         return
     joints = len(met_at) // max(len(time), 1)
-    swept = np.empty(joints, dtype=np.bool_)
+    # A joint is not swept if the exceedance of an assessable sample is NaN.
+    swept = np.ones(joints, dtype=np.bool_)
+    for at in range(len(met_at)):
+        if np.isnan(met_at[at]) and status[at] == Status.VALID:
+            swept[at % joints] = False
     # By joint: the number of factors that the last sample exceeded, were raised, and it was not calm for. They
     # are the smallest ones.
     outside = np.zeros(joints, dtype=np.int64)
     raised = np.zeros(joints, dtype=np.int64)
     restless = np.zeros(joints, dtype=np.int64)
     for j in range(joints):
-        swept[j] = not has_unknown(met_at, status, j, joints)
         restless[j] = count if swept[j] else 0
     all_restless = np.sum(restless)
     # By joint: its samples so far that were not calm for all factors, without gaps.

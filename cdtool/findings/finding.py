@@ -1,120 +1,80 @@
-"""A finding: which fact, about which channel and file, how severe."""
+"""A finding: of which kind, about which channel and file, with which numbers, how severe."""
 
 from __future__ import annotations
 
-import re
-from abc import ABC, abstractmethod
-from collections.abc import Iterable
-from dataclasses import asdict
-from typing import Any, ClassVar, Literal
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
-from cdtool.frozen import frozen
+from cdtool.findings.kinds import Severity, kind_of
+from cdtool.findings.words import FindingWords
 from cdtool.short_repr import short_repr
 
-Severity = Literal["note", "warning", "loss"]
-
 _SEVERITIES: tuple[Severity, ...] = ("loss", "warning", "note")
-_WORD = re.compile(r"(?<!^)(?=[A-Z])")
+# Of lines so many numbers are kept.
+_FIRST = 3
 
 
-@frozen
-class Fact(ABC):
-    """One kind of fact: a frozen dataclass whose fields are the numbers and names in its sentence.
-
-    `subject_field` and `variant_field` name the fields that are its `subject` and `variant`.
-    """
-
-    subject_field: ClassVar[str] = ""
-    variant_field: ClassVar[str] = ""
-
-    @property
-    def kind(self) -> str:
-        """The name of the kind in results and JSON: that of its class, `repeated_stamps` of `RepeatedStamps`."""
-        return _WORD.sub("_", type(self).__name__).lower()
-
-    @property
-    def variant(self) -> str:
-        """What tells facts of one kind apart that are not to be merged; empty for most kinds."""
-        return str(getattr(self, self.variant_field)) if self.variant_field else ""
-
-    @property
-    def subject(self) -> str:
-        """What the fact is about where that is not a channel: a column that is left out, a part of a log."""
-        return str(getattr(self, self.subject_field)) if self.subject_field else ""
-
-    @abstractmethod
-    def sentence(self) -> str:
-        """Return the fact in words, without the channel and the file that it is about."""
-
-
-@frozen
-class TemplateFact(Fact):
-    """A fact whose sentence is `words`, with its fields in the places of their names in braces."""
-
-    @property
-    @abstractmethod
-    def words(self) -> str:
-        """The sentence as a template: `the values reach {largest:.3g}`."""
-
-    def sentence(self) -> str:
-        """Return the sentence with its numbers."""
-        return self.words.format(**vars(self))
-
-
-@frozen
-class Remark(Fact):
-    """A sentence without numbers, for plug-ins that need no kind of their own.
-
-    >>> str(Finding(Remark("the recorder lost its clock"), "torque"))
-    'torque: the recorder lost its clock'
-    """
-
-    text: str
-
-    variant_field = "text"
-
-    def sentence(self) -> str:
-        """Return the text."""
-        return self.text
-
-
-@frozen
+@dataclass(frozen=True)
 class Finding:
-    """A fact about a file or a channel.
+    """What holds of a file or a channel.
 
     Parameters
     ----------
-    fact
-        What holds, with its numbers.
+    kind
+        A kind of `kinds.toml`, which has its sentence.
     channel
         The channel, column or topic that it is about; empty for the whole file.
+    numbers
+        The numbers and names of its kind: exactly those that `kinds.toml` lists, as JSON values and tuples.
     severity
-        "note", "warning", or "loss": data that the file held, or should hold, could not be read.
+        "note", "warning", or "loss": data that the file held, or should hold, could not be read. That of its kind,
+        where none is given.
     file
         The name of the part that it is about, where a log has several.
     """
 
-    fact: Fact
+    kind: str
     channel: str = ""
-    severity: Severity = "warning"
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    severity: Severity = ""  # type: ignore[assignment]  # completed below
     file: str = ""
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        """Raise TypeError for anything but a fact, where a plug-in makes it and not where it is shown."""
-        if not isinstance(self.fact, Fact):
-            raise TypeError(f"a Finding needs a Fact, not {type(self.fact).__name__}: write Finding(Remark('...'))")
+        """Raise ValueError for an unknown kind or other numbers than its own, where it is made."""
+        kind = kind_of(self.kind)
+        if self.numbers.keys() != set(kind.numbers):
+            raise ValueError(f"a finding '{self.kind}' has the numbers {kind.numbers}, not {tuple(self.numbers)}")
+        object.__setattr__(self, "severity", self.severity or kind.severity)
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.channel, self.severity, self.file))  # its numbers may be nested
 
     @property
-    def kind(self) -> str:
-        """The kind of the fact."""
-        return self.fact.kind
+    def sentence(self) -> str:
+        """What holds in words, without the channel and the file."""
+        return FindingWords(kind_of(self.kind), self.numbers).sentence()
+
+    def words_for(self, name: str) -> str:
+        """Return the words that its kind has for the value of a number."""
+        return FindingWords(kind_of(self.kind), self.numbers).words_for(name)
+
+    @property
+    def subject(self) -> str:
+        """What it is about where that is not a channel: a column that is left out, a part of a log."""
+        return str(self.numbers.get(kind_of(self.kind).subject, ""))
+
+    @property
+    def variant(self) -> str:
+        """What tells findings of one kind apart that are not to be merged; empty for most kinds."""
+        return str(self.numbers.get(kind_of(self.kind).variant, ""))
 
     @property
     def message(self) -> str:
         """The sentence, with the part of the log before it."""
-        return f"{self.file}: {self.fact.sentence()}" if self.file else self.fact.sentence()
+        return f"{self.file}: {self.sentence}" if self.file else self.sentence
 
     def __str__(self) -> str:
         return f"{self.channel}: {self.message}" if self.channel else self.message
@@ -127,8 +87,22 @@ class Finding:
             "severity": self.severity,
             "file": self.file,
             "kind": self.kind,
-            "numbers": asdict(self.fact),
+            "numbers": dict(self.numbers),
         }
+
+
+def remark(text: str, channel: str = "", severity: Severity = "warning") -> Finding:
+    """Return a finding in words, for plug-ins and what has no numbers.
+
+    >>> str(remark("the recorder lost its clock", "torque"))
+    'torque: the recorder lost its clock'
+    """
+    return Finding("remark", channel, {"text": text}, severity)
+
+
+def lines_of(lines: Sequence[int]) -> dict[str, Any]:
+    """Return the numbers of a finding about lines: how many, the first three and the last; a log may have millions."""
+    return {"count": len(lines), "first": tuple(lines[:_FIRST]), "last": lines[-1]}
 
 
 def worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -5,12 +5,12 @@ Optional attributes:
 
 * `topics`: True if the file contains messages of topics, which [channels.mcap] maps;
 * `pieces`: yields the columns of a file that need not fit into memory (`pieces.py`); `exact_pieces`: the same with the
-  times that `cdtool convert` wrote; `mapped`: the columns of a channel map (`pieces.open_mapped_log`);
+  times that `cdtool convert` wrote;
 * `element_names`: returns the names of the elements of a topic's arrays, such as the joints of a JointState;
 * `sniffs_any_text`: True if `sniff` accepts almost any text file.
 
-Anything that the user should know about a file is added to `Source.findings`, as `Finding(Remark("..."), column,
-severity)` or as a fact with its own numbers: a frozen dataclass derived from `cdtool.findings.Fact` with a `sentence`.
+Anything that the user should know about a file is added to `Source.findings`: by a plug-in as `remark("...", column,
+severity)`, here as `Finding(kind, column, numbers)` with a kind in `cdtool/findings/kinds.toml`.
 
 The meaning of a column (channel, unit, scale) is assigned in `cdtool/ingest/channel_assembly.py`, in the same way for
 all formats. Writers are functions that implement `groups.Writer`.

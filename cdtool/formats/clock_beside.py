@@ -11,7 +11,6 @@ import numpy.typing as npt
 from cdtool.clock.plausible_unit import SECONDS, unit_since_1970
 from cdtool.columns import as_float64
 from cdtool.findings import Finding
-from cdtool.findings.clocks import AssumedClock
 from cdtool.formats.epoch_clock import EpochClock
 from cdtool.units import find_unit
 
@@ -49,7 +48,9 @@ def assumed_clock(
         label = next(unit for most, unit in _UNITS if step < most)
         factor = SECONDS[label]
     severity: Literal["note", "warning"] = "warning" if evidence == "steps" and label != "s" else "note"
-    findings.append(Finding(AssumedClock(label, evidence, start, step), name, severity))
+    findings.append(
+        Finding("assumed_clock", name, {"unit": label, "evidence": evidence, "start": start, "step": step}, severity)
+    )
     return EpochClock(lambda first, end: stamps[first:end], factor)
 
 

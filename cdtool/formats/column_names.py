@@ -12,7 +12,6 @@ from typing import Literal
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
-from cdtool.findings.channels import AbsentTruth
 from cdtool.formats.source import Source
 from cdtool.recording import GROUND_TRUTH
 
@@ -20,10 +19,6 @@ from cdtool.recording import GROUND_TRUTH
 OWN_CLOCK = "time"
 # `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in brackets is an index, not a unit.
 _BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
-
-# The maps found last (_resolved), by the map of the machine file and the columns of the file.
-_FOUND: dict[tuple[ChannelMap, tuple[str, ...]], tuple[ChannelMap, list[ChannelSource]]] = {}
-_MOST_FOUND = 16
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
@@ -108,25 +103,15 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     resolved, absent = _resolved(source.path, plain, names)
     resolved = replace(resolved, time=channels.time) if own else resolved
     what: Literal["column", "topic"] = "topic" if channels.topics else "column"
-    notes = [Finding(AbsentTruth(what, cell.described, _similar(cell, names)), cell.channel, "note") for cell in absent]
+    notes = [
+        Finding("absent_truth", cell.channel, {"what": what, "name": cell.described, "similar": _similar(cell, names)})
+        for cell in absent
+    ]
     return replace(source, findings=(*source.findings, *notes)), resolved
 
 
 def _resolved(path: Path, channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
-    """Return the map with the file's own column names, and the ground truth that is missing from the file.
-
-    The maps found last are kept, as files with the same columns usually follow each other.
-    """
-    known = channels, tuple(names)
-    found = _FOUND.get(known)
-    if found is None:
-        if len(_FOUND) >= _MOST_FOUND:
-            _FOUND.clear()
-        found = _FOUND[known] = _find_columns(path, channels, names)
-    return found
-
-
-def _find_columns(path: Path, channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
+    """Return the map with the file's own column names, and the ground truth that is missing from the file."""
     absent = [
         source
         for source in channels.sources

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from cdtool.columns import as_float64
 from cdtool.errors import CdtoolError, RecordingError, installing
 from cdtool.findings import Finding
-from cdtool.findings.containers import ColumnLeftOut, RoundedColumn
 from cdtool.recording import FloatArray
 
 # A file that unpacks to more than this many bytes and to more than this multiple of its own size is refused.
@@ -34,9 +33,8 @@ def library(module: str, extra: str, path: Path) -> Any:
 
 def check_size(path: Path, values: int) -> None:
     """Raise RecordingError if a file declares far more numbers than a log of its size can contain."""
-    # A product of damaged dimensions may exceed every float.
-    size, declared = path.stat().st_size, min(8 * values, 2**63)
-    if declared > _FREE and declared > _RATIO * size:
+    declared = min(8 * values, 2**63)  # a product of damaged dimensions may exceed every float
+    if declared > _FREE and declared > _RATIO * (size := path.stat().st_size):
         raise RecordingError(
             f"{path}: unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",
             "name fewer columns in the machine file, or save it without compression",
@@ -72,10 +70,10 @@ def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> 
     if values.dtype.kind in "iu" and values.size:
         largest = max(abs(int(values.min())), abs(int(values.max())))
         if largest > _LARGEST_EXACT:
-            findings.append(Finding(RoundedColumn(), name))
+            findings.append(Finding("rounded_column", name))
     return as_float64(values)
 
 
 def left_out_finding(name: str, kind: str) -> Finding:
     """Return the note on a column that is left out because its values are not numbers."""
-    return Finding(ColumnLeftOut(name, kind), severity="note")
+    return Finding("column_left_out", "", {"column": name, "what": kind})

@@ -17,7 +17,6 @@ from cdtool.clock import EPOCH
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
 from cdtool.columns import as_float64
 from cdtool.findings import Finding
-from cdtool.findings.clocks import FileUnitImplausible
 from cdtool.recording import FloatArray
 
 
@@ -65,7 +64,9 @@ def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding],
     meant = contradicted_by_epoch(stamp, clock.factor)
     if clock.base or not meant:
         return clock
-    findings.append(Finding(FileUnitImplausible(both_readings(stamp, clock.factor, stated, meant)), channel))
+    findings.append(
+        Finding("file_unit_implausible", channel, {"readings": both_readings(stamp, clock.factor, stated, meant)})
+    )
     return EpochClock(clock.read, SECONDS[meant], missing=clock.missing)
 
 

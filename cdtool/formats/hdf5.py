@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,8 +18,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import ClocksWithoutUnit, UnusableClock
-from cdtool.findings.containers import PackedValues, RowsAsColumns
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.container_checks import (
     check_chunks,
@@ -37,21 +36,12 @@ from cdtool.units import find_unit
 
 _KEYS = ("scale_factor", "add_offset")
 _MISSING = ("_FillValue", "missing_value")
-_UNITS = {
-    **dict.fromkeys(("ns", "nsec", "nsecs", "nanosecond", "nanoseconds"), 1e-9),
-    **dict.fromkeys(("us", "usec", "usecs", "microsecond", "microseconds"), 1e-6),
-    **dict.fromkeys(("ms", "msec", "msecs", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
-    **dict.fromkeys(("min", "mins", "minute", "minutes"), 60.0),
-    **dict.fromkeys(("h", "hr", "hrs", "hour", "hours"), 3600.0),
-    **dict.fromkeys(("d", "day", "days"), 86400.0),
-}
+# Units of a time since a date, without a plural, that are in no table of units.
+_UNITS = {"nsec": 1e-9, "usec": 1e-6, "msec": 1e-3, "min": 60.0, "hr": 3600.0, "d": 86400.0, "day": 86400.0}
 _SINCE = re.compile(r"\s*(?P<unit>[a-z]+)\s+since\s+(?P<date>.+?)\s*", re.IGNORECASE)
-_DATE = re.compile(
-    r"(?P<day>[0-9]{4}-[0-9]{1,2}-[0-9]{1,2})(?:[T ]+(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})"
-    r"(?::(?P<second>[0-9]{1,2}(?:\.[0-9]*)?))?)?\s*"
-    r"(?:Z|UTC|GMT|(?P<sign>[+-])(?P<zone>[0-9]{1,2}):?(?P<part>[0-9]{2})?)?"
-)
+# A single digit, to which ISO 8601 has a zero; what it has not between date and zone; decimals of a second.
+_DIGIT, _ZONE = re.compile(r"(?<![0-9.])[0-9](?![0-9])"), re.compile(r"\s+(?=[+-])|\s*(UTC|GMT|Z)$")
+_DECIMALS = re.compile(r"[.,]([0-9]*)")
 _CALENDARS = ("", "standard", "gregorian", "proleptic_gregorian")
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNIT_KEYS = ("unit", "units", "Unit", "Units")
@@ -97,7 +87,7 @@ class Packing:
         """Return the note on a packed column; empty if the column is not packed."""
         if (self.scale, self.offset) == (1.0, 0.0):
             return []
-        return [Finding(PackedValues(self.scale, self.offset), column, "note")]
+        return [Finding("packed_values", column, {"scale": self.scale, "offset": self.offset})]
 
 
 def times_since(unit: str, calendar: str) -> tuple[float, Fraction] | None:
@@ -107,18 +97,20 @@ def times_since(unit: str, calendar: str) -> tuple[float, Fraction] | None:
     a calendar of 360 days are not Gregorian dates.
     """
     match = _SINCE.fullmatch(unit)
-    if match is None or match["unit"].lower() not in _UNITS:
+    factor = _UNITS.get(match["unit"].lower().removesuffix("s")) if match else None
+    if match and factor is None and (known := find_unit(match["unit"].lower())) is not None and known.si == "s":
+        factor = known.factor
+    if match is None or factor is None:
         return None
-    date = _DATE.fullmatch(match["date"])
-    if date is None:
-        raise ValueError(f"the date of '{unit}' cannot be read")
+    date, decimals = " ".join(match["date"].split()), _DECIMALS.search(match["date"])
+    try:
+        moment = datetime.fromisoformat(_DIGIT.sub(r"0\g<0>", _ZONE.sub("", _DECIMALS.sub("", date))))
+        since_1970 = moment.replace(tzinfo=moment.tzinfo or UTC) - datetime(1970, 1, 1, tzinfo=UTC)
+    except (ValueError, OverflowError):
+        raise ValueError(f"the date of '{unit}' cannot be read") from None
     if calendar.lower() not in _CALENDARS:
         raise ValueError(f"its calendar '{calendar}' is not the Gregorian calendar")
-    year, month, day = (int(part) for part in date["day"].split("-"))
-    days = int((np.datetime64(f"{year:04d}-{month:02d}-{day:02d}") - np.datetime64(0, "D")).astype(np.int64))
-    seconds = 3600 * int(date["hour"] or 0) + 60 * int(date["minute"] or 0) + Fraction(date["second"] or 0)
-    east = 3600 * int(date["zone"] or 0) + 60 * int(date["part"] or 0)
-    return _UNITS[match["unit"].lower()], 86400 * days + seconds + (east if date["sign"] == "-" else -east)
+    return factor, since_1970 // timedelta(seconds=1) + Fraction(f"0.{decimals[1]}" if decimals else 0)
 
 
 def _numbers(attributes: Mapping[str, Any], key: str) -> tuple[float, ...]:
@@ -152,8 +144,6 @@ class Hdf5(PiecewiseFormat):
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         h5py = library("h5py", "hdf5", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not an HDF5 file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "an HDF5 file"), h5py.File(path, "r") as file:
             tree = _Datasets(path, h5py, file, findings, wanted.worded if wanted is not None else ())
@@ -179,8 +169,8 @@ class Hdf5(PiecewiseFormat):
 class _Datasets:
     """The datasets of numbers of an open file.
 
-    `locations` maps a column to its dataset and, if the dataset is a matrix, to the index of the column in it. The
-    datasets `worded` may contain texts, which are read as `categories`.
+    `locations` maps a column to its dataset and to the index of the column in it. The datasets `worded` may contain
+    texts, which are read as `categories`.
     """
 
     def __init__(
@@ -191,7 +181,7 @@ class _Datasets:
         self._worded = worded
         self.datasets: dict[str, Any] = {}
         self.packings: dict[str, Packing] = {}
-        self.locations: dict[str, tuple[str, int | None]] = {}
+        self.locations: dict[str, tuple[str, int]] = {}
         self.rounded: Counter[str] = Counter()
         self._clocks: dict[str, EpochClock | None] = {}
         self._origin = Fraction(0)
@@ -202,7 +192,7 @@ class _Datasets:
         if not isinstance(node, self.h5py.Dataset):
             return
         if name in self._worded and node.ndim == 1 and self.h5py.check_string_dtype(node.dtype) is not None:
-            self.datasets[name], self.packings[name], self.locations[name] = node, Packing(), (name, None)
+            self.datasets[name], self.packings[name], self.locations[name] = node, Packing(), (name, 0)
             self.categories[name] = Categories()
             return
         reason = _unusable(node)
@@ -216,12 +206,14 @@ class _Datasets:
         self.datasets[name], self.packings[name] = node, packing
         self.findings += packing.finding(name)
         if node.ndim == 1 or 1 in node.shape:
-            self.locations[name] = (name, None)
+            self.locations[name] = (name, 0)
             return
         for i in range(min(node.shape)):
             self.locations[f"{name}[{i}]"] = (name, i)
         if node.shape[0] < node.shape[1]:
-            self.findings.append(Finding(RowsAsColumns("dataset", name, *node.shape), severity="note"))
+            rows, columns = node.shape
+            shape = {"thing": "dataset", "name": name, "rows": rows, "columns": columns}
+            self.findings.append(Finding("rows_as_columns", "", shape))
 
     def rows(self, key: str) -> int:
         """Return the number of values of a column."""
@@ -258,12 +250,11 @@ class _Datasets:
 
     def clocks_without_unit(self) -> list[Finding]:
         """Return a warning if several groups have datasets with the name of a clock but without a unit of time."""
-        paths = [
-            path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES and self._clock_at(path) is None
-        ]
+        named = (path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES)
+        paths = [path for path in named if self._clock_at(path) is None]
         if len({path.rpartition("/")[0] for path in paths}) < 2:
             return []
-        return [Finding(ClocksWithoutUnit(tuple(paths)))]
+        return [Finding("clocks_without_unit", "", {"datasets": tuple(paths)})]
 
     def _clock(self, key: str) -> tuple[str, EpochClock] | None:
         """Return path and clock of a column; the clock of a clock is itself. None if the column has no clock."""
@@ -288,7 +279,7 @@ class _Datasets:
         try:
             since = times_since(stated, _text(dataset.attrs.get("calendar")))
         except ValueError as fault:
-            self.findings.append(Finding(UnusableClock(str(fault)), path))
+            self.findings.append(Finding("unusable_clock", path, {"reason": str(fault)}))
             return None
         unit = find_unit(stated)
         if since is None and (unit is None or unit.si != "s"):
@@ -296,22 +287,18 @@ class _Datasets:
         factor, base = since or (unit.factor if unit is not None else 1.0, Fraction(0))
 
         def read(start: int, end: int) -> Any:
-            return _rows_of(dataset, None, start, end)
+            return _rows_of(dataset, 0, start, end)
 
         base += Fraction(packing.offset) * Fraction(repr(factor))
         clock = EpochClock(read, factor * packing.scale, base, packing.missing)
         return with_plausible_unit(clock, stated, self.findings, path)
 
 
-def _rows_of(dataset: Any, index: int | None, start: int, end: int) -> Any:
+def _rows_of(dataset: Any, index: int, start: int, end: int) -> Any:
     """Return values of a vector, or of column `index` of a matrix; the rows are along the longer dimension."""
-    if index is None:
-        return dataset[start:end] if dataset.ndim == 1 else _long_side(dataset, start, end)
+    if dataset.ndim == 1:
+        return dataset[start:end]
     return dataset[index, start:end] if dataset.shape[0] < dataset.shape[1] else dataset[start:end, index]
-
-
-def _long_side(dataset: Any, start: int, end: int) -> Any:
-    return (dataset[0, start:end] if dataset.shape[0] == 1 else dataset[start:end, 0]).ravel()
 
 
 def _unusable(dataset: Any) -> str:

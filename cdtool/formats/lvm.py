@@ -18,50 +18,53 @@ The keys are those of the "Specification for the LabVIEW Measurement File" of Na
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import DerivedTimes, StartAssumed
-from cdtool.findings.containers import LastSegmentIncomplete, SegmentCutOff
-from cdtool.formats.column_names import OWN_CLOCK, requested_keys
+from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import left_out_finding
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.cells import SEPARATORS, kind, number
-from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.encoding import HEAD_BYTES, detect_text, looks_like_text
-from cdtool.formats.csv.foreign_heads import LABVIEW, is_measurement
-from cdtool.formats.csv.marks import Marks, SampleCell
-from cdtool.formats.csv.text import SAMPLE_BYTES, Text, read_sample, read_small
-from cdtool.formats.csv.timed_table import ClockGroup, CountClock, RowCells, StampClock, headers, timed_pieces
-from cdtool.formats.pieces import Pieces, PiecewiseFormat
+from cdtool.formats.csv.cells import kind, number
+from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
+from cdtool.formats.csv.foreign_heads import is_measurement
+from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.source import Source
+from cdtool.formats.timed_text import (
+    ClockGroup,
+    Segment,
+    TimedText,
+    details_of,
+    dialect_of_rows,
+    number_in_head,
+    opened,
+)
 from cdtool.recording import FloatArray
 
 _END, _X, _COMMENT = "***End_of_Header***", "X_Value", "Comment"
 _SEGMENT_KEYS = {"Channels", "Samples", "Delta_X", "X_Dimension"}
 _SEPARATOR_WORDS = {"tab": "\t", "comma": ","}
-# No recording has more segments, or more columns in a segment.
-_MOST_SEGMENTS, _MOST_COLUMNS = 10_000, 1 << 14
+# No recording has more segments.
+_MOST_SEGMENTS = 10_000
 # Statements of more samples are no more precise, but may not fit into 64 bits.
 _MOST_SAMPLES = 1 << 40
-_DATE = re.compile(r"(?P<year>\d{4})/(?P<month>\d{1,2})/(?P<day>\d{1,2})")
-_TIME = re.compile(r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2})(?:[.,](?P<fraction>\d+))?")
 # Seconds from 1904, where LabVIEW's times begin, to 1970. Later stamps are absolute, others count from the start.
 _EPOCH_1904, _ABSOLUTE = 2_082_844_800, 1e9
 
 
 @dataclass(frozen=True)
-class Lvm(PiecewiseFormat):
+class Lvm:
     """LabVIEW measurement files: each channel has the times of its `X_Value` column, or of its X0 and Delta_X."""
 
     name: ClassVar[str] = "lvm"
@@ -77,116 +80,41 @@ class Lvm(PiecewiseFormat):
 
         If the machine file names a column as the clock, or pins lines in `[csv]`, the file is a table with one clock.
         """
-        if wanted is not None and _is_of_table(wanted):
+        pins, clock = (TablePins(), None) if wanted is None else (wanted.pins, wanted.time.column)
+        if clock not in (None, OWN_CLOCK) or pins.header is not None or pins.skip_lines > 0:
             return Csv().columns(path, wanted)
-        return super().columns(path, wanted)
-
-    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        log = _read_measurement(path, TablePins() if wanted is None else wanted.pins)
-        names = tuple(log.units)
-        keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
-        findings, left_out = [*log.findings], set[str]()
-        for segment in log.segments:
-            table = yield from timed_pieces(path, segment.dialect, segment.groups, keys, survey=wanted is None)
-            findings += table.findings
-            left_out |= table.left_out
-            if table.rows < segment.stated:
-                findings.append(
-                    Finding(SegmentCutOff(segment.dialect.first_line, segment.stated, table.rows), "", "loss")
-                )
-        read = [key for key in keys if key not in left_out]
-        if not read:
-            raise RecordingError(f"{path}: no channel has numbers", "see cdtool info")
-        groups = [group for segment in log.segments for group in segment.groups]
-        columns = headers(groups, log.units, read)
-        ordered = {key: columns[key] for key in names if key in columns}
-        merged = tuple(dict.fromkeys(findings))
-        return Source(path, self.name, ordered, log.origin, merged, log.details, names)
-
-
-def _is_of_table(wanted: ChannelMap) -> bool:
-    column = wanted.time.column
-    return column not in (None, OWN_CLOCK) or wanted.pins.header is not None or wanted.pins.skip_lines > 0
+        return _read_heads(path, pins).source(path, self.name, wanted)
 
 
 @dataclass(frozen=True)
-class _PacketClock:
-    """The times of a channel with fewer samples than the first one, in packets of `rows` rows.
+class _Line:
+    """The cells of a line, its number (from 1), and the byte of the stream where it starts."""
 
-    A packet has `samples` of them, `step` [s] apart, in its first rows. `column` are the times of the first channel,
-    `first_step` [s] apart (None: no such column, and the first sample is at `start` [s]); `offset` [s] is added.
-    """
-
-    rows: int
-    samples: int
-    step: float
-    first_step: float
-    start: float
-    offset: float
-    column: int | None
-    whole: tuple[int, ...] = ()
-
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """The column of times."""
-        return () if self.column is None else (self.column,)
-
-    def times(self, rows: RowCells) -> FloatArray:
-        """Return the times of the rows in which the channel has a sample."""
-        packet, row = np.divmod(np.arange(rows.first, rows.first + rows.count), self.rows)
-        if self.column is None:
-            times = self.start + (packet * self.samples + row) * self.step
-        else:
-            times = rows.numbers[self.column] + row * (self.step - self.first_step)
-        return np.where(row < self.samples, times + self.offset, np.nan)
+    cells: list[str]
+    number: int
+    start: int
 
 
 @dataclass(frozen=True)
-class _Segment:
-    """A segment: the dialect of its rows, its channels by clock, and the rows that its head states (0: none)."""
-
-    dialect: Dialect
-    groups: tuple[ClockGroup, ...]
-    stated: int
-
-
-@dataclass(frozen=True)
-class _Measurement:
-    """A measurement file: its segments, the units of its channels, its start since 1970 [s], and findings."""
-
-    segments: tuple[_Segment, ...]
-    units: Mapping[str, str | None]
-    origin: float
-    details: Mapping[str, str]
-    findings: tuple[Finding, ...]
-
-
-@dataclass
 class _Head:
-    """The head of a segment: its keys, the cells of the names, and where its rows are in the stream.
+    """The head of a segment, which begins at byte `start`: its keys, the line of names, and the first row."""
 
-    The first row is line `line` (from 1). `row` are the cells of the first row.
-    """
-
-    keys: dict[str, list[str]]
-    names: list[str] = field(default_factory=list)
-    line: int = 0
-    start: int = 0
-    end: int = 0
-    row: list[str] = field(default_factory=list)
+    keys: Mapping[str, list[str]]
+    start: int
+    names: _Line
+    row: _Line
 
     @property
     def clocks(self) -> list[int]:
         """Return the columns of times."""
-        return [at for at, name in enumerate(self.names) if name == _X]
+        return [at for at, name in enumerate(self.names.cells) if name == _X]
 
     @property
     def channels(self) -> dict[int, str]:
         """Return the names of the channels by column."""
-        last = len(self.names) - 1
-        named = {at: name for at, name in enumerate(self.names) if name and name != _X}
-        if named.get(last) == _COMMENT:
-            del named[last]
+        named = {at: name for at, name in enumerate(self.names.cells) if name and name != _X}
+        if named.get(len(self.names.cells) - 1) == _COMMENT:
+            del named[len(self.names.cells) - 1]
         counts = Counter(named.values())
         return {at: f"{name}#{at}" if counts[name] > 1 else name for at, name in named.items()}
 
@@ -198,11 +126,10 @@ class _Head:
         values = [cell for cell in cells[1:] if cell]
         return values[columns.index(column)] if len(values) == len(columns) else ""
 
-    def number(self, key: str, column: int, default: float) -> float:
+    def number(self, key: str, column: int, default: float = 0.0) -> float:
         """Return the number that a key states about a channel."""
-        cell = self.cell(key, column)
-        value = number(cell, "," if "," in cell else ".") if cell else None
-        return value if value is not None and np.isfinite(value) else default
+        value = number_in_head(self.cell(key, column))
+        return default if value is None else value
 
     def samples(self, column: int, default: int = 0) -> int:
         """Return how many samples of a channel are stated."""
@@ -223,210 +150,137 @@ class _Style:
     started: Fraction | None
 
 
-def _read_measurement(path: Path, pins: TablePins) -> _Measurement:
-    content = read_small(path)
-    sample = read_sample(path) if content is None else content[:SAMPLE_BYTES]
-    if not sample.strip():
-        raise RecordingError(f"{path}: is empty", "was the recording stopped immediately, or the copy cut off?")
-    text, stream = detect_text(path, sample, pins.encoding, content)
-    style = _style(path, text, stream, pins)
-    heads, is_cut = _heads(path, text, style)
+def _read_heads(path: Path, pins: TablePins) -> TimedText:
+    text, lines = opened(path, pins)
+    style = _style(path, [text.decode(line).strip(" \r\n") for line in lines], pins)
+    heads, end = _heads(path, text, style)
     if not heads:
         raise RecordingError(f"{path}: has no row of numbers", "was the recording stopped immediately?")
-    if len(heads) > 1 and text.recoded:
-        raise RecordingError(f"{path}: has several segments in {text.encoding.upper()}", "save it again as UTF-8")
     for head in heads:
         _check_head(path, head)
-    findings = [Finding(LastSegmentIncomplete(), severity="loss")] if is_cut else []
+    findings = [] if end is None else [Finding("last_segment_incomplete")]
     origin, absolute = _origin(heads, style, findings)
     units: dict[str, str | None] = {}
     empty: dict[str, None] = {}
     segments = []
-    for head in heads:
+    for head, below in zip(heads, [*(each.start for each in heads[1:]), end], strict=True):
         channels = {at: key for at, key in head.channels.items() if head.samples(at, 1) > 0}
         empty |= dict.fromkeys(key for at, key in head.channels.items() if at not in channels)
         for at, key in channels.items():
             units.setdefault(key, head.cell("Y_Unit_Label", at) or None)
-        groups = _groups(head, channels, style, origin, absolute, findings)
-        stated = max(map(head.samples, channels), default=0)
-        segments.append(_Segment(_dialect(text, pins, head, style), tuple(groups), stated))
+        rows = text if below is None else replace(text, size=text.mark + below, padding=0)
+        names = [head.channels.get(at, "") for at in range(len(head.names.cells))]
+        place = head.row.number, head.row.start
+        dialect = dialect_of_rows(rows, pins, (style.separator, style.decimal), place, names, [head.row.cells])
+        groups = tuple(_groups(head, channels, style, origin, absolute, findings))
+        segments.append(Segment(dialect, groups, max(map(head.samples, channels), default=0)))
     findings += [left_out_finding(key, "empty") for key in empty if key not in units]
-    details = {
-        "separator": SEPARATORS.get(style.separator, repr(style.separator)),
-        "decimal mark": "comma" if style.decimal == "," else "point",
-        "encoding": text.encoding,
-        "segments": str(len(segments)),
-    }
-    return _Measurement(
-        _with_common_clocks(segments),
-        units,
-        absolute - _EPOCH_1904 if absolute else float(origin),
-        details,
-        tuple(findings),
-    )
+    details = details_of(text, style.separator, style.decimal) | {"segments": str(len(segments))}
+    start = absolute - _EPOCH_1904 if absolute else float(origin)
+    return TimedText(tuple(segments), units, start, details, tuple(findings))
 
 
-def _style(path: Path, text: Text, stream: bytes, pins: TablePins) -> _Style:
+def _style(path: Path, lines: Sequence[str], pins: TablePins) -> _Style:
     """Return what the head of the file states; raises RecordingError for an unknown separator."""
-    lines = []
-    for raw in stream.split(text.line_end):
-        lines.append(text.decode(raw).strip(" \r\n"))
-        if lines[-1].startswith(_END):
-            break
-    else:
+    end = next((i for i, line in enumerate(lines) if line.startswith(_END)), None)
+    if end is None:
         raise RecordingError(f"{path}: its head has no end ({_END})", "was the copy cut off? copy it again")
-    if not lines[0].lstrip("\ufeff").startswith(LABVIEW):
-        raise RecordingError(f"{path}: is not a measurement file of LabVIEW", "see cdtool list formats")
-    stated = next((line for line in lines if line.startswith("Separator")), "Separator\tTab")
+    stated = next((line for line in lines[:end] if line.startswith("Separator")), "Separator\tTab")
     mark, word = stated[len("Separator") : len("Separator") + 1], stated[len("Separator") + 1 :].strip(" \t,").lower()
     separator = pins.separator or _SEPARATOR_WORDS.get(word, "")
     if not separator or (mark != separator and not pins.separator):
         raise RecordingError(
             f"{path}: states the separator '{word[:20]}', which is not Tab or Comma", "pin separator in [csv]"
         )
-    keys = {line.partition(separator)[0]: line.split(separator)[1:] for line in lines}
-
-    def value(key: str) -> str:
-        return next(iter(keys.get(key, [])), "").strip()
-
-    decimal = pins.decimal or value("Decimal_Separator") or "."
+    keys = {cells[0]: (cells[1:] or [""])[0].strip() for cells in (line.split(separator) for line in lines[:end])}
+    decimal = pins.decimal or keys.get("Decimal_Separator") or "."
     if decimal not in (".", ",") or decimal == separator:
         raise RecordingError(f"{path}: states the decimal separator '{decimal}'", "pin decimal in [csv]")
-    return _Style(separator, decimal, value("X_Columns").lower() == "no", _instant(value("Date"), value("Time")))
+    started = _instant(keys.get("Date", ""), keys.get("Time", ""))
+    return _Style(separator, decimal, keys.get("X_Columns", "").lower() == "no", started)
 
 
-def _heads(path: Path, text: Text, style: _Style) -> tuple[list[_Head], bool]:
-    """Return the heads of the segments with the bytes of their rows, and whether the file ends within a head."""
-    search = _HeadSearch(path, style.separator)
-    lines_before, offset = 0, 0
-    for block, size in text.blocks(0):
-        data = np.frombuffer(block, dtype=np.uint8, count=size)
-        starts = np.concatenate(([0], np.flatnonzero(data == text.line_end[0]) + 1))
-        starts = starts[starts < size]
-        marked = np.flatnonzero(_BEGINS_HEAD[data[starts]])
-        line = 0
-        while line < len(starts):
-            if search.head is None and not search.keys:  # rows follow, up to the next line that may begin a head
-                at = int(np.searchsorted(marked, line))
-                if at == len(marked):
-                    break
-                line = int(marked[at])
-            end = int(starts[line + 1]) if line + 1 < len(starts) else size
-            cells = _cells(text.decode(bytes(memoryview(block)[int(starts[line]) : end])), style.separator)
-            search.add(cells, lines_before + line + 1, offset + int(starts[line]))
-            line += 1
-        offset += size
-        lines_before += len(starts)
-    return search.end(offset)
+def _heads(path: Path, text: Text, style: _Style) -> tuple[list[_Head], int | None]:
+    """Return the heads of the segments, and the byte of one that the file's end cuts off (None: no head is).
 
-
-# The letters with which the lines of a head begin, and no row.
-_BEGINS_HEAD = np.array(
-    [chr(letter).isascii() and (chr(letter).isalpha() or letter == ord("*")) for letter in range(256)]
-)
-
-
-class _HeadSearch:
-    """The heads found so far; `head` is the one whose names or first row are still to come."""
-
-    def __init__(self, path: Path, separator: str) -> None:
-        self.path, self.separator = path, separator
-        self.heads: list[_Head] = []
-        self.head: _Head | None = None
-        self.keys: dict[str, list[str]] = {}
-        self.begin = 0  # of the first line of words below the last row
-
-    def add(self, cells: list[str], line: int, start: int) -> None:
-        """Add a line of a head, the line of names below it, or its first row, which starts at byte `start`."""
-        if not any(cells):
-            return
-        if self.head is None and self.heads and _is_row(cells):  # the words above it were no head
-            self.keys, self.begin = {}, 0
-        elif self.head is None:
-            self._add_key(cells, start)
-        elif not self.head.names:
-            self.head.names = cells
-        elif _is_row(cells):
-            self.head.line, self.head.start, self.head.row = line, start, cells
-            self.heads.append(self.head)
-            self.head = None
-            if len(self.heads) > _MOST_SEGMENTS:
-                raise RecordingError(f"{self.path}: has more than {_MOST_SEGMENTS} segments", "write one heading only")
-        elif cells[0] in _SEGMENT_KEYS:  # a segment without rows
-            self.head = None
-            self._add_key(cells, start)
-        else:
+    Other words between and below the rows are left to the reader of the rows.
+    """
+    heads: list[_Head] = []
+    for lines, row in _lines_of_words(text, style.separator):
+        ends = [i for i, line in enumerate(lines) if line.cells[0] == _END]
+        before, end = ([-1, -1, *ends])[-2:]
+        keys = {line.cells[0]: line.cells for line in lines[before + 1 : end]} if ends else {}
+        is_head = bool(keys.keys() & _SEGMENT_KEYS)
+        below = lines[end + 1 :]
+        if row is None:
+            is_cut = is_head or any(line.cells[0] in _SEGMENT_KEYS for line in below)
+            return heads, lines[0].start if is_cut else None
+        if is_head and len(below) > 1:
+            wrong = below[1]
             raise RecordingError(
-                f"{self.path}: line {line} ({cells[0][:30]!r}) is below the names, but is no row of numbers",
+                f"{path}: line {wrong.number} ({wrong.cells[0][:30]!r}) is below the names, but not a row of numbers",
                 "repair the line",
             )
+        if is_head and below:
+            heads.append(_Head(keys, lines[0].start, below[0], row))
+        if len(heads) > _MOST_SEGMENTS:
+            raise RecordingError(f"{path}: has more than {_MOST_SEGMENTS} segments", "write one heading only")
+    return heads, None
 
-    def _add_key(self, cells: list[str], start: int) -> None:
-        if not self.keys and not self.begin:
-            self.begin = start
-        if cells[0] != _END:
-            self.keys[cells[0]] = cells
-            return
-        if self.keys.keys() & _SEGMENT_KEYS:
-            self.head = _Head(self.keys)
-            if self.heads and not self.heads[-1].end:
-                self.heads[-1].end = self.begin
-            self.begin = 0
-        self.keys = {}
 
-    def end(self, size: int) -> tuple[list[_Head], bool]:
-        """Return the heads, and whether another one is cut off; `size` is that of the stream.
-
-        Other words below the last row are left to the reader of the rows.
-        """
-        is_cut = self.head is not None or bool(self.keys.keys() & _SEGMENT_KEYS)
-        if self.heads and not self.heads[-1].end:
-            self.heads[-1].end = self.begin if is_cut and self.begin else size
-        return self.heads, is_cut
+def _lines_of_words(text: Text, separator: str) -> Iterator[tuple[list[_Line], _Line | None]]:
+    """Yield the lines from one that begins with a letter, as no row does, to the next row, and that row."""
+    lines: list[_Line] = []
+    number, start = 1, 0
+    for block in text.blocks(0):
+        for raw in block.removesuffix(text.line_end).split(text.line_end):
+            if lines or raw[:1].isalpha() or raw[:1] == b"*":
+                line = _Line(_cells(text.decode(raw), separator), number, start)
+                if lines and _is_row(line.cells):
+                    yield lines, line
+                    lines = []
+                elif any(line.cells):
+                    lines.append(line)
+            start += len(raw) + 1
+            number += 1
+    if lines:
+        yield lines, None
 
 
 def _check_head(path: Path, head: _Head) -> None:
-    count, stated = len(head.channels), head.keys.get("Channels", ["", ""])
-    if len(head.names) > _MOST_COLUMNS:
-        raise RecordingError(f"{path}: names {len(head.names)} columns, more than {_MOST_COLUMNS}", "split the log")
-    if head.names[0] != _X:
+    """Raise RecordingError if a head contradicts its names, or is not of samples over time."""
+    names, stated = head.names, head.keys.get("Channels", ["", ""])[1:]
+    if names.cells[0] != _X:
         raise RecordingError(
-            f"{path}: line {head.line - 1} begins with {head.names[0][:30]!r}, not with {_X}", "repair the line"
+            f"{path}: line {names.number} begins with {names.cells[0][:30]!r}, not with {_X}", "repair the line"
         )
-    if len(stated) > 1 and stated[1].isdigit() and int(stated[1][:12]) != count:
+    if stated and stated[0].isdigit() and int(stated[0][:12]) != len(head.channels):
         raise RecordingError(
-            f"{path}: line {head.line - 1} has {count} names, but {stated[1][:12]} channels are stated above it",
+            f"{path}: line {names.number} has {len(head.channels)} names, but {stated[0][:12]} channels are stated "
+            "above it",
             "was the file edited, or the copy damaged?",
         )
-    for at in head.channels:
-        dimension = head.cell("X_Dimension", at)
-        if dimension not in ("", "Time"):
+    for at, key in head.channels.items():
+        if (dimension := head.cell("X_Dimension", at)) not in ("", "Time"):
             raise RecordingError(
-                f"{path}: the x axis of channel '{head.channels[at]}' is '{dimension[:30]}', not Time",
+                f"{path}: the x axis of channel '{key}' is '{dimension[:30]}', not Time",
                 "a log of samples over time is needed",
             )
 
 
 def _origin(heads: Sequence[_Head], style: _Style, findings: list[Finding]) -> tuple[Fraction, float]:
     """Return the start since 1970 [s], and the first stamp [s] if the stamps count from 1904 (0: they do not)."""
-    stamps = [
-        value
-        for head in heads
-        for at in head.clocks
-        if at < len(head.row)
-        and (value := number(head.row[at], style.decimal)) is not None
-        and _ABSOLUTE < value < np.inf
-    ]
+    cells = [head.row.cells[at] for head in heads for at in head.clocks if at < len(head.row.cells)]
+    values = [value for cell in cells if (value := number(cell, style.decimal)) is not None]
+    stamps = [value for value in values if _ABSOLUTE < value < np.inf]
     if stamps and not style.counted:
         return Fraction(0), min(stamps)
-    starts = [start for head in heads for at in head.channels if (start := head.started(at)) is not None]
-    origin = min(starts, default=style.started or Fraction(0))
-    unknown = tuple(
-        dict.fromkeys(key for head in heads for at, key in head.channels.items() if head.started(at) is None)
-    )
-    if starts and unknown:
-        findings.append(Finding(StartAssumed(unknown)))
-    return origin, 0.0
+    starts = [(key, head.started(at)) for head in heads for at, key in head.channels.items()]
+    known = [start for _, start in starts if start is not None]
+    unknown = tuple(dict.fromkeys(key for key, start in starts if start is None))
+    if known and unknown:
+        findings.append(Finding("start_assumed", "", {"channels": unknown}))
+    return min(known, default=style.started or Fraction(0)), 0.0
 
 
 def _groups(
@@ -440,96 +294,49 @@ def _groups(
     """Yield the channels of a segment by their clocks."""
     starts = {at: head.started(at) for at in channels}
     known = [start for start in starts.values() if start is not None]
-    usual = min(known, default=origin)
-    offsets = {at: float((starts[at] or usual) - origin) if known else 0.0 for at in channels}
-    steps = {at: head.number("Delta_X", at, 0.0) for at in channels}
-    firsts = {at: head.number("X0", at, 0.0) for at in channels}
+    offsets = {at: float((starts[at] or min(known)) - origin) if known else 0.0 for at in channels}
     samples = {at: head.samples(at) for at in channels}
-    rows = max(samples.values(), default=0)
-    clocks = head.clocks
-    alike: dict[tuple[float, ...], list[int]] = {}
-    for at in channels:
-        if len(clocks) > 1:
-            alike.setdefault((float(max(clock for clock in clocks if clock < at)), offsets[at]), []).append(at)
-        else:
-            alike.setdefault((offsets[at], steps[at], firsts[at], float(samples[at])), []).append(at)
+    rows, clocks = max(samples.values(), default=0), head.clocks
+    alike: dict[tuple[float, ...], dict[str, int]] = {}
+    for at, key in channels.items():
+        beside = max(clock for clock in clocks if clock < at)
+        stated = (head.number("Delta_X", at), head.number("X0", at), samples[at]) if len(clocks) < 2 else (0.0, 0.0, 0)
+        alike.setdefault((beside, offsets[at], *stated), {})[key] = at
     lead = next(iter(channels), 0)
-    for number_of_group, members in enumerate(alike.values()):
-        at = members[0]
-        columns = {channels[member]: member for member in members}
-        offset = -absolute if absolute else offsets[at]
-        name = f"{_X} {number_of_group}"
-        if len(clocks) > 1:
-            column = max(clock for clock in clocks if clock < at)
-            yield ClockGroup(name, columns, StampClock(column, 1.0, offset), sparse=True)
-        elif style.counted:
-            if samples[at] == rows:
-                yield ClockGroup(name, columns, CountClock(offset + firsts[at], steps[at] or 1.0), sparse=True)
-            else:
-                packets = _PacketClock(rows, samples[at], steps[at], 0.0, firsts[at], offset, None)
-                yield ClockGroup(name, columns, packets, sparse=True)
-        elif number_of_group == 0 or samples[at] == rows == 0:
-            yield ClockGroup(name, columns, StampClock(0, 1.0, offset), sparse=True)
-        else:
-            # The column of times is that of the first channel only.
-            findings.append(Finding(DerivedTimes(tuple(columns)), "", "note"))
-            later = offsets[at] - offsets[lead] - absolute if absolute else offsets[at]
-            later += firsts[at] - firsts[lead]
-            packets = _PacketClock(max(rows, 1), samples[at] or rows, steps[at], steps[lead], 0.0, later, 0)
-            yield ClockGroup(name, columns, packets, sparse=True)
+    for i, ((column, offset, step, first, _), columns) in enumerate(alike.items()):
+        of_packet = samples[next(iter(columns.values()))]
+        clock: int | None = int(column)
+        times = partial(np.add, -absolute if absolute else offset)
+        if style.counted and len(clocks) < 2:
+            clock, times = None, partial(_counted, rows or 1, of_packet or rows or 1, step or 1.0, offset + first)
+        elif len(clocks) < 2 and i and rows:  # the column of times is that of the first channel only
+            findings.append(Finding("derived_times", "", {"channels": tuple(columns)}))
+            start = (offset - offsets[lead] - absolute if absolute else offset) + first - head.number("X0", lead)
+            clock, times = 0, partial(_derived, rows, of_packet or rows, step - head.number("Delta_X", lead), start)
+        yield ClockGroup(columns, clock, times, sparse=True)
 
 
-def _with_common_clocks(segments: Sequence[_Segment]) -> tuple[_Segment, ...]:
-    """Return segments in which equal names of clocks mean the same channels: otherwise each channel has its own."""
-    parts = {frozenset((group.name, *group.columns) for group in segment.groups) for segment in segments}
-    if len(parts) == 1:
-        return tuple(segments)
-    return tuple(
-        replace(
-            segment,
-            groups=tuple(
-                replace(group, name=key, columns={key: at})
-                for group in segment.groups
-                for key, at in group.columns.items()
-            ),
-        )
-        for segment in segments
-    )
+def _counted(rows: int, samples: int, step: float, start: float, numbers: npt.NDArray[Any]) -> FloatArray:
+    """Return the times of rows, by their numbers: packets of `rows` rows, in the first of which are `samples`."""
+    packet, row = np.divmod(numbers, rows)
+    return np.where(row < samples, start + (packet * samples + row) * step, np.nan)
 
 
-def _dialect(text: Text, pins: TablePins, head: _Head, style: _Style) -> Dialect:
-    width, last = len(head.names), head.end == text.size - text.mark or text.recoded
-    row = [*head.row, *[""] * width]
-    kinds = "".join("N" if kind(cell) == "N" else "M" for cell in row[:width])
-    words = {at: SampleCell(row[at], head.line) for at in head.channels if kind(row[at]) in "XT"}
-    return Dialect(
-        text=text if last else replace(text, size=text.mark + head.end, padding=0),
-        pins=pins,
-        separator=style.separator,
-        marks=Marks(style.decimal),
-        missing=pins.missing,
-        header=tuple(head.channels.get(at, str(at)) for at in range(width)),
-        first_line=head.line,
-        sampled=1,
-        offset=head.start,
-        width=width,
-        kinds=kinds,
-        words=words,
-        short_rows=True,
-    )
+def _derived(rows: int, samples: int, longer: float, start: float, stamps: npt.NDArray[Any]) -> FloatArray:
+    """Return the times of rows from the stamps of another channel, whose step is by `longer` [s] shorter."""
+    row = np.arange(len(stamps)) % rows
+    return np.where(row < samples, stamps + row * longer + start, np.nan)
 
 
 def _instant(date: str, time: str) -> Fraction | None:
     """Return a date and a time of day since 1970 [s]; None if unknown: an empty stamp of LabVIEW is in 1903 or 1904."""
-    day, clock = _DATE.fullmatch(date.strip()), _TIME.fullmatch(time.strip())
-    if day is None or clock is None or int(day["year"]) < 1970:
-        return None
+    second, _, decimals = time.strip().replace(",", ".").partition(".")
     try:
-        days = np.datetime64(f"{day['year']}-{int(day['month']):02d}-{int(day['day']):02d}", "D").astype(int)
+        moment = datetime.strptime(f"{date.strip()} {second}", "%Y/%m/%d %H:%M:%S").replace(tzinfo=UTC)
+        seconds = int(moment.timestamp()) + Fraction(f"0.{decimals or 0}")
     except ValueError:
         return None
-    seconds = int(days) * 86400 + int(clock["hour"]) * 3600 + int(clock["minute"]) * 60 + int(clock["second"])
-    return seconds + Fraction(f"0.{clock['fraction'] or 0}")
+    return seconds if seconds >= 0 else None
 
 
 def _cells(line: str, separator: str) -> list[str]:

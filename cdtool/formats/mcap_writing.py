@@ -15,11 +15,10 @@ import numpy as np
 
 from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts, WrittenNames, prefix_keys, require_clocks
 from cdtool.formats.mcap.exact_times import EXACT_TIME, METADATA, PACKAGE
-from cdtool.recording import FloatArray
+from cdtool.formats.mcap.write import merged
 
 _CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _SECOND = 10**9
-_ROWS = 2**14
 
 
 def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
@@ -63,28 +62,14 @@ def _start(groups: Sequence[Group], origin: float) -> int:
 
 def _messages(ready: Sequence[Part | None], start: int) -> Iterator[tuple[int, int, bytes]]:
     """Yield (group, stamp, payload) in the order of the stamps; equal stamps in the order of the groups."""
-    stamps = [start + np.rint(_time(part) * _SECOND).astype(np.int64) for part in ready]
-    which = np.repeat(np.arange(len(ready)), [len(part) for part in stamps])
-    row = np.concatenate([np.arange(len(part)) for part in stamps])
-    joined = np.concatenate(stamps)
-    order = np.lexsort((which, joined))
-    for first in range(0, len(order), _ROWS):
-        some = order[first : first + _ROWS]
-        packed = [_packed(part, row[some[which[some] == group]]) for group, part in enumerate(ready)]
-        for group, stamp in zip(which[some].tolist(), joined[some].tolist(), strict=True):
-            yield group, stamp, next(packed[group])
-
-
-def _time(part: Part | None) -> FloatArray:
-    return np.empty(0) if part is None or part.time is None else part.time
-
-
-def _packed(part: Part | None, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Iterator[bytes]:
-    """Yield these rows in CDR."""
-    if part is None:
-        return iter(())
-    table = np.column_stack([_time(part)[rows], *(column[rows] for column in part.values)]).astype("<f8")
-    return (_CDR_LITTLE_ENDIAN + line.tobytes() for line in table)
+    times = [np.empty(0) if part is None or part.time is None else part.time for part in ready]
+    stamps = [start + np.rint(time * _SECOND).astype(np.int64) for time in times]
+    rows = [
+        np.column_stack([time, *(part.values if part is not None else ())]).astype("<f8")
+        for time, part in zip(times, ready, strict=True)
+    ]
+    for group, row, stamp in merged(stamps):
+        yield group, stamp, _CDR_LITTLE_ENDIAN + rows[group][row].tobytes()
 
 
 def _definition(group: Group, names: Sequence[str]) -> str:

@@ -23,7 +23,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import NeverFinalised, ValuesCutOff
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.groups import Group, Parts, WrittenNames, prefix_keys, require_clocks
@@ -57,14 +56,12 @@ class Mdf(PiecewiseFormat):
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         asammdf = _library(path)
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its problems are reported as errors or findings
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not an MDF file", "see cdtool list formats")
         findings: list[Finding] = []
         with path.open("rb") as file:
             unfinished = file.read(8) == _MAGICS[1]
         with one_line_errors(path, "an MDF file"), _opened(asammdf, path) as log:
             if unfinished:
-                findings.append(Finding(NeverFinalised(), severity="loss"))
+                findings.append(Finding("never_finalised"))
             channels = _channels(log, findings)
             keys = [key for key in requested_keys(path, wanted, tuple(channels)) if some is None or key in some]
             if not keys:
@@ -156,8 +153,8 @@ def _column(log: Any, key: str, group: int, index: int, findings: list[Finding])
         if signal.invalidation_bits is not None and np.any(signal.invalidation_bits):
             numbers = np.where(np.asarray(signal.invalidation_bits), np.nan, numbers)
         if len(numbers) < end - start:
-            lost = ValuesCutOff(end - start - len(numbers), start + len(numbers))
-            findings.append(Finding(lost, key, "loss"))
+            lost = {"count": end - start - len(numbers), "first": start + len(numbers)}
+            findings.append(Finding("values_cut_off", key, lost))
         return np.pad(numbers, (0, end - start - len(numbers)), constant_values=np.nan)
 
     factor = _time_factor(log, group)

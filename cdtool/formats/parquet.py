@@ -15,11 +15,8 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import StampsAsSeconds
-from cdtool.findings.containers import CutBehindRow
 from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, split_unit
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
-from cdtool.formats.parquet_check import check_batches, check_pages
 from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
@@ -46,8 +43,6 @@ class Parquet(PiecewiseFormat):
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         arrow = library("pyarrow", "parquet", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a Parquet or Feather file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "a Parquet or Feather file"):
             table = _ArrowTable(path, arrow, findings, wanted.worded if wanted is not None else ())
@@ -125,8 +120,8 @@ class _ArrowTable:
                 yield Piece(key, time[~absent], {key: values[~absent]}, int(np.count_nonzero(~absent)))
 
     def _of_parquet(self, keys: Sequence[str]) -> Iterator[Any]:
-        check_size(self.path, self._file.metadata.num_rows * len(keys))
-        check_pages(self.path, self._file.metadata, keys)
+        metadata = self._file.metadata
+        check_size(self.path, sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)) * len(keys))
         return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)))
 
     def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
@@ -154,7 +149,7 @@ class _ArrowTable:
         absent = np.isnat(stamps)
         if key not in self._starts and not absent.all():
             self._starts[key] = stamps[~absent][0]
-            self.findings.append(Finding(StampsAsSeconds(str(self._starts[key])), key, "note"))
+            self.findings.append(Finding("stamps_as_seconds", key, {"start": str(self._starts[key])}))
         seconds = (stamps - self._starts.get(key, np.datetime64(0, "ns"))).astype(np.int64) / 1e9
         seconds[absent] = np.nan
         return seconds, absent
@@ -173,10 +168,12 @@ class _Feather:
     def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
         self._path, self._arrow, self._findings = path, arrow, findings
         self._ipc = library("pyarrow.ipc", "parquet", path)
-        check_batches(path)
         try:
             self._whole = self._ipc.open_file(os.fspath(path))
             self.schema = self._whole.schema
+            # A batch is decompressed as a whole; this counts its rows by its head.
+            counted = library("pyarrow.dataset", "parquet", path).dataset(os.fspath(path), format="feather")
+            check_size(path, counted.count_rows() * len(self.schema.names))
         except arrow.ArrowInvalid:
             self._whole = None
             with path.open("rb") as stream:
@@ -184,12 +181,10 @@ class _Feather:
 
     def batches(self, keys: Sequence[str]) -> Iterator[Any]:
         """Yield the columns `keys`, batch by batch. Arrow does not check a file's declarations without `validate`."""
-        for batch in self._before_cut() if self._whole is None else map(self._whole.get_batch, self._batch_numbers()):
+        count = 0 if self._whole is None else self._whole.num_record_batches
+        for batch in self._before_cut() if self._whole is None else map(self._whole.get_batch, range(count)):
             batch.validate(full=True)
             yield batch.select(list(keys))
-
-    def _batch_numbers(self) -> range:
-        return range(self._whole.num_record_batches)
 
     def _before_cut(self) -> Iterator[Any]:
         """Yield the batches before the cut."""
@@ -200,7 +195,7 @@ class _Feather:
                 batch = reader.read_next_batch()
                 rows += batch.num_rows
                 yield batch
-        self._findings.append(Finding(CutBehindRow(rows), severity="loss"))
+        self._findings.append(Finding("cut_behind_row", "", {"row": rows}))
 
     def _stream(self, stream: Any) -> Any:
         stream.seek(8)  # after the magic bytes and their padding, an Arrow file is a stream

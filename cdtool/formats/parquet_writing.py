@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import reduce
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from cdtool.columns import Column
 from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import library
 from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys, require_clocks
 from cdtool.formats.parquet import OWN_CLOCKS
-from cdtool.recording import BoolArray, FloatArray
+from cdtool.recording import FloatArray
 
 # One row group contains this many numbers (8 MiB), but at least this many rows.
 _VALUES, _FEWEST_ROWS = 2**20, 2**14
@@ -81,16 +83,16 @@ def _opened(arrow: Any, path: Path, schema: Any, *, feather: bool) -> Iterator[C
 
 def _of_one(arrow: Any, group: Group, part: Part | None) -> list[Any]:
     if part is None:
-        return [_array(arrow, np.empty(0)) for _ in range(group.own_clock + len(list(chain(*group.flat))))]
+        return [arrow.array(np.empty(0)) for _ in range(group.own_clock + len(list(chain(*group.flat))))]
     own = [part.time] if group.own_clock and part.time is not None else []
-    return [_array(arrow, column) for column in (*own, *part.flat)]
+    return [arrow.array(column) for column in (*own, *part.flat)]
 
 
 def _of_several(arrow: Any, groups: Sequence[Group], ready: Sequence[Part | None]) -> list[Any]:
     """Return the times of all clocks, then each column with its values in the rows of its own clock."""
     times = [np.empty(0) if part is None or part.time is None else part.time for part in ready]
     table, rows = _rows(times)
-    arrays = [_array(arrow, table)]
+    arrays = [arrow.array(table)]
     for group, part, own in zip(groups, ready, rows, strict=True):
         empty = [np.empty(0)] * len(list(chain(*group.flat)))
         arrays += [_spread(arrow, values, own, len(table)) for values in (part.flat if part is not None else empty)]
@@ -99,36 +101,14 @@ def _of_several(arrow: Any, groups: Sequence[Group], ready: Sequence[Part | None
 
 def _rows(times: Sequence[FloatArray]) -> tuple[FloatArray, list[Any]]:
     """Return all times in order, and the rows of each clock's samples; a repeated time has one row per repetition."""
-    repetitions = [_repetitions(time) for time in times]
-    time, repetition = np.concatenate(times), np.concatenate(repetitions)
-    order = np.lexsort((repetition, time))
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(time[order]) != 0.0) | (np.diff(repetition[order]) != 0)
-    row = np.empty(len(order), dtype=np.intp)
-    row[order] = np.cumsum(new) - 1
-    return time[order][new], np.split(row, np.cumsum([len(part) for part in times])[:-1])
-
-
-def _repetitions(time: FloatArray) -> Any:
-    """Return for each time how many earlier samples have the same time."""
-    order = np.argsort(time, kind="stable")
-    new = np.ones(len(time), dtype=bool)
-    new[1:] = np.diff(time[order]) != 0.0
-    number = np.arange(len(time))
-    repetitions = np.empty(len(time), dtype=np.intp)
-    repetitions[order] = number - np.maximum.accumulate(np.where(new, number, 0))
-    return repetitions
+    repetitions = [pd.Series(time).groupby(time, dropna=False).cumcount() for time in times]
+    clocks = [pd.MultiIndex.from_arrays(pair) for pair in zip(times, repetitions, strict=True)]
+    table = reduce(pd.MultiIndex.union, clocks)
+    return table.get_level_values(0).to_numpy(), [table.get_indexer(clock) for clock in clocks]
 
 
 def _spread(arrow: Any, values: FloatArray, rows: Any, count: int) -> Any:
     """Return values in these rows of a longer table, null in the other rows."""
     spread, absent = np.zeros(count), np.ones(count, dtype=bool)
     spread[rows], absent[rows] = values, False
-    return _array(arrow, spread, absent)
-
-
-def _array(arrow: Any, values: FloatArray, absent: BoolArray | None = None) -> Any:
-    """Return an Arrow array of numbers, null where absent; built from buffers, as pyarrow's function imports pandas."""
-    data = np.ascontiguousarray(values, dtype=np.float64)
-    present = None if absent is None else arrow.py_buffer(np.packbits(~absent, bitorder="little"))
-    return arrow.Array.from_buffers(arrow.float64(), len(data), [present, arrow.py_buffer(data)])
+    return arrow.array(spread, mask=absent)

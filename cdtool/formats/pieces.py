@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -25,24 +25,7 @@ VALUES_PER_PIECE = 1 << 20
 # The generator's return value is the source, whose columns have names, units and widths, but no rows.
 Pieces = Generator[Piece, None, Source]
 
-
-class MappedLog(Protocol):
-    """The columns of a channel map, which can be read piece by piece repeatedly; each column has a clock of its own.
-
-    `settled`: the times of the last pass are relative to the origin of its source.
-    """
-
-    settled: bool
-
-    def pieces(self) -> Pieces:
-        """Yield the columns from the first row to the last; raises RecordingError."""
-        ...
-
-
-def open_mapped_log(file_format: Format, path: Path, wanted: ChannelMap) -> MappedLog | None:
-    """Return the columns that `wanted` names, to be read piece by piece; None if the format does not support it."""
-    opener: Callable[[Path, ChannelMap], MappedLog] | None = getattr(file_format, "mapped", None)
-    return None if opener is None else opener(path, wanted)
+Returned = TypeVar("Returned")
 
 
 class PiecewiseFormat(ABC):
@@ -61,12 +44,12 @@ class PiecewiseFormat(ABC):
         """Yield the columns of a channel map, the columns `some`, or all columns."""
 
 
-class PieceRun:
-    """An iterator over pieces; `source` is set after the last piece."""
+class PieceRun(Generic[Returned]):
+    """An iterator over pieces; `source`, what their generator returns, is set after the last piece."""
 
-    def __init__(self, pieces: Pieces) -> None:
+    def __init__(self, pieces: Generator[Piece, None, Returned]) -> None:
         self._pieces = pieces
-        self.source: Source
+        self.source: Returned
 
     def __iter__(self) -> Iterator[Piece]:
         self.source = yield from self._pieces
@@ -118,6 +101,8 @@ def join_pieces(pieces: Pieces, sort: bool) -> Source:
 
 
 def _assemble(parts: list[tuple[int, FloatArray]], rows: int, shape: tuple[int, ...]) -> FloatArray:
+    if len(parts) == 1 and len(parts[0][1]) == rows:  # without a copy
+        return parts[0][1]
     values = np.full((rows, *shape), np.nan)
     for first, part in parts:
         values[first : first + len(part)] = part

@@ -3,69 +3,45 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Generator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
-from cdtool.formats.bag_messages import Bag, IsWanted, one_line
-from cdtool.formats.container_checks import library, one_line_errors
-from cdtool.formats.pieces import Pieces, join_pieces
-from cdtool.formats.source import Source
-from cdtool.messages.stream import Stream
+from cdtool.formats.bag import Bag, one_line
+from cdtool.formats.container_checks import one_line_errors
+from cdtool.formats.topic_log import IsWanted, TopicFormat
+from cdtool.messages.batch import Stream
 
 _BAG = b"#ROSBAG V2.0"
 
 
 @dataclass(frozen=True)
-class Rosbag:
+class Rosbag(TopicFormat):
     """ROS 1 bags: a column is a topic and a numeric field of its messages, as in an MCAP file."""
 
     name: ClassVar[str] = "rosbag"
     suffixes: ClassVar[tuple[str, ...]] = (".bag",)
-    topics: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
         """Return whether the file starts like a ROS 1 bag."""
         with path.open("rb") as file:
             return file.read(len(_BAG)) == _BAG
 
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """Return the fields that `wanted` names, or all numeric fields; raises RecordingError."""
-        if wanted is None:
-            return join_pieces(self.pieces(path), sort=True)
-        bag = self._bag(path)
-        return bag.source(*bag.wanted(wanted))
-
-    def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
-        """Yield all numeric fields, some thousand messages of a topic at a time; raises RecordingError."""
-        bag = self._bag(path)
-        return bag.source(*(yield from bag.pieces()))
-
-    def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
-        """Return the `name` list of a topic's first message; empty if the message has no such list."""
-        from rosbags.highlevel import AnyReader
-
-        with one_line_errors(path, "a ROS bag"), AnyReader([Path(os.fspath(path))]) as reader:
-            chosen = [connection for connection in reader.connections if connection.topic == topic]
-            for connection, _, raw in reader.messages(connections=chosen):
-                names = getattr(reader.deserialize(raw, connection.msgtype), "name", ())
-                return tuple(map(str, names)) if isinstance(names, list) else ()
-        return ()
-
-    def _bag(self, path: Path) -> _Ros1Bag:
-        library("rosbags", "rosbag", path)
+    def log(self, path: Path, is_wanted: IsWanted | None = None) -> Bag:
+        """Open a bag; raises RecordingError if the file is not one."""
         if not self.sniff(path):
             raise RecordingError(f"{path}: is not a ROS bag", "see cdtool list formats")
-        return _Ros1Bag(path, self.name)
+        return _Ros1Bag(path, is_wanted)
 
 
 class _Ros1Bag(Bag):
     """A ROS 1 bag, read by rosbags."""
 
-    def messages(self, is_wanted: IsWanted) -> Generator[tuple[Stream, int, bytes], None, None]:
+    format = Rosbag.name
+
+    def messages(self) -> Generator[tuple[Stream, int, bytes], None, None]:
         """Yield the messages to the bag's end or to the first damage."""
         from rosbags.highlevel import AnyReader
 
@@ -76,10 +52,10 @@ class _Ros1Bag(Bag):
             with one_line_errors(self.path, "a ROS bag"):
                 streams = {connection.id: _stream(connection) for connection in reader.connections}
                 for connection in reader.connections:
-                    count = self.topics.get(connection.topic, ("", 0))[1] + connection.msgcount
-                    self.topics[connection.topic] = (connection.msgtype, count)
+                    count = self.counts.get(connection.topic, ("", 0))[1] + connection.msgcount
+                    self.counts[connection.topic] = (connection.msgtype, count)
                 self.origin = int(reader.start_time) if reader.message_count else 0
-            wanted = [connection for connection in reader.connections if is_wanted(connection.topic)]
+            wanted = [connection for connection in reader.connections if self.is_wanted(connection.topic)]
             messages = iter(reader.messages(connections=wanted))
             while wanted:
                 try:

@@ -11,28 +11,22 @@ closed has a journal beside it, which SQLite can only apply to a copy: both are 
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import sqlite3
-from collections.abc import Collection, Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
-from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import BagNotClosed, DamagedRows, StandardDefinitions
-from cdtool.formats.bag_messages import Bag, IsWanted, one_line
+from cdtool.formats.bag import Bag, one_line
 from cdtool.formats.container_checks import check_size, one_line_errors
-from cdtool.formats.pieces import Pieces, join_pieces
-from cdtool.formats.source import Source
-from cdtool.messages.columns import UndecodableError
-from cdtool.messages.decoders import Decoders
+from cdtool.formats.topic_log import IsWanted, TopicFormat
+from cdtool.messages.batch import Stream
 from cdtool.messages.schemas import DEFINITIONS
-from cdtool.messages.stream import Stream
 from cdtool.remote.remote_path import location
 
 _SQLITE, _ZSTD = b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
@@ -41,24 +35,17 @@ _COMPRESSED = (".zstd", ".zst")
 _JOURNALS = ("-wal", "-journal")
 # Largest message [bytes]: SQLite does not return a longer value.
 _LARGEST = 2**28
-_MOST_TOPICS = 2**16
 # A row of a table needs at least so many bytes: more rows than the file has room for are a loop in damaged pages.
 _ROW_BYTES = 4
-# What a query on a table may do. A database may contain views, triggers and expressions, which are never evaluated.
-_ALLOWED = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ}
-_FUNCTIONS = {"count", "min"}
-# Words in the definition of a table whose values are computed when it is read, without asking `_authorise`.
-_EXPRESSIONS, _WORD = {"as", "generated", "virtual"}, re.compile("[a-z]+")
 _LAST_STAMP = 2**63 - 1
 
 
 @dataclass(frozen=True)
-class Rosbag2:
+class Rosbag2(TopicFormat):
     """ROS 2 bags in SQLite: a column is a topic and a numeric field of its messages, as in an MCAP file."""
 
     name: ClassVar[str] = "rosbag2"
     suffixes: ClassVar[tuple[str, ...]] = (".db3", *_COMPRESSED)
-    topics: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
         """Return whether the file is an SQLite database with a table of messages, compressed or not."""
@@ -70,66 +57,42 @@ class Rosbag2:
         journal = location(f"{path}{_JOURNALS[0]}")  # of a bag that was not closed, it may have all but the first bytes
         return b"messages" in head or (_is_filled(journal) and b"messages" in _head(journal))
 
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """Return the fields that `wanted` names, or all numeric fields; raises RecordingError."""
-        if wanted is None:
-            return join_pieces(self.pieces(path), sort=True)
-        bag = self._bag(path)
-        return bag.source(*bag.wanted(wanted))
-
-    def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
-        """Yield all numeric fields, some thousand messages of a topic at a time; raises RecordingError."""
-        bag = self._bag(path)
-        return bag.source(*(yield from bag.pieces()))
-
-    def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
-        """Return the `name` list of a topic's first decodable message; empty if the message has no such list."""
-        decoders = Decoders()
-        batches = self._bag(path).batches(topic.__eq__)
-        with closing(batches), suppress(RecordingError):  # the survey reports the problem
-            for stream, batch in batches:
-                decoder = decoders.of(stream, batch)
-                if decoder is not None:
-                    with suppress(UndecodableError):
-                        return decoder.element_names(batch.first(1))
-        return ()
-
-    def _bag(self, path: Path) -> _Ros2Bag:
+    def log(self, path: Path, is_wanted: IsWanted | None = None) -> Bag:
+        """Open a bag; raises RecordingError if the file is not one."""
         if not self.sniff(path):
             raise RecordingError(f"{path}: is not a ROS 2 bag", "see cdtool list formats")
-        return _Ros2Bag(path, self.name)
+        return _Ros2Bag(path, is_wanted)
 
 
 class _Ros2Bag(Bag):
     """A ROS 2 bag, read by SQLite in the order in which it was written."""
 
-    def messages(self, is_wanted: IsWanted) -> Generator[tuple[Stream, int, bytes], None, None]:
+    format = Rosbag2.name
+
+    def messages(self) -> Generator[tuple[Stream, int, bytes], None, None]:
         """Yield the messages to the bag's end or to the first damage."""
         with ExitStack() as stack:
             with one_line_errors(self.path, "a ROS 2 bag"):
                 file = stack.enter_context(self._database())
                 base = stack.enter_context(closing(_connect(file)))
-                try:
-                    kinds = _topics(self.path, base)
-                except sqlite3.DatabaseError:  # such as a file that is cut off
-                    base = stack.enter_context(closing(_connect(file, damaged=True)))
-                    kinds = _topics(self.path, base)
+                tables = {name for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+                kinds = _topics(self.path, base, tables)
                 is_counted = self._count(base, kinds)
-                streams = self._streams(base, kinds, is_wanted)
-            unwanted = kinds.keys() - streams.keys()
-            decompress, damaged = _Decompressor(), 0
+                streams = self._streams(kinds, _definitions(base) if "message_definitions" in tables else {})
+            unwanted, damaged = kinds.keys() - streams.keys(), 0
             for topic, time, raw in self._rows(base, file.stat().st_size // _ROW_BYTES):
                 if topic in unwanted:
                     continue
-                content = decompress(raw) if topic in streams and _is_message(time, raw) else None
+                is_message = topic in streams and _is_stamp(time) and isinstance(raw, bytes)
+                content = _decompressed(raw) if is_message else None
                 if content is None:
                     damaged += 1
                 else:
                     yield streams[topic], time, content
             if damaged:
-                self.findings.append(Finding(DamagedRows(damaged), severity="loss"))
+                self.noted.append(Finding("damaged_rows", "", {"count": damaged}))
             if not is_counted:
-                self.topics = {name: (kind, self.read.get(name, 0)) for name, (kind, _) in self.topics.items()}
+                self.counts = {name: (kind, self.read.get(name, 0)) for name, (kind, _) in self.counts.items()}
 
     def _rows(self, base: sqlite3.Connection, most: int) -> Iterator[tuple[Any, Any, Any]]:
         """Yield the rows of the table of messages, to its end or to the first damage; at most `most`."""
@@ -160,15 +123,15 @@ class _Ros2Bag(Bag):
                 with closing(sqlite3.connect(copy)) as base:  # applies the journal
                     base.execute("SELECT count(*) FROM sqlite_master").fetchone()
                     base.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
-                self.findings.append(Finding(BagNotClosed(journals[0].name)))
+                self.noted.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
             yield copy
 
     def _count(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> bool:
         """Set the topics with their numbers of messages, and the origin; return False if the bag is too damaged."""
-        self.topics = {name: (kind, 0) for name, kind, _ in kinds.values()}
+        self.counts = {name: (kind, 0) for name, kind, _ in kinds.values()}
         try:
             counted = base.execute("SELECT topic_id, count(*), min(timestamp) FROM messages GROUP BY topic_id")
-            rows = counted.fetchmany(_MOST_TOPICS)
+            rows = counted.fetchall()
         except sqlite3.DatabaseError:
             first = base.execute("SELECT timestamp FROM messages LIMIT 1").fetchone()
             self.origin = first[0] if first is not None and _is_stamp(first[0]) else 0
@@ -176,72 +139,46 @@ class _Ros2Bag(Bag):
         for topic, count, _ in rows:
             if topic in kinds:
                 name, kind, _ = kinds[topic]
-                self.topics[name] = (kind, self.topics[name][1] + count)
+                self.counts[name] = (kind, self.counts[name][1] + count)
         self.origin = min((first for _, _, first in rows if _is_stamp(first)), default=0)
         return True
 
     def _streams(
-        self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]], is_wanted: IsWanted
+        self, kinds: Mapping[int, tuple[str, str, str]], own: Mapping[str, tuple[str, str]]
     ) -> dict[int, Stream]:
         """Return the streams of the wanted topics by the topics' numbers, with the definitions of their messages."""
-        own = _definitions(base)
         streams: dict[int, Stream] = {}
         standard: dict[str, None] = {}
         for number, (topic, (name, kind, encoding)) in enumerate(kinds.items()):
-            if not is_wanted(name):
-                continue
-            definition = own.get(kind)
-            if definition is None:
-                text = _standard_definition(kind)
-                definition = ("ros2msg" if text else "", text)
-                if text:
-                    standard[kind] = None
-            streams[topic] = Stream(number, name, encoding, (definition[0], kind, definition[1].encode()))
+            if self.is_wanted(name):
+                language, text = own.get(kind) or ("ros2msg", _standard_definition(kind))
+                standard |= {kind: None} if text and kind not in own else {}
+                streams[topic] = Stream(number, name, encoding, (language if text else "", kind, text.encode()))
         if standard:
-            self.findings.append(Finding(StandardDefinitions(tuple(standard)), severity="note"))
+            self.noted.append(Finding("standard_definitions", "", {"types": tuple(standard)}))
         return streams
 
 
-def _connect(file: Path, damaged: bool = False) -> sqlite3.Connection:
-    """Open a database for reading tables only; with `damaged`, SQLite does not refuse it before it meets the damage."""
+def _connect(file: Path) -> sqlite3.Connection:
+    """Open a database for reading only; SQLite does not refuse a damaged one before it meets the damage."""
     base = sqlite3.connect(f"{Path(os.fspath(file)).absolute().as_uri()}?mode=ro&immutable=1", uri=True)
     base.text_factory = lambda text: text.decode("utf-8", "replace")
     base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST)
-    base.execute("PRAGMA trusted_schema=OFF")
-    if damaged:  # nothing can be written in this mode of opening
-        base.execute("PRAGMA writable_schema=ON")
-    base.set_authorizer(_authorise)
+    base.execute("PRAGMA writable_schema=ON")  # nothing can be written in this mode of opening
     return base
 
 
-def _authorise(action: int, _: str | None, name: str | None, *__: Any) -> int:
-    if action in _ALLOWED or (action == sqlite3.SQLITE_FUNCTION and name in _FUNCTIONS):
-        return sqlite3.SQLITE_OK
-    return sqlite3.SQLITE_DENY
-
-
-def _topics(path: Path, base: sqlite3.Connection) -> dict[int, tuple[str, str, str]]:
+def _topics(path: Path, base: sqlite3.Connection, tables: set[str]) -> dict[int, tuple[str, str, str]]:
     """Return name, message type and encoding of each topic by its number; raises RecordingError."""
-    tables = dict(base.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'").fetchmany(_MOST_TOPICS))
-    for name in ("topics", "messages"):
-        if name not in tables or _EXPRESSIONS & set(_WORD.findall(str(tables[name]).lower())):
-            raise RecordingError(
-                f"{path}: is not a ROS 2 bag: it has no table '{name}' as rosbag2 writes it", "see cdtool list formats"
-            )
-    rows = base.execute("SELECT id, name, type, serialization_format FROM topics").fetchmany(_MOST_TOPICS + 1)
-    if len(rows) > _MOST_TOPICS:
-        raise RecordingError(f"{path}: has more than {_MOST_TOPICS} topics", "is it a bag?")
+    for name in sorted({"topics", "messages"} - tables):
+        raise RecordingError(f"{path}: is not a ROS 2 bag: it has no table '{name}'", "see cdtool list formats")
+    rows = base.execute("SELECT id, name, type, serialization_format FROM topics")
     return {row[0]: (str(row[1]), str(row[2]), str(row[3])) for row in rows}
 
 
 def _definitions(base: sqlite3.Connection) -> dict[str, tuple[str, str]]:
     """Return language and text of the definitions in the bag by message type; those in IDL are not read."""
-    try:
-        rows = base.execute(
-            "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-        ).fetchmany(_MOST_TOPICS)
-    except sqlite3.DatabaseError:  # before ROS 2 Iron
-        return {}
+    rows = base.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
     return {str(kind): (str(language), str(text)) for kind, language, text in rows if language == "ros2msg" and text}
 
 
@@ -251,17 +188,13 @@ def _standard_definition(kind: str) -> str:
     name = kind if rest.startswith("msg/") else f"{package}/msg/{rest}"
     if name in DEFINITIONS:
         return DEFINITIONS[name].text
-    try:
-        from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys import Stores, get_typestore
 
+    try:
         text, _ = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(name, ros_version=2)
-    except Exception:  # rosbags is not installed, or does not know the type
+    except Exception:  # the package does not know the type
         return ""
     return str(text)
-
-
-def _is_message(time: object, raw: object) -> bool:
-    return _is_stamp(time) and isinstance(raw, bytes)
 
 
 def _is_stamp(time: object) -> bool:
@@ -272,26 +205,18 @@ def _is_filled(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0
 
 
-class _Decompressor:
-    """Decompresses messages that are zstd frames; the others are plain."""
+def _decompressed(raw: bytes) -> bytes | None:
+    """Return a message that may be a zstd frame; None if it is damaged or too large."""
+    if not raw.startswith(_ZSTD):  # no representation of CDR starts with these bytes
+        return raw
+    import zstandard
 
-    def __init__(self) -> None:
-        self._zstd: Any = None
-
-    def __call__(self, raw: bytes) -> bytes | None:
-        """Return the message; None if it is damaged or too large."""
-        if not raw.startswith(_ZSTD):  # no representation of CDR starts with these bytes
-            return raw
-        import zstandard
-
-        self._zstd = self._zstd or zstandard.ZstdDecompressor(max_window_size=_LARGEST)
-        try:
-            if zstandard.frame_content_size(raw) > _LARGEST:
-                return None
-            content: bytes = self._zstd.decompress(raw, max_output_size=_LARGEST)
-        except zstandard.ZstdError:
-            return None
-        return content
+    try:
+        if zstandard.frame_content_size(raw) <= _LARGEST:
+            return zstandard.ZstdDecompressor(max_window_size=_LARGEST).decompress(raw, max_output_size=_LARGEST)
+    except zstandard.ZstdError:
+        return None
+    return None
 
 
 def _head(path: Path) -> bytes:

@@ -20,8 +20,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import NoStartTime
-from cdtool.findings.containers import LastSegmentIncomplete, LibraryMessage, ValuesCutOff
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.container_checks import check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
@@ -55,8 +53,6 @@ class Tdms(PiecewiseFormat):
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         nptdms = library("nptdms", "tdms", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a TDMS file", "see cdtool list formats")
         findings: list[Finding] = []
         with (
             one_line_errors(path, "a TDMS file"),
@@ -70,14 +66,14 @@ class Tdms(PiecewiseFormat):
             check_size(path, sum(len(channels[key]) for key in keys))
             incomplete = getattr(file.file_status, "incomplete_final_segment", False)
             if incomplete:
-                findings.append(Finding(LastSegmentIncomplete(), severity="loss"))
+                findings.append(Finding("last_segment_incomplete"))
             tree = _Channels(channels, findings)
             origin = tree.set_origin(keys, file.properties)
             columns = [tree.column(key) for key in keys]
             yield from interleave(columns)
             findings += [finding for key in keys for finding in rounding_finding(key, tree.rounded[key])]
             findings += [
-                Finding(LibraryMessage("npTDMS", text), severity="note" if incomplete else "warning")
+                Finding("library_message", "", {"library": "npTDMS", "text": text}, "note" if incomplete else "warning")
                 for text in warnings
             ]
             details = {key: str(value)[:80] for key, value in file.properties.items()}
@@ -127,7 +123,7 @@ class _Channels:
         self._origin = min(known, default=Fraction(0))
         unknown = [key for key, start in starts.items() if start is None] + [key for key in clocks if not self._epoch]
         if known and unknown:
-            self._findings.append(Finding(NoStartTime(tuple(unknown))))
+            self._findings.append(Finding("no_start_time", "", {"channels": tuple(unknown)}))
         return float(self._origin)
 
     def column(self, key: str) -> SlicedColumn:
@@ -161,7 +157,9 @@ class _Channels:
         self.rounded[key] += rounded_integers(values) if raw.dtype.kind in "iu" else 0
         if len(values) == end - start:
             return values
-        self._findings.append(Finding(ValuesCutOff(end - start - len(values), start + len(values)), key, "loss"))
+        self._findings.append(
+            Finding("values_cut_off", key, {"count": end - start - len(values), "first": start + len(values)})
+        )
         return np.pad(values, (0, end - start - len(values)), constant_values=np.nan)
 
     def _first(self, channel: Any) -> float:
@@ -247,15 +245,6 @@ def _channel_rows(nptdms: Any, group: Group, part: Part | None) -> list[Any]:
     ]
 
 
-class _WarningCollector(logging.Handler):
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.lines: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.lines.append(" ".join(record.getMessage().split())[:200])
-
-
 @contextmanager
 def collect_warnings(library: str) -> Iterator[list[str]]:
     """Yield a list that collects the warnings of a library's loggers within the context; no handler prints them.
@@ -264,13 +253,16 @@ def collect_warnings(library: str) -> Iterator[list[str]]:
     warnings.
     """
     known = [name for name in logging.Logger.manager.loggerDict if name == library or name.startswith(f"{library}.")]
-    loggers = [logging.getLogger(name) for name in known]
-    before = [(logger.handlers, logger.propagate) for logger in loggers]
-    collector = _WarningCollector()
+    loggers, lines = [logging.getLogger(name) for name in known], list[str]()
+
+    def collect(record: logging.LogRecord) -> bool:
+        lines.append(" ".join(record.getMessage().split())[:200])
+        return False
+
     for logger in loggers:
-        logger.handlers, logger.propagate = [collector], False
+        logger.addFilter(collect)
     try:
-        yield collector.lines
+        yield lines
     finally:
-        for logger, (handlers, propagate) in zip(loggers, before, strict=True):
-            logger.handlers, logger.propagate = handlers, propagate
+        for logger in loggers:
+            logger.removeFilter(collect)

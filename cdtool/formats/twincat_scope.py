@@ -14,30 +14,34 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.tables import NamesOfSymbols
-from cdtool.formats.column_names import requested_keys
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.cells import SEPARATORS, kind, number, split_line
-from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.encoding import HEAD_BYTES, detect_text, looks_like_text
+from cdtool.formats.csv.cells import kind, split_line
+from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
 from cdtool.formats.csv.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
-from cdtool.formats.csv.head_words import column_kinds
-from cdtool.formats.csv.marks import Marks, SampleCell
-from cdtool.formats.csv.text import Text, read_sample, read_small
-from cdtool.formats.csv.timed_table import ClockGroup, RowClock, StampClock, TickClock, headers, timed_pieces
-from cdtool.formats.pieces import Pieces, PiecewiseFormat
+from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.source import Source
+from cdtool.formats.timed_text import (
+    ClockGroup,
+    Segment,
+    TimedText,
+    details_of,
+    dialect_of_rows,
+    number_in_head,
+    opened,
+)
 from cdtool.plain_text import counted
+from cdtool.recording import FloatArray
 
 # The keys of lines about the file: of Scope View in TwinCAT 3 and in TwinCAT 2.
 _FILE_KEYS = ("File", *SCOPE_STARTS, "Endtime of export", "EndRecord")
@@ -51,19 +55,17 @@ _CHANNEL_KEYS = (
 # The head of a file may have this many bytes, and its first lines (those about the file) this many lines.
 _MOST_HEAD, _MOST_FILE_LINES = 1 << 22, 20
 _SAMPLE_ROWS = 50
-# No recording has more columns; each row may be completed with as many empty cells.
-_MOST_COLUMNS = 1 << 14
 _TICKS_PER_S, _TICKS_1970 = 1e7, 116_444_736_000_000_000
-# Ticks have 18 digits; no export is long enough for as many milliseconds.
-_FEWEST_TICKS = 10**16
-_EXPORT_AGAIN = "export it again with 'Timelines' set to 'For each sampletime' or 'All'"
+# Ticks since 1917 have 18 digits: fewer are damaged. No export is long enough for as many milliseconds.
+_FEWEST_TICKS = 10**17
+_NAME = re.compile(rf"(?<![^ ]){NAME}(?![^ ])")
 # A unit with its quantity in parentheses, `(None)`, or any other word.
 _BETWEEN_BLANKS = re.compile(r"[^ ]+ \((?!None\))[^()]*\)|[^ ]+")
 _WORDED_UNIT = re.compile(r"(?P<unit>[^(]*?)\s*\([^()]*\)")
 
 
 @dataclass(frozen=True)
-class TwincatScope(PiecewiseFormat):
+class TwincatScope:
     """Text exports of TwinCAT Scope: each channel has the times beside it, in s since the start of the export."""
 
     name: ClassVar[str] = "twincat_scope"
@@ -79,37 +81,10 @@ class TwincatScope(PiecewiseFormat):
 
         Lines that the machine file pins in `[csv]` are those of a table of any kind.
         """
-        pinned = wanted is not None and (wanted.pins.header is not None or wanted.pins.skip_lines > 0)
-        return Csv().columns(path, wanted) if pinned else super().columns(path, wanted)
-
-    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        export = _read_export(path, TablePins() if wanted is None else wanted.pins)
-        names = tuple(key for group in export.groups for key in group.columns)
-        keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
-        table = yield from timed_pieces(path, export.dialect, export.groups, keys, survey=wanted is None)
-        read = [key for key in keys if key not in table.left_out]
-        if not read:
-            raise RecordingError(f"{path}: no channel has numbers", "see cdtool info")
-        return Source(
-            path,
-            self.name,
-            headers(export.groups, export.units, read),
-            export.origin,
-            (*export.dialect.findings, *table.findings),
-            export.details,
-            names,
-        )
-
-
-@dataclass(frozen=True)
-class _Export:
-    """The head of an export: the dialect of its rows, its channels by clock, their units, its start since 1970 [s]."""
-
-    dialect: Dialect
-    groups: tuple[ClockGroup, ...]
-    units: Mapping[str, str | None]
-    origin: float
-    details: Mapping[str, str]
+        pins = TablePins() if wanted is None else wanted.pins
+        if pins.header is not None or pins.skip_lines > 0:
+            return Csv().columns(path, wanted)
+        return _read_export(path, pins).source(path, self.name, wanted)
 
 
 @dataclass(frozen=True)
@@ -124,7 +99,7 @@ class _Head:
     of_channels: Mapping[str, list[str]]
     line: int
     start: int
-    rows: Sequence[list[str]]
+    rows: list[list[str]]
 
     @property
     def names(self) -> list[str]:
@@ -146,53 +121,51 @@ class _Head:
         return ""
 
 
-def _read_export(path: Path, pins: TablePins) -> _Export:
-    content = read_small(path)
-    sample = read_sample(path, _MOST_HEAD) if content is None else content
-    if not sample.strip():
-        raise RecordingError(f"{path}: is empty", "was the export stopped, or the copy cut off?")
-    text, stream = detect_text(path, sample, pins.encoding, content)
-    head = _read_head(path, text, stream)
-    findings: tuple[Finding, ...] = ()
+def _read_export(path: Path, pins: TablePins) -> TimedText:
+    text, lines = opened(path, pins, _MOST_HEAD)
+    head, findings = _read_head(path, text, lines), list[Finding]()
     if head.separator == " ":
         _refuse_empty_cells(path, text, head)
-        head, findings = _between_blanks(head)
+        head = _between_blanks(head, findings)
     # A line in which a cell contains the separator is wider than the others: it would be read in the wrong columns.
     usual = Counter(map(len, head.of_channels.values())).most_common(1)[0][0]
     head = replace(head, of_channels={key: line for key, line in head.of_channels.items() if len(line) == usual})
-    clocks, names = head.clocks, head.names
-    _refuse_other_layout(path, head)
-    decimal = pins.decimal or _decimal_mark(text, head)
-    start = _start(head)
-    periods = {at: _number(head.cell((_PERIOD, "SampleTime"), at)) for at in range(len(names))}
+    clocks, width = head.clocks, len(head.names)
+    if not clocks or clocks[0] != 0 or len(head.rows[0]) <= width - len(clocks) or len(clocks) == width:
+        raise RecordingError(
+            f"{path}: line {head.line} has {counted(len(head.rows[0]), 'cell')} for {counted(width, 'name')}: "
+            "no columns of times?",
+            "export it again with 'Timelines' set to 'For each sampletime' or 'All'",
+        )
     columns = _keys(head)
-    units = {key: _unit(head.cell((_UNIT,), at)) for at, key in columns.items()}
-    dialect = replace(_dialect(text, pins, head, decimal, columns), findings=findings)
-    full_stamps = _are_ticks(head, clocks)
-    first = min((int(row[at]) for row in head.rows for at in clocks if full_stamps and _is_tick(row, at)), default=0)
-    groups = []
-    for at, end in zip(clocks, [*clocks[1:], len(names)], strict=True):
+    decimal = pins.decimal or _decimal_mark(text, head)
+    named = [columns.get(at, "") for at in range(width)]
+    dialect = dialect_of_rows(text, pins, (head.separator, decimal), (head.line, head.start), named, head.rows)
+    ticks = [int(row[at]) for row in head.rows for at in clocks if _is_tick(row, at)]
+    first, groups = min(ticks, default=0), list[ClockGroup]()
+
+    def times(stamps: npt.NDArray[Any]) -> FloatArray:
+        # The difference of ticks is exact before it is rounded; missing ones are negative.
+        return np.where(stamps < _FEWEST_TICKS, np.nan, (stamps - first) / _TICKS_PER_S) if ticks else stamps / 1000.0
+
+    for at, end in zip(clocks, [*clocks[1:], width], strict=True):
         members = {columns[i]: i for i in range(at + 1, end) if i in columns}
-        stated = {periods[i] for i in members.values()}
-        period = stated.pop() / 1000.0 if len(stated) == 1 else 0.0
-        clock: RowClock = TickClock(at, _TICKS_PER_S, first) if full_stamps else StampClock(at, 1000.0)
+        stated = {number_in_head(head.cell((_PERIOD, "SampleTime"), i)) or 0.0 for i in members.values()}
+        period = max(stated.pop() / 1000.0, 0.0) if len(stated) == 1 else 0.0
         if members:
-            groups.append(ClockGroup(f"time {at}", members, clock, held=True, period=period))
-    origin = (first - _TICKS_1970) / _TICKS_PER_S if full_stamps else start
-    details = {
-        "separator": SEPARATORS.get(head.separator, repr(head.separator)),
-        "decimal mark": "comma" if decimal == "," else "point",
-        "encoding": text.encoding,
-        "times": "FILETIME" if full_stamps else "ms since the start of the export",
+            groups.append(ClockGroup(members, at, times, ticks=bool(ticks), held=True, period=period))
+    details = details_of(text, head.separator, decimal) | {
+        "times": "FILETIME" if ticks else "ms since the start of the export",
         "columns of times": str(len(groups)),
     }
-    return _Export(dialect, tuple(groups), units, origin, details)
+    of_groups = {key: at for group in groups for key, at in group.columns.items()}
+    units = {key: _unit(head.cell((_UNIT,), at)) for key, at in of_groups.items()}
+    origin = (first - _TICKS_1970) / _TICKS_PER_S if ticks else _start(head)
+    return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, tuple(findings))
 
 
-def _read_head(path: Path, text: Text, stream: bytes) -> _Head:
-    raw = stream.split(text.line_end)
-    first_lines = [text.decode(line).rstrip("\r") for line in raw[:_MOST_FILE_LINES]]
-    separator = scope_separator(first_lines)
+def _read_head(path: Path, text: Text, raw: Sequence[bytes]) -> _Head:
+    separator = scope_separator([text.decode(line).rstrip("\r") for line in raw[:_MOST_FILE_LINES]])
     if separator is None:
         raise RecordingError(f"{path}: is not an export of TwinCAT Scope", "see cdtool list formats")
     of_file: dict[str, list[str]] = {}
@@ -207,10 +180,10 @@ def _read_head(path: Path, text: Text, stream: bytes) -> _Head:
         if cells[0] in _FILE_KEYS and i < _MOST_FILE_LINES:
             of_file[cells[0]] = cells
             of_channels.clear()  # a line Name above is that of the file
-        elif cells[0] in _CHANNEL_KEYS and len(cells) > 1 and not _is_split_key(cells):
+        elif cells[0] in _CHANNEL_KEYS and len(cells) > 1 and f"{cells[0]} {cells[1]}" not in _CHANNEL_KEYS:
             of_channels[cells[0]] = cells
         start += len(line) + 1
-    if len(stream) >= _MOST_HEAD - 4:
+    if start >= _MOST_HEAD - 4:
         raise RecordingError(f"{path}: has no row of numbers in its first {_MOST_HEAD >> 20} MiB", "export it again")
     if not of_channels:
         raise RecordingError(
@@ -222,96 +195,42 @@ def _read_head(path: Path, text: Text, stream: bytes) -> _Head:
 
 def _refuse_empty_cells(path: Path, text: Text, head: _Head) -> None:
     """Raise RecordingError if a table that is separated by blanks has empty cells, which are blanks too."""
-    for block, size in text.blocks(head.start):
-        if block[:1] == b" " or block.find(b"  ", 0, size) >= 0 or block.find(text.line_end + b" ", 0, size) >= 0:
+    for block in text.blocks(head.start):
+        if block[:1] == b" " or b"  " in block or text.line_end + b" " in block:
             raise RecordingError(
                 f"{path}: is separated by blanks and has empty cells, which are blanks too",
                 "export it again with tabs or semicolons",
             )
 
 
-def _between_blanks(head: _Head) -> tuple[_Head, tuple[Finding, ...]]:
+def _between_blanks(head: _Head, findings: list[Finding]) -> _Head:
     """Return the head with the cells of lines that are separated by blanks, which names and units may contain.
 
     Data types have no blanks: their line shows how many channels follow each column of times. Names that cannot be told
     apart are replaced by those of the symbols, or by the numbers of their columns, with a note.
     """
-    of_channels = head.of_channels
-    of_words = {key: cells for key, cells in of_channels.items() if key not in (NAME, _UNIT)}
+    of_words = {key: cells for key, cells in head.of_channels.items() if key not in (NAME, _UNIT)}
     if not of_words:
-        return head, ()
+        return head
     usual = Counter(map(len, of_words.values())).most_common(1)[0][0]
     whole = {key: cells for key, cells in of_words.items() if len(cells) == usual}
-    layout_key, layout = next(iter(whole.items()))
-    clocks = [at for at, cell in enumerate(layout) if cell == layout_key]
-    counts = [end - at - 1 for at, end in zip(clocks, [*clocks[1:], len(layout)], strict=True)]
-    symbols = whole.get(_SYMBOL, [str(at) for at in range(len(layout))])
-    names: list[str] = []
-    replaced = 0
-    for count, words in zip(counts, _parts(of_channels.get(NAME, []), NAME, len(counts)), strict=True):
-        names.append(NAME)
-        at = len(names)
-        if len(words) != count and (count > 1 or not words):
-            replaced += count
-            words = symbols[at : at + count]
-        names += [" ".join(words)] if count == 1 else words
-    units = _BETWEEN_BLANKS.findall(" ".join(of_channels.get(_UNIT, [])))
-    is_clear = len(units) == len(layout) and all(units[at] == _UNIT for at in clocks)
-    cells = {**whole, NAME: names, **({_UNIT: units} if is_clear else {})}
-    findings = (Finding(NamesOfSymbols(replaced), severity="note"),) if replaced else ()
-    return replace(head, of_channels=cells), findings
-
-
-def _parts(cells: Sequence[str], key: str, count: int) -> list[list[str]]:
-    """Return the cells after each key, `count` times; empty if the key is not there as often."""
-    parts: list[list[str]] = []
-    for cell in cells:
-        if cell == key:
-            parts.append([])
-        elif parts:
-            parts[-1].append(cell)
-    return parts if len(parts) == count else [[] for _ in range(count)]
-
-
-def _refuse_other_layout(path: Path, head: _Head) -> None:
-    """Raise RecordingError if there are no columns of times, or if the cells of a row cannot be told apart."""
-    width, clocks = len(head.names), head.clocks
-    if width > _MOST_COLUMNS:
-        raise RecordingError(f"{path}: names {width} columns, more than {_MOST_COLUMNS}", "export fewer channels")
-    if not clocks or clocks[0] != 0 or len(head.rows[0]) <= width - len(clocks) or len(clocks) == width:
-        raise RecordingError(
-            f"{path}: line {head.line} has {counted(len(head.rows[0]), 'cell')} for {counted(width, 'name')}: "
-            "no columns of times?",
-            _EXPORT_AGAIN,
-        )
-
-
-def _dialect(text: Text, pins: TablePins, head: _Head, decimal: str, columns: Mapping[int, str]) -> Dialect:
-    """Return the dialect of the rows."""
-    width = max(len(head.names), *(len(row) for row in head.rows if not row[-1]), 1)
-    padded = [row + [""] * (width - len(row)) for row in head.rows if len(row) <= width]
-    kinds = column_kinds(padded, width)
-    words = {
-        i: SampleCell(next(row[i] for row in padded if kind(row[i]) in "XT"), head.line)
-        for i in columns
-        if kinds[i] in "XT"
-    }
-    names = tuple(columns.get(i, str(i)) for i in range(width))
-    return Dialect(
-        text=text,
-        pins=pins,
-        separator=head.separator,
-        marks=Marks(decimal),
-        missing=pins.missing,
-        header=names,
-        first_line=head.line,
-        sampled=len(padded),
-        offset=head.start,
-        width=width,
-        kinds=kinds,
-        words=words,
-        short_rows=True,
-    )
+    key, layout = next(iter(whole.items()))
+    clocks = [at for at, cell in enumerate(layout) if cell == key]
+    symbols = whole.get(_SYMBOL, [str(at) for at in range(usual)])
+    parts = _NAME.split(" ".join(head.of_channels.get(NAME, [])))[1:]
+    parts = parts if len(parts) == len(clocks) else [""] * len(clocks)
+    names, replaced = list[str](), 0
+    for at, end, part in zip(clocks, [*clocks[1:], usual], parts, strict=True):
+        words = [part.strip()] if end - at == 2 and part.strip() else part.split()
+        if len(words) != end - at - 1:
+            replaced += end - at - 1
+            words = symbols[at + 1 : end]
+        names += [NAME, *words]
+    if replaced:
+        findings.append(Finding("names_of_symbols", "", {"count": replaced}))
+    units = _BETWEEN_BLANKS.findall(" ".join(head.of_channels.get(_UNIT, [])))
+    is_clear = len(units) == usual and all(units[at] == _UNIT for at in clocks)
+    return replace(head, of_channels={**whole, NAME: names, **({_UNIT: units} if is_clear else {})})
 
 
 def _keys(head: _Head) -> dict[int, str]:
@@ -336,31 +255,21 @@ def _start(head: _Head) -> float:
     )
 
 
-def _are_ticks(head: _Head, clocks: Sequence[int]) -> bool:
-    return any(_is_tick(row, at) for row in head.rows for at in clocks)
-
-
 def _is_tick(row: Sequence[str], at: int) -> bool:
     cell = row[at] if at < len(row) else ""
-    return cell.isascii() and cell.isdigit() and len(cell) <= len(str(_TICKS_1970)) and int(cell) > _FEWEST_TICKS
+    return cell.isascii() and cell.isdigit() and len(cell) <= len(str(_TICKS_1970)) and int(cell) >= _FEWEST_TICKS
 
 
 def _decimal_mark(text: Text, head: _Head) -> str:
     """Return the decimal mark: the first mark in the rows. Scope writes no thousands separators."""
     if head.separator == ",":
         return "."
-    for block, size in text.blocks(head.start):
-        found = {mark: block.find(mark, 0, size) for mark in (b",", b".")}
+    for block in text.blocks(head.start):
+        found = {mark: block.find(mark) for mark in (b",", b".")}
         seen = {mark: at for mark, at in found.items() if at >= 0}
         if seen:
             return min(seen, key=lambda mark: seen[mark]).decode()
     return "."
-
-
-def _number(cell: str) -> float:
-    """Return a positive number of the head, whose decimal mark may not be that of the rows; 0 for any other cell."""
-    value = number(cell, "," if "," in cell else ".") if cell else None
-    return value if value is not None and np.isfinite(value) and value > 0.0 else 0.0
 
 
 def _unit(cell: str) -> str | None:
@@ -375,11 +284,6 @@ def _cells(line: str, separator: str) -> list[str]:
     if '"' in line:
         return [cell.strip(" \r\n") for cell in split_line(line, separator)]
     return [cell.strip(" \r\n") for cell in line.strip("\r\n").split(separator)]
-
-
-def _is_split_key(cells: Sequence[str]) -> bool:
-    """Return whether a blank as separator splits a key such as `Unit Offset`."""
-    return f"{cells[0]} {cells[1]}" in _CHANNEL_KEYS
 
 
 def _is_row(cells: Sequence[str]) -> bool:

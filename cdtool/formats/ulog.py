@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
+from os import SEEK_CUR
 from pathlib import Path
 from typing import Any, BinaryIO, ClassVar
 
@@ -17,7 +17,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import CutWithinMessage, LibraryMessage, LoggerDropouts, MessagesDamaged
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin
@@ -49,8 +48,6 @@ class Ulog:
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all columns of numbers; raises RecordingError."""
         pyulog = library("pyulog", "ulog", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a ULog file", "see cdtool list formats")
         with one_line_errors(path, "a ULog file"), redirect_stdout(StringIO()) as printed:
             _check_formats(path, pyulog)
             with path.open("rb") as file:
@@ -73,27 +70,33 @@ class _EndCheck:
     """
 
     def __init__(self, file: BinaryIO) -> None:
-        self._file, self._is_content = file, False
+        self._file, self._is_content, self._missing = file, False, 0
         self.left: int | None = None
         self.tell, self.close = file.tell, file.close
 
     def read(self, size: int) -> bytes:
         """Return the next bytes."""
         content = self._file.read(size)
-        if len(content) < size and (content or self._is_content):
+        self._missing = size - len(content)
+        if self._missing and (content or self._is_content):
             self.left = len(content) + (_HEADER if self._is_content else 0)
         self._is_content = size == _HEADER and not self._is_content
         return content
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Go to another byte, where a header is read next."""
+        """Go to another byte, where a header is read next.
+
+        The library goes back by as many bytes as a damaged message declares, also where the file has fewer; without the
+        difference it would read the same bytes for ever.
+        """
         self._is_content = False
-        return self._file.seek(offset, whence)
+        return self._file.seek(offset + (self._missing if whence == SEEK_CUR else 0), whence)
 
 
 def _check_formats(path: Path, pyulog: Any) -> None:
     """Raise RecordingError if a message has more fields than any of PX4; messages inside of messages multiply them."""
-    header = pyulog.ULog(os.fspath(path), parse_header_only=True)
+    with path.open("rb") as file:
+        header = pyulog.ULog(_EndCheck(file), parse_header_only=True)
     formats: Mapping[str, Any] = header.message_formats
     known: dict[str, int] = {}
 
@@ -120,14 +123,18 @@ def _losses(log: Any, ends: _EndCheck, printed: str) -> list[Finding]:
     """Return what the log or its logger lost."""
     findings = []
     if log.file_corruption:
-        findings.append(Finding(MessagesDamaged(), severity="loss"))
+        findings.append(Finding("messages_damaged"))
     elif ends.left is not None:
-        findings.append(Finding(CutWithinMessage(ends.left), severity="loss"))
+        findings.append(Finding("cut_within_message", "", {"size": ends.left}))
     lines = dict.fromkeys(" ".join(line.split())[:200] for line in printed.splitlines() if line.strip())
-    findings += [Finding(LibraryMessage("pyulog", line)) for line in list(lines)[:_MOST_MESSAGES]]
+    findings += [
+        Finding("library_message", "", {"library": "pyulog", "text": line}) for line in list(lines)[:_MOST_MESSAGES]
+    ]
     if log.dropouts:
         lengths = [dropout.duration / 1000.0 for dropout in log.dropouts]
-        findings.append(Finding(LoggerDropouts(len(lengths), sum(lengths), max(lengths)), severity="loss"))
+        findings.append(
+            Finding("logger_dropouts", "", {"count": len(lengths), "total": sum(lengths), "longest": max(lengths)})
+        )
     return findings
 
 

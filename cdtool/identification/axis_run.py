@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
 
@@ -92,8 +91,8 @@ def axis_run(recording: Recording, joint: int = 0) -> AxisRun:
 
 def _derived(recording: Recording) -> frozenset[str]:
     """Return the channels that were computed from others when the log was read."""
-    computed = (DerivedSpeed, IntegratedPosition, IntegratedReference)
-    return frozenset(item.channel for item in recording.findings if isinstance(item.fact, computed))
+    computed = ("derived_speed", "integrated_position", "integrated_reference")
+    return frozenset(item.channel for item in recording.findings if item.kind in computed)
 
 
 def _uniform(start: float, period: float, count: int) -> FloatArray:

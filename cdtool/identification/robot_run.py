@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.findings.channels import DerivedSpeed
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.short_repr import short_repr
@@ -107,7 +106,7 @@ def robot_run(recording: Recording) -> RobotRun:
         raise RecordingError(
             f"{recording.name}: no position", "the torque of a robot depends on its pose: map position in [channels]"
         )
-    is_derived = "speed" not in recording or any(isinstance(item.fact, DerivedSpeed) for item in recording.findings)
+    is_derived = "speed" not in recording or any(item.kind == "derived_speed" for item in recording.findings)
     axes = [axis_run(recording, joint) for joint in range(len(recording.joints))]
     position = np.column_stack([_values(axis, "position") for axis in axes])
     if is_derived:

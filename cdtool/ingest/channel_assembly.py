@@ -7,8 +7,6 @@ masked. All warnings are reported together. Nothing is resampled.
 from __future__ import annotations
 
 import hashlib
-import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,37 +20,19 @@ from cdtool.clock.lower_rate import sampled_rows
 from cdtool.clock.stamps import gaps_of, missing_findings
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.findings import Finding, Severity
-from cdtool.findings.channels import (
-    ImpossibleValues,
-    InfiniteValues,
-    MaskedValues,
-    SaturatedValues,
-    StuckChannel,
-    UnitContradicted,
-)
-from cdtool.findings.clocks import ClocksApart, LowerRate
-from cdtool.findings.plausibility import Confirmed
+from cdtool.findings import Finding
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, guessed_units, time_unit_findings, unit_findings
-from cdtool.kernels import READ_ONLY, kernel
 from cdtool.log_names import log_stem
 from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, RIG_UNITS, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
 from cdtool.remote.remote_path import RemotePath
 
-_TABLE = "Array(float64, 2, 'C', readonly=True)"
-# A file of at most this many bytes is read at once for its digest.
-_READ_AT_ONCE = 1 << 20
 # A channel of a lower rate has empty cells in these first rows of a table.
 _FIRST_ROWS = 1 << 12
 Counts = npt.NDArray[np.int64]
-# The kinds of masked values, in the order of convert_to_si, with their severity.
-_MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
-    (InfiniteValues, "loss"),
-    (SaturatedValues, "warning"),
-    (ImpossibleValues, "loss"),
-)
+# The kinds of masked values, in the order of convert_to_si.
+_MASKED = ("infinite_values", "saturated_values", "impossible_values")
 
 
 def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, digest: str = "") -> Recording:
@@ -64,7 +44,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
     work = _Assembly(source, channels)
     series = {}
     findings = (*source.findings, *work.findings)
-    doubted = {item.channel for item in findings if isinstance(item.fact, UnitContradicted) and item.severity == "loss"}
+    doubted = {item.channel for item in findings if item.kind == "unit_contradicted" and item.severity == "loss"}
     for number, item in enumerate(channels.sources):
         made = work.series(item)
         if item.channel not in doubted:
@@ -91,11 +71,9 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
         findings=(
             *source.findings,
             *work.findings,
-            *(Finding(Confirmed(), item.channel, "note") for item in channels.sources if item.confirmed),
-            *stuck_findings({name: _is_constant(series[name]) for name in MEASURED if name in series}, channels.joints),
-            *disjoint_clock_findings(
-                {name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}
-            ),
+            *(Finding("confirmed", item.channel) for item in channels.sources if item.confirmed),
+            *_stuck_findings(series, channels.joints),
+            *_disjoint_clock_findings(series),
         ),
         digest=digest or file_digest(source.path),
         rows=work.rows,
@@ -111,19 +89,17 @@ def file_digest(path: Path) -> str:
     if isinstance(path, RemotePath) and path.is_read_by_ranges():
         return path.digest()
     with path.open("rb", buffering=0) as file:
-        if os.fstat(file.fileno()).st_size <= _READ_AT_ONCE:
-            return hashlib.sha256(file.readall()).hexdigest()
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @dataclass(frozen=True)
-class _TopicClock:
-    """The clock that the channels of a topic share: its `stamps`, cleaned times, and findings on gaps between these."""
+class _Clock:
+    """A clock that channels share: its cleaned times, its `stamps` [s], and findings on gaps that each channel gets."""
 
-    stamps: FloatArray
     clean: CleanTime
     times: Series
-    gaps: tuple[Finding, ...]
+    gaps: tuple[Finding, ...] = ()
+    stamps: FloatArray | None = None
 
 
 class _Assembly:
@@ -135,20 +111,23 @@ class _Assembly:
         self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
         self.origin = source.origin
         self.findings: list[Finding] = []
-        self.table: CleanTime | None = None
-        self.clock: Series | None = None  # the table's times, which its channels share
-        self._topic_clocks: dict[tuple[int, bool], _TopicClock] = {}  # by the identity of the stamps
+        self.table: _Clock | None = None  # the gaps of its times are reported once
+        self._topic_clocks: dict[tuple[int, bool], _Clock] = {}  # by the identity of the stamps
         if not channels.topics:
-            self.table = self._table_clock()
+            clean = self._table_clock()
+            self.table = _Clock(clean, _as_series(clean))
+            if channels.time.column is not None:
+                self.findings += gaps_of(clean.time, self.table.times.period, "time")
             self.findings += unit_findings(source, channels)
         self.findings += guessed_units(channels, {found.channel for found in self.findings})
 
     @property
     def rows(self) -> TableRows | None:
         """Return the rows of the table on its clock; None for channels with clocks of their own."""
-        if self.table is None or self.clock is None:
+        if self.table is None:
             return None
-        return TableRows(self.clock.time, None if self.table.keep.all() else self.table.keep)
+        keep = self.table.clean.keep
+        return TableRows(self.table.times.time, None if keep.all() else keep)
 
     def drop_columns(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
         """Remove the columns of a channel that no later channel needs."""
@@ -161,22 +140,18 @@ class _Assembly:
 
     def series(self, item: ChannelSource) -> Series:
         """Return one channel: its values in SI at its own times."""
-        if self.table is None:
-            column = self.columns[item.keys[0]]
-            stamps = column.time if column.time is not None else np.empty(0)
-            topic = self._topic_clock(stamps, item)
-            clean, clock, gaps, values = topic.clean, topic.times, topic.gaps, column.values
-        else:
-            assert self.clock is not None
-            clean, clock, gaps = self.table, self.clock, ()  # the gaps of its times are reported once
-            parts = [self.columns[key].values for key in item.keys]
-            values = parts[0] if len(parts) == 1 else np.column_stack(parts)
-            self._require_samples(clean, item)
-        kept = self._select(item, values, clean.keep)
+        shared = self.table or self._topic_clock(item)
+        if not len(shared.clean.time):
+            raise RecordingError(
+                f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
+            )
+        parts = [self.columns[key].values for key in item.keys]
+        values = parts[0] if len(parts) == 1 else np.column_stack(parts)
+        kept, clock, gaps = self._select(item, values, shared.clean.keep), shared.times, shared.gaps
         if self.table is not None and item.channel not in UNITLESS and np.isnan(kept[:_FIRST_ROWS]).any():
             kept, clock, gaps = self._at_lower_rate(kept, clock, item.channel)
         scaled, masked = convert_to_si(item, kept)
-        self.findings += masked_findings(masked, item, self.channels.joints)
+        self.findings += _masked_findings(masked, item, self.channels.joints)
         self.findings += [replace(finding, channel=item.channel) for finding in gaps]
         absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
         self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
@@ -193,36 +168,29 @@ class _Assembly:
         time = clock.time[rows]
         own = Series(time, np.zeros(len(time)), "s")
         share = clock.period / own.period if own.period > 0.0 else np.nan
-        self.findings.append(Finding(LowerRate(1.0 / own.period, share), channel, "note"))
+        self.findings.append(Finding("lower_rate", channel, {"rate": 1.0 / own.period, "share": share}))
         return values[rows], own, tuple(gaps_of(own.time, own.period, "time"))
 
-    def _topic_clock(self, stamps: FloatArray, item: ChannelSource) -> _TopicClock:
+    def _topic_clock(self, item: ChannelSource) -> _Clock:
         """Return a channel's clock, cleaned once for all channels of its topic, and add the findings on its stamps."""
+        stamps = self.columns[item.keys[0]].time
+        stamps = np.empty(0) if stamps is None else stamps
         name, sampled = f"{item.channel} time", item.channel != "event"
         known = self._topic_clocks.get((id(stamps), sampled))
         if known is not None:
             self._add_clock_findings(known.clean, name)
             return known
         clean = self._clean(stamps, name, sampled=sampled)
-        self._require_samples(clean, item)
-        times = Series(clean.time, np.zeros(len(clean.time)), "s")
-        known = _TopicClock(stamps, clean, times, tuple(gaps_of(times.time, times.period, "time")))
+        times = _as_series(clean)
+        known = _Clock(clean, times, tuple(gaps_of(times.time, times.period, "time")), stamps)
         self._topic_clocks[id(stamps), sampled] = known
         return known
-
-    def _require_samples(self, clean: CleanTime, item: ChannelSource) -> None:
-        if not len(clean.time):
-            raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
-            )
 
     def _table_clock(self) -> CleanTime:
         time = self.channels.time
         if time.column is None:
             rows = {len(column.values) for column in self.columns.values()}
-            clock = clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
-            self.clock = Series(clock.time, np.zeros(len(clock.time)), "s")
-            return clock
+            return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
         column = self.columns[time.key]
         self.findings += check_clock_unit(self.source.path, time, column, self.origin)
         self.findings += time_unit_findings(time, column, self.origin)
@@ -234,8 +202,6 @@ class _Assembly:
             raise RecordingError(
                 f"{self.source.path}: column '{column.name}' contains no time stamp", "see [channels] time"
             )
-        self.clock = Series(clock.time, np.zeros(len(clock.time)), "s")
-        self.findings += gaps_of(self.clock.time, self.clock.period, "time")
         return clock
 
     def _clean(
@@ -264,36 +230,31 @@ class _Assembly:
                 "all columns of a recording have the same length",
                 channel=item.channel,
             )
-        check_width(self.source.path, item, table.shape[1])
+        if table.shape[1] != len(item.factor):
+            raise RecordingError(
+                f"{self.source.path}: channel '{item.channel}' ({item.described}) has {table.shape[1]} values "
+                f"per sample for {len(item.factor)} {'axes' if item.axes else 'joints'}",
+                f"name one element per {'axis' if item.axes else 'joint, in the order of machine.joints'}",
+                channel=item.channel,
+            )
         return table if keep.all() else table[keep]
 
 
-def check_width(path: Path, item: ChannelSource, width: int) -> None:
-    """Raise RecordingError if the samples of a channel do not have one value per joint."""
-    if width != len(item.factor):
-        raise RecordingError(
-            f"{path}: channel '{item.channel}' ({item.described}) has {width} values "
-            f"per sample for {len(item.factor)} {'axes' if item.axes else 'joints'}",
-            "name one element per axis" if item.axes else "name one element per joint, in the order of machine.joints",
-            channel=item.channel,
-        )
-
-
-def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
+def _masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
     """Return the findings on masked values by joint, or by axis of a force; `masked` (3, J): as of convert_to_si."""
-    if item.axes:
-        return [
-            Finding(kind(count, ""), f"{item.channel} {item.axes[j]}", severity)
-            for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
-            for j, count in enumerate(counts)
-            if count
-        ]
+    parts = [(f"{item.channel} {axis}", "") for axis in item.axes]
+    width = masked.shape[1]
+    parts = parts or [(item.channel, _joint_name(joints, j, width)) for j in range(width)]
     return [
-        Finding(kind(count, joint_name(joints, j, len(counts))), item.channel, severity)
-        for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
-        for j, count in enumerate(counts)
+        Finding(kind, channel, {"count": count, "joint": joint})
+        for kind, counts in zip(_MASKED, masked.tolist(), strict=True)
+        for (channel, joint), count in zip(parts, counts, strict=True)
         if count
     ]
+
+
+def _as_series(clean: CleanTime) -> Series:
+    return Series(clean.time, np.zeros(len(clean.time)), "s")
 
 
 def component_along(direction: Sequence[float], values: FloatArray) -> FloatArray:
@@ -303,7 +264,7 @@ def component_along(direction: Sequence[float], values: FloatArray) -> FloatArra
     return along[:, np.newaxis]
 
 
-def joint_name(joints: Sequence[str], joint: int, count: int) -> str:
+def _joint_name(joints: Sequence[str], joint: int, count: int) -> str:
     """Return the name of a joint if the channel has several joints, else an empty string."""
     return joints[joint] if count > 1 else ""
 
@@ -314,12 +275,19 @@ def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, 
     The counts are (3, J): infinite, saturated, and physically impossible values.
     """
     low, high = item.valid_range or (np.nan, np.nan)
-    impossible = np.nan if item.channel in UNITLESS else IMPOSSIBLE
-    limits = np.array([low, high, item.least, item.most, impossible])
-    table, masked = as_table(values), np.zeros((3, values.shape[1]), dtype=np.int64)
-    scaled = np.empty(table.shape)
-    convert_and_mask(table, np.array(item.factor, dtype=np.float64), limits, scaled, masked)
-    return scaled, masked
+    with np.errstate(over="ignore", invalid="ignore"):  # of values that are masked
+        scaled = np.multiply(values, item.factor, order="C")
+    infinite = np.isinf(values)
+    saturated = ((values <= low) | (values >= high)) & ~infinite
+    impossible = (values < item.least) | (values > item.most)
+    if item.channel not in UNITLESS:
+        impossible |= np.abs(scaled) >= IMPOSSIBLE
+    impossible &= ~(infinite | saturated)
+    masked = infinite | saturated | impossible
+    if not masked.any():  # the usual case
+        return scaled, np.zeros((len(_MASKED), values.shape[1]), dtype=np.int64)
+    scaled[masked] = np.nan
+    return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, impossible)])
 
 
 def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
@@ -341,34 +309,32 @@ def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series]
     return Series(logged.time, torque, "N m")
 
 
-def stuck_findings(constant: Mapping[str, Sequence[bool]], joints: Sequence[str]) -> list[Finding]:
-    """Return a finding for each measured channel that is constant while its joint moves.
-
-    `constant` states, channel by channel and joint by joint, whether the value never changes.
-    """
-    findings = []
-    for name in (item for item in MEASURED if item in constant):
-        others = [constant[other] for other in ("speed", "position") if other in constant and other != name]
-        for joint, is_constant in enumerate(constant[name]):
-            if is_constant and not all(other[joint] for other in others):
-                findings.append(Finding(StuckChannel(joint_name(joints, joint, len(constant[name]))), name))
-    return findings
+def _stuck_findings(series: Mapping[str, Series], joints: Sequence[str]) -> list[Finding]:
+    """Return a finding for each measured channel that is constant while its joint moves."""
+    constant = {name: _is_constant(series[name]) for name in MEASURED if name in series}
+    return [
+        Finding("stuck_channel", name, {"joint": _joint_name(joints, joint, len(by_joint))})
+        for name, by_joint in constant.items()
+        for joint, is_constant in enumerate(by_joint)
+        if is_constant
+        and not all(constant[other][joint] for other in ("speed", "position") if other in constant and other != name)
+    ]
 
 
-def disjoint_clock_findings(first_and_last: Mapping[str, tuple[float, float]]) -> list[Finding]:
+def _disjoint_clock_findings(series: Mapping[str, Series]) -> list[Finding]:
     """Return a finding for each channel whose times [s] do not overlap with those of the others.
 
     Such channels cannot be compared. Channels that are logged only at events may be outside the time span of the
     others, by at most the length of the log.
     """
-    spans = sorted((first, last, name) for name, (first, last) in first_and_last.items())
+    spans = sorted((float(each.time[0]), float(each.time[-1]), name) for name, each in series.items())
     longest = max((end - start for start, end, _ in spans), default=0.0)
     findings = []
     latest, before = (spans[0][1], spans[0][2]) if spans else (0.0, "")
     for start, end, name in spans[1:]:
         distance = start - latest
         if distance > (longest if {name, before} & set(UNITLESS) else 0.0):
-            findings.append(Finding(ClocksApart(distance, before), name))
+            findings.append(Finding("clocks_apart", name, {"distance": distance, "before": before}))
         if end > latest:
             latest, before = end, name
     return findings
@@ -381,34 +347,3 @@ def _is_constant(series: Series) -> list[bool]:
     highest = np.where(known, series.values, -np.inf).max(axis=0, initial=-np.inf)
     found: list[bool] = ((lowest == highest) & (known.sum(axis=0) > 1)).tolist()
     return found
-
-
-@kernel(f"void({_TABLE}, {READ_ONLY}, {READ_ONLY}, float64[:, ::1], int64[:, ::1])")
-def convert_and_mask(
-    values: FloatArray, factor: FloatArray, limits: FloatArray, scaled: FloatArray, masked: FloatArray
-) -> None:
-    """Fill `scaled` (n, J) with values times `factor` (J,), NaN where masked; count the masked ones in `masked` (3, J).
-
-    Masked are infinite values, saturated ones (up to the first limit, from the second), and impossible ones: below the
-    third limit, above the fourth, or from the fifth when scaled. No value exceeds a limit that is NaN.
-    """
-    low, high, least, most, impossible = limits[0], limits[1], limits[2], limits[3], limits[4]
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            value = values[i, j]
-            scaled[i, j] = value * factor[j]
-            if math.isinf(value):
-                kind = 0
-            elif value <= low or value >= high:
-                kind = 1
-            elif value < least or value > most or abs(scaled[i, j]) >= impossible:
-                kind = 2
-            else:
-                continue
-            masked[kind, j] += 1
-            scaled[i, j] = math.nan
-
-
-def as_table(values: FloatArray) -> FloatArray:
-    """Return values (n, J) as these kernels read them: as float64, row by row."""
-    return np.ascontiguousarray(values, dtype=np.float64)

@@ -14,7 +14,6 @@ from cdtool.clock.stamps import EDGE_ROWS, ClockCleaner, count_leading_strays, g
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.findings import Finding
-from cdtool.findings.clocks import AssumedClock, HeaderUnitImplausible
 from cdtool.formats.source import Source
 from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.recording import FloatArray
@@ -57,12 +56,11 @@ class TableClock:
     statistics: ClockStatistics
     findings: tuple[Finding, ...]
 
-    def times(self, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
-        """Yield strictly increasing times [s] for pieces of stamps; the last rows of a piece come with the next one."""
-        return self.clean(ClockCleaner(), stamps)
+    def times(self, stamps: Iterable[FloatArray], cleaner: ClockCleaner) -> Iterator[FloatArray]:
+        """Yield strictly increasing times [s] for pieces of stamps; the last rows of a piece come with the next one.
 
-    def clean(self, cleaner: ClockCleaner, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
-        """Yield the same times as `times`, using a given cleaner, which then has the findings on dropped rows."""
+        The cleaner has the findings on dropped rows after the last piece.
+        """
         for piece in stamps:
             yield cleaner.times((piece - self.origin) * self.factor, piece)
         yield cleaner.times(np.empty(0), np.empty(0), final=True)
@@ -82,7 +80,7 @@ def guess_clock(source: Source) -> GuessedClock | None:
     clock = find_clock(source, statistics, lambda name: [source.columns[name].values])
     if clock is None:
         return None
-    times = np.concatenate(list(clock.times([source.columns[clock.column].values])))
+    times = np.concatenate(list(clock.times([source.columns[clock.column].values], ClockCleaner())))
     return GuessedClock(clock.column, times, clock.findings)
 
 
@@ -137,7 +135,7 @@ def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], 
     if known is not None and stated and contradicted_by_epoch(start, known.factor):
         stated = False
         readings = both_readings(start, known.factor, str(column.unit), epoch)
-        wrong = (Finding(HeaderUnitImplausible(readings), column.name),)
+        wrong = (Finding("header_unit_implausible", column.name, {"readings": readings}),)
     if stated:
         unit, evidence = str(column.unit), "header"
     elif epoch:
@@ -149,7 +147,7 @@ def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], 
     factor = _DAY if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
     # An epoch is subtracted before scaling, so that no digit is lost.
     origin = start if epoch or unit == "days" else 0.0
-    assumed = Finding(AssumedClock(unit, evidence, start, step), column.name, "note")
+    assumed = Finding("assumed_clock", column.name, {"unit": unit, "evidence": evidence, "start": start, "step": step})
     clock = TableClock(column.name, origin, factor, ClockStatistics(), (assumed, *wrong))
     return _with_findings(clock, first_row, stamps)
 
@@ -166,7 +164,7 @@ def _start(stamps: Iterable[FloatArray]) -> float:
 def _with_findings(clock: TableClock, first_row: int, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     """Return the clock with its statistics and all findings."""
     cleaner = ClockCleaner()
-    for times in clock.clean(cleaner, stamps()):
+    for times in clock.times(stamps(), cleaner):
         clock.statistics.add(times, len(times))
-    gaps = gaps_in(clock.times(stamps()), clock.statistics.steps.median, clock.column)
+    gaps = gaps_in(clock.times(stamps(), ClockCleaner()), clock.statistics.steps.median, clock.column)
     return replace(clock, findings=(*clock.findings, *cleaner.findings(first_row), *gaps))

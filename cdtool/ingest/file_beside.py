@@ -17,8 +17,6 @@ from cdtool.channels import ChannelMap, ChannelSource, OwnFile
 from cdtool.dynamics import Machine
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding, Severity
-from cdtool.findings.channels import AbsentFile, AbsentTruth, UnitContradicted
-from cdtool.findings.clocks import ClocksApart, FileAligned, TriggersDiffer, TriggersDrift
 from cdtool.formats.source import Source
 from cdtool.ingest.channel_assembly import assemble_recording
 from cdtool.recording import SHOWS_CONTACTS, FloatArray, Recording, Series
@@ -47,22 +45,23 @@ def add_files_beside(
         assert own is not None
         path = own.path_for(log)
         if path.resolve() == log.resolve():
-            itself = AbsentFile("file", path.as_posix(), reason="it is the log itself: map its column without 'file'")
-            recording = _without(recording, item, itself)
+            reason = "it is the log itself: map its column without 'file'"
+            recording = _without(recording, item, path, reason)
             continue
         if not path.exists():
-            recording = _without(recording, item, AbsentFile("file", path.as_posix()))
+            recording = _without(recording, item, path)
             continue
         try:
             recording = _with_file(recording, item, own, _read(path, item, own, channels, machine, read), trigger)
         except RecordingError as fault:
             reason = str(fault).removeprefix(f"{path}: ")
-            recording = _without(recording, item, AbsentFile("file", path.as_posix(), reason=reason))
+            recording = _without(recording, item, path, reason)
     return recording
 
 
-def _without(recording: Recording, item: ChannelSource, fact: AbsentFile) -> Recording:
-    finding = Finding(fact, item.channel, "loss" if fact.reason else "note")
+def _without(recording: Recording, item: ChannelSource, path: Path, reason: str = "") -> Recording:
+    numbers = {"name": path.as_posix(), "reason": reason}
+    finding = Finding("absent_file", item.channel, numbers, "loss" if reason else "note")
     return replace(recording, findings=(*recording.findings, finding))
 
 
@@ -90,10 +89,14 @@ def _with_file(
     recording: Recording, item: ChannelSource, own: OwnFile, beside: Recording, trigger: ReadTrigger
 ) -> Recording:
     name, path = item.channel, location(beside.source)
-    findings = [replace(found, file=path.name) for found in beside.findings if not isinstance(found.fact, ClocksApart)]
+    findings = [replace(found, file=path.name) for found in beside.findings if found.kind != "clocks_apart"]
     if name not in beside:
-        absent = [found.fact for found in beside.findings if isinstance(found.fact, AbsentTruth | UnitContradicted)]
-        raise RecordingError(f"{path}: {absent[0].sentence()}" if absent else f"{path}: contains no {name}")
+        absent = [
+            found.sentence
+            for found in beside.findings
+            if found.kind in ("absent_truth", "absent_file", "unit_contradicted")
+        ]
+        raise RecordingError(f"{path}: {absent[0]}" if absent else f"{path}: contains no {name}")
     shift = _shift(recording, item.channel, own, beside, trigger)
     shift = replace(shift, seconds=shift.seconds + item.time_offset)
     series = beside[name]
@@ -105,13 +108,19 @@ def _with_file(
             f"the log ({recording.start:.3f} to {recording.end:.3f} s)",
             "check how the clocks are aligned",
         )
-    aligned = FileAligned(path.name, shift.seconds, own.align, shift.within, len(moved) - len(inside))
+    aligned = {
+        "file_name": path.name,
+        "shift": shift.seconds,
+        "how": own.align,
+        "within": shift.within,
+        "cut": len(moved) - len(inside),
+    }
     # More outside than inside: the clocks may have other units, or be aligned wrongly.
     severity: Severity = "warning" if 2 * len(inside) < len(moved) else "note"
     return replace(
         recording,
         channels={**recording.channels, name: inside},
-        findings=(*recording.findings, *findings, *shift.findings, Finding(aligned, name, severity)),
+        findings=(*recording.findings, *findings, *shift.findings, Finding("file_aligned", name, aligned, severity)),
         beside=(*recording.beside, (path.name, beside.digest)),
         # A pressure shows no onset: its clock does not concern a latency.
         truth_clock=max(recording.truth_clock, shift.within if name in SHOWS_CONTACTS else 0.0),
@@ -143,7 +152,7 @@ def _shift_by_rises(channel: str, file: str, in_log: Series, in_file: Series) ->
             )
     step = max(float(np.nanmax([series.period for series in (in_log, in_file)])), 0.0)
     if len(ours) != len(theirs):
-        differ = Finding(TriggersDiffer(len(ours), len(theirs)), channel)
+        differ = Finding("triggers_differ", channel, {"in_log": len(ours), "in_file": len(theirs)})
         return _Shift(float(ours[0] - theirs[0]), step, (differ,))
     shifts = ours - theirs
     middle = 0.5 * float(shifts.min() + shifts.max())
@@ -151,7 +160,11 @@ def _shift_by_rises(channel: str, file: str, in_log: Series, in_file: Series) ->
     if spread <= 2.0 * step or span <= 0.0:
         return _Shift(middle, step)
     ppm = 1e6 * float(shifts[-1] - shifts[0]) / span
-    return _Shift(middle, step + 0.5 * spread, (Finding(TriggersDrift(1e3 * spread, span, ppm), channel),))
+    return _Shift(
+        middle,
+        step + 0.5 * spread,
+        (Finding("triggers_drift", channel, {"spread": 1e3 * spread, "span": span, "ppm": ppm}),),
+    )
 
 
 def rises(trigger: Series) -> FloatArray:

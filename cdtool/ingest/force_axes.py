@@ -13,7 +13,6 @@ from cdtool.clock import HOLD_PERIODS, clean_time, previous_value
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.channels import AxesHeld
 from cdtool.formats.source import Source
 from cdtool.recording import Series
 
@@ -69,8 +68,8 @@ def join_axes(path: Path, item: ChannelSource, axes: Sequence[Column]) -> tuple[
     clock = clean[slowest].time
     held = np.column_stack([previous_value(series, clock)[:, 0] for series in clean])
     ages = [_longest_age(series, clock) for k, series in enumerate(clean) if k != slowest]
-    fact = AxesHeld(axes[slowest].name, max(ages, default=0.0))
-    return Column(item.channel, held, clock), [Finding(fact, item.channel, "note")]
+    fact = {"slowest": axes[slowest].name, "age": max(ages, default=0.0)}
+    return Column(item.channel, held, clock), [Finding("axes_held", item.channel, fact)]
 
 
 def _cleaned(path: Path, item: ChannelSource, axis: Column) -> Series:

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Literal
 from unicodedata import normalize
 
 import numpy as np
@@ -15,9 +14,7 @@ from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch, contradicted_by_steps
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
-from cdtool.findings.channels import UnitContradicted
-from cdtool.findings.clocks import ClockUnitContradicted, StepsImplausible
+from cdtool.findings import Finding, Severity
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recording import CONTACT_PRESSURE, RIG_UNITS
@@ -53,10 +50,12 @@ def guessed_units(channels: ChannelMap, reported: Collection[str]) -> list[Findi
 
     Not of the `reported` channels, whose header says more.
     """
+    numbers = {"header": "", "header_unit": "", "more": 0, "ratio": 0.0, "advice": "confirm", "scale": ""}
     return [
         Finding(
-            UnitContradicted("", "", 0, item.stated or "", 0.0, "confirm"),
+            "unit_contradicted",
             item.channel,
+            {**numbers, "stated": item.stated or ""},
             "loss" if item.channel == CONTACT_PRESSURE else "note",
         )
         for item in channels.sources
@@ -75,11 +74,7 @@ def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> lis
         header_unit = find_unit(text) if text else None
         if text and (header_unit is None or not _fits(header_unit, stated, item, abs(factor))):
             by_unit.setdefault(text, []).append(column)
-    facts = [_contradiction(item, stated, unit, columns) for unit, columns in by_unit.items()]
-    return [
-        Finding(fact, item.channel, "note" if fact.advice == "no unit" and item.channel != CONTACT_PRESSURE else "loss")
-        for fact in facts
-    ]
+    return [_contradiction(item, stated, unit, columns) for unit, columns in by_unit.items()]
 
 
 def _unit_text(item: ChannelSource, column: Column, factor: float) -> str | None:
@@ -111,16 +106,23 @@ def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float
     meant = contradicted_by_epoch(first, time.factor)
     if meant:
         also = f", as its header says '{header}'" if header else ""
+        readings = {"readings": both_readings(first, time.factor, stated, meant)}
         raise RecordingError(
             f"{path}: the machine file states {stated} for the clock '{column.name}'{also}, but "
-            f"{both_readings(first, time.factor, stated, meant)}",
+            f"{Finding('header_unit_implausible', '', readings).words_for('readings')}",
             f'write time = {{ column = "{column.name}", unit = "{meant}" }} in [channels]',
         )
     likely, step = contradicted_by_steps(column.values, time.factor)
     if not likely:
         return []
     rate = time.factor / (step * SECONDS[likely])
-    return [Finding(StepsImplausible(step, stated, header, likely, rate), "time")]
+    return [
+        Finding(
+            "steps_implausible",
+            "time",
+            {"step": step, "stated": stated, "header": header, "likely": likely, "rate": rate},
+        )
+    ]
 
 
 def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
@@ -138,8 +140,14 @@ def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) ->
     if header_unit.si == "s" and math.isclose(header_unit.factor, time.factor):
         return []
     ratio = _ratio(header_unit, Unit("s", time.factor))
-    fact = ClockUnitContradicted(_header_text(column), str(column.unit), time.unit or "s", time.rate or 0.0, ratio)
-    return [Finding(fact, "time")]
+    fact = {
+        "header": _header_text(column),
+        "header_unit": str(column.unit),
+        "stated": time.unit or "s",
+        "rate": time.rate or 0.0,
+        "ratio": ratio,
+    }
+    return [Finding("clock_unit_contradicted", "time", fact)]
 
 
 def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:
@@ -164,11 +172,19 @@ def _fits(header_unit: Unit, stated: Unit, item: ChannelSource, factor: float) -
     return header_unit.si == item.unit and math.isclose(header_unit.factor, factor, rel_tol=_ROUNDED)
 
 
-def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> UnitContradicted:
+def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> Finding:
     header_unit = find_unit(unit)
+    known = {
+        "header": _header_text(columns[0]),
+        "header_unit": unit,
+        "more": len(columns) - 1,
+        "stated": str(item.stated),
+    }
     if header_unit is None or (unit == "1" and item.channel in RIG_UNITS):
-        return UnitContradicted(_header_text(columns[0]), unit, len(columns) - 1, str(item.stated), 0.0, "no unit")
-    advice: Literal["unit", "unit and scale", "unit without scale", "other column"] = "unit"
+        numbers = {**known, "advice": "no unit", "ratio": 0.0, "scale": ""}
+        severity: Severity = "loss" if item.channel == CONTACT_PRESSURE else "note"
+        return Finding("unit_contradicted", item.channel, numbers, severity)
+    advice = "unit"
     if item.duty is None and header_unit.si in RAW_UNITS and (stated.si != header_unit.si or item.channel in RIG_UNITS):
         advice = "unit and scale"
     elif header_unit.si == item.unit and stated.si in RAW_UNITS:
@@ -176,8 +192,8 @@ def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequen
     elif header_unit.si not in (item.unit, stated.si, *RAW_UNITS):
         advice = "other column"
     scale = f"{item.unit} per {header_unit.si}" if advice == "unit and scale" else ""
-    header, ratio = _header_text(columns[0]), _ratio(header_unit, stated)
-    return UnitContradicted(header, unit, len(columns) - 1, str(item.stated), ratio, advice, scale)
+    numbers = {**known, "advice": advice, "ratio": _ratio(header_unit, stated), "scale": scale}
+    return Finding("unit_contradicted", item.channel, numbers)
 
 
 def _ratio(header_unit: Unit, stated: Unit) -> float:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,10 +15,8 @@ from cdtool.clock import GAP_PERIODS
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.messages import ArrayLengthsDiffer
-from cdtool.findings.parts import PartCompressed, PartGap, PartMissing, PartOfOtherKind, PartsOverlap, PartUnreadable
 from cdtool.formats.source import Source, TopicDetails
-from cdtool.recording import GROUND_TRUTH, Recording, Series
+from cdtool.recording import GROUND_TRUTH, FloatArray, Recording, Series
 from cdtool.remote.remote_path import location
 
 # First and last time [s].
@@ -42,8 +39,8 @@ def missing_part_findings(folder: Path, parts: Sequence[Path]) -> list[Finding]:
         if name in read or plain in read:
             continue
         exists = (folder / name).exists()
-        kind = PartMissing if not exists else PartCompressed if name != plain else PartOfOtherKind
-        findings.append(Finding(kind(name, _METADATA), severity="loss"))
+        kind = "part_missing" if not exists else "part_compressed" if name != plain else "part_of_other_kind"
+        findings.append(Finding(kind, "", {"part": name, "metadata": _METADATA}))
     return findings
 
 
@@ -52,7 +49,7 @@ def loss_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, Rec
     findings = missing_part_findings(folder, parts)
     for part, fault in unread.items():
         reason = fault.message.removeprefix(f"{part}: ")
-        findings.append(Finding(PartUnreadable(part.name, reason), severity="loss"))
+        findings.append(Finding("part_unreadable", "", {"part": part.name, "reason": reason}))
     return tuple(findings)
 
 
@@ -76,110 +73,73 @@ def join_sources(
         containing = [(source, spans.get(name)) for source, spans in parts if name in source.columns]
         widths = sorted({source.columns[name].values.shape[1:] for source, _ in containing})
         if len(widths) > 1:
-            lengths = ArrayLengthsDiffer(tuple(width[0] if width else 1 for width in widths))
-            findings.append(Finding(lengths, name, "note"))
+            lengths = {"lengths": tuple(width[0] if width else 1 for width in widths)}
+            findings.append(Finding("array_lengths_differ", name, lengths))
             continue
         columns[name] = containing[0][0].columns[name]
         for (_, before), (source, span) in pairwise(containing):
             if before and span and span[0] < before[1]:
                 late.setdefault(source.path, name)
-    findings += [Finding(PartsOverlap(path.name, name)) for path, name in late.items()]
+    findings += [Finding("parts_overlap", "", {"part": path.name, "column": name}) for path, name in late.items()]
     first, names = sources[0], tuple(columns)
     details, topics = join_details(sources), join_topics(sources)
     return Source(folder, first.format, columns, first.origin, tuple(findings), details, names=names, topics=topics)
 
 
-class ChannelSpan(NamedTuple):
-    """A channel's first and last time in a part, and its median step [s]; the unit of its values."""
+def join_recordings(parts: Sequence[Recording], name: str) -> Recording:
+    """Return the parts of a log, as logged, as one recording.
 
-    first: float
-    last: float
-    step: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class PartSpan:
-    """The time spans of the channels of a part, counted from `origin` [s]."""
-
-    path: str
-    origin: float
-    channels: Mapping[str, ChannelSpan]
-
-    @classmethod
-    def of(cls, part: Recording) -> PartSpan:
-        """Return the spans of a part that is in memory."""
-        spans = {}
-        for name, series in part.channels.items():
-            time = series.time
-            step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
-            spans[name] = ChannelSpan(float(time[0]), float(time[-1]), step, series.unit)
-        return cls(part.source, part.origin, spans)
-
-
-def check_parts(parts: Sequence[PartSpan]) -> None:
-    """Raise RecordingError if a part does not have a channel of another one, or begins before the previous part ends.
-
+    Raises RecordingError if a part does not have a channel of another one, or begins before the previous part ends.
     Ground truth, such as the events of a stroke, may be in some parts only.
     """
+    parts = sorted(parts, key=lambda part: part.origin + part.start)
     first = parts[0]
-    for name in dict.fromkeys(name for part in parts for name in part.channels):
-        end, unit = -np.inf, None
-        for part in parts:
-            if name not in part.channels and name in GROUND_TRUTH:
-                continue
-            span = part.channels.get(name)
-            if span is None or unit not in (None, span.unit):
+    joined: dict[str, Series] = {}
+    for channel in dict.fromkeys(name for part in parts for name in part.channels):
+        containing = [part for part in parts if channel in part or channel not in GROUND_TRUTH]
+        end, unit, times = -np.inf, None, list[FloatArray]()
+        for part in containing:
+            if channel not in part or unit not in (None, part[channel].unit):
                 raise RecordingError(
-                    f"{part.path}: channel '{name}' is not logged as in {first.path}",
+                    f"{part.source}: channel '{channel}' is not logged as in {first.source}",
                     "all parts of a log have the same channels and units",
-                    channel=name,
+                    channel=channel,
                 )
-            start = span.first + (part.origin - first.origin)
-            if start <= end:
+            times.append(part[channel].time + (part.origin - first.origin))
+            if times[-1][0] <= end:
                 raise RecordingError(
-                    f"{part.path}: overlaps the previous part ({name}: starts at {start:g} s, before {end:g} s)",
+                    f"{part.source}: overlaps the previous part ({channel}: starts at {times[-1][0]:g} s, before "
+                    f"{end:g} s)",
                     "the parts of a log share one clock and do not overlap",
                 )
-            end, unit = span.last + (part.origin - first.origin), span.unit
+            end, unit = times[-1][-1], part[channel].unit
+        values = np.concatenate([part[channel].values for part in containing])
+        joined[channel] = Series(np.concatenate(times), values, containing[0][channel].unit)
+    findings = tuple(found for part in parts for found in with_file_name(location(part.source), part.findings))
+    findings += tuple(_gaps_between(parts))
+    source = ", ".join(part.source for part in parts)
+    digest = join_digests([part.digest for part in parts])
+    kinds = next((part.label_kinds for part in parts if part.label_kinds), ())
+    return Recording(name, source, first.joints, joined, first.origin, findings, digest, label_kinds=kinds)
 
 
-def part_gap_findings(parts: Sequence[PartSpan]) -> Iterator[Finding]:
+def _gaps_between(parts: Sequence[Recording]) -> Iterator[Finding]:
     """Yield one finding for each of the consecutive `parts` that begins later than its channels' steps explain.
 
     Nothing was logged in between: the recorder was stopped, or a part is missing. Ground truth is not considered, as it
     may be in some parts only. If only some channels pause, the finding names them.
     """
     for before, after in pairwise(parts):
-        channels = [name for name in before.channels if name in after.channels and name not in GROUND_TRUTH]
+        channels = [name for name in before.channels if name in after and name not in GROUND_TRUTH]
         gaps = {}
         for name in channels:
-            gap = after.channels[name].first + (after.origin - before.origin) - before.channels[name].last
-            if gap > GAP_PERIODS * before.channels[name].step:
+            gap = float(after[name].time[0] + (after.origin - before.origin) - before[name].time[-1])
+            if gap > GAP_PERIODS * before[name].period:
                 gaps[name] = gap
         if gaps:
             paused = () if len(gaps) == len(channels) else tuple(gaps)
-            yield Finding(PartGap(min(gaps.values()), paused), file=Path(after.path).name)
-
-
-def join_recordings(parts: Sequence[Recording], name: str) -> Recording:
-    """Return the parts of a log, as logged, as one recording; raises RecordingError as check_parts does."""
-    parts = sorted(parts, key=lambda part: part.origin + part.start)
-    spans = [PartSpan.of(part) for part in parts]
-    check_parts(spans)
-    first = parts[0]
-    joined: dict[str, Series] = {}
-    for channel in dict.fromkeys(name for part in parts for name in part.channels):
-        containing = [part for part in parts if channel in part]
-        time = np.concatenate([part[channel].time + (part.origin - first.origin) for part in containing])
-        values = np.concatenate([part[channel].values for part in containing])
-        joined[channel] = Series(time, values, containing[0][channel].unit)
-    findings = tuple(found for part in parts for found in with_file_name(location(part.source), part.findings))
-    findings += tuple(part_gap_findings(spans))
-    source = ", ".join(part.source for part in parts)
-    digest = join_digests([part.digest for part in parts])
-    kinds = next((part.label_kinds for part in parts if part.label_kinds), ())
-    return Recording(name, source, first.joints, joined, first.origin, findings, digest, label_kinds=kinds)
+            numbers = {"gap": min(gaps.values()), "channels": paused}
+            yield Finding("part_gap", "", numbers, file=Path(after.source).name)
 
 
 def with_file_name(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:

@@ -410,7 +410,7 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     for item in channels.sources:
         joined[item.channel], of_axes = _joined(source, item)
         notes += of_axes
-    sources = tuple(replace(item, columns=(item.channel,), keys=(item.channel,)) for item in channels.sources)
+    sources = tuple(replace(item, keys=(item.channel,)) for item in channels.sources)
     names = tuple(joined)
     # The units are compared here, as joined columns have no unit.
     findings = (*source.findings, *unit_findings(source, channels), *notes)

@@ -18,8 +18,6 @@ from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.channels import AbsentTruth
-from cdtool.findings.runs import ReturningIds, SamplesOutsideRuns
 from cdtool.formats.source import Source, in_words
 from cdtool.ingest.channel_assembly import assemble_recording, file_digest
 from cdtool.ingest.parts import join_details, join_digests, join_topics, missing_part_findings, with_file_name
@@ -130,7 +128,7 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
     findings = [*whole.source.findings, *whole.outside()]
     later = tuple(name for (run, name) in chosen if segments.number[run])
     if later and cut.by == "column":
-        findings.append(Finding(ReturningIds(later, cut.column)))
+        findings.append(Finding("returning_ids", "", {"names": later, "column": cut.column}))
     short = np.flatnonzero(lengths < FEWEST_SAMPLES)
     if pattern:
         fits = [_fits(name, pattern) for name in segments.names(short)]
@@ -171,8 +169,8 @@ def id_source(cut: RunCut, topics: bool) -> ChannelSource:
 class _CutLog:
     """The columns of a log, and where its runs are.
 
-    `rows` are those of each clock by run; a clock is known by its identity, that of a table by 0. `begins` (r,) is when
-    the runs begin [s], where ids have a clock of their own.
+    `rows` are the rows of each run in the order of the file, by clock; a clock is known by its identity, that of a
+    table by 0. `begins` (r,) is when the runs begin [s], where ids have a clock of their own.
     """
 
     path: Path
@@ -182,7 +180,7 @@ class _CutLog:
     machine_file: MachineFile
     files: tuple[Path, ...]
     segments: Segments
-    rows: Mapping[int, _RunRows] = field(default_factory=dict)
+    rows: Mapping[int, Sequence[Rows]] = field(default_factory=dict)
     begins: FloatArray | None = None
 
     @classmethod
@@ -213,7 +211,7 @@ class _CutLog:
         bridged = self.cut.by == "column"
         if not self.channels.topics:
             segments = segments_by_id(values[:, 0], ids.words, bridged)
-            return replace(self, segments=segments, rows={0: _RunRows.consecutive(segments, len(values))})
+            return replace(self, segments=segments, rows={0: _consecutive(segments)})
         assert ids.time is not None
         time, id_values = ids.time, values[:, 0]
         if np.any(time[1:] < time[:-1]):
@@ -222,7 +220,7 @@ class _CutLog:
         segments = segments_by_id(id_values, ids.words, bridged)
         begins = time[segments.start]
         ends = np.append(time, np.inf)[segments.stop]
-        rows = {id(clock): _RunRows.between(clock, begins, ends) for clock in self._clocks()}
+        rows = {clock: _between(time, begins, ends) for clock, time in self._clocks().items()}
         return replace(self, segments=segments, rows=rows, begins=begins)
 
     def _by_reset(self) -> _CutLog:
@@ -237,10 +235,9 @@ class _CutLog:
                     f"{self.path}: has no clock that could start again: [channels] time states a rate",
                     'cut it by a column: by = "column:NAME"',
                 )
-            stamps = self.source.columns[self.channels.time.key].values
-            segments = segments_by_reset(stamps)
-            return replace(self, segments=segments, rows={0: _RunRows.consecutive(segments, len(stamps))})
-        found: dict[int, Segments] = {id(clock): segments_by_reset(clock) for clock in self._clocks()}
+            segments = segments_by_reset(self.source.columns[self.channels.time.key].values)
+            return replace(self, segments=segments, rows={0: _consecutive(segments)})
+        found = {clock: segments_by_reset(time) for clock, time in self._clocks().items()}
         counts = sorted({len(item) for item in found.values()})
         if len(counts) > 1:
             raise RecordingError(
@@ -248,78 +245,64 @@ class _CutLog:
                 f"{' and '.join(str(count - 1) for count in counts)}",
                 'cut it by a column: by = "column:NAME"',
             )
-        rows = {id(clock): _RunRows.consecutive(found[id(clock)], len(clock)) for clock in self._clocks()}
+        rows = {clock: _consecutive(segments) for clock, segments in found.items()}
         return replace(self, segments=next(iter(found.values())), rows=rows)
 
-    def _clocks(self) -> Iterator[FloatArray]:
-        """Yield each clock of the channels once."""
-        known: set[int] = set()
-        for item in self.channels.sources:
-            for key in item.keys:
-                time = self.source.columns[key].time
-                if time is not None and id(time) not in known:
-                    known.add(id(time))
-                    yield time
+    def _clocks(self) -> dict[int, FloatArray]:
+        """Return the clocks of the channels by their identity; empty for a table."""
+        columns = (self.source.columns[key] for item in self.channels.sources for key in item.keys)
+        return {id(column.time): column.time for column in columns if column.time is not None}
 
     @property
     def lengths(self) -> Rows:
         """The samples (r,) of each run, in the channel with most of them."""
-        counts = [item.counts for item in self.rows.values()]
+        counts = [list(map(len, rows)) for rows in self.rows.values()]
         return np.max(counts, axis=0) if counts else np.zeros(0, dtype=np.intp)
 
     def recording(self, run: int, name: str, digest: str) -> LoggedRecording:
         """Return a run as logged; raises RecordingError if a channel has no sample in it."""
         path = location(f"{self.path}{_MARK}{name}")
         source, first_row = self.source, self.source.first_row
+        times, start = self._times(run)
         columns: dict[str, Column] = {}
-        known: dict[int, FloatArray] = {}
         for key, column in source.columns.items():
-            rows = self.rows.get(id(column.time) if self.channels.topics else 0)
-            if rows is None:  # not of a channel
-                continue
-            time = column.time if self.channels.topics else None
-            if time is not None:
-                if id(time) not in known:
-                    known[id(time)] = rows.of(time, run)
-                time = known[id(time)]
-            columns[key] = replace(column, values=rows.of(column.values, run), time=time)
-        if first_row and 0 in self.rows:
-            first_row += int(self.segments.start[run])
-        columns, origin = self._from_start(run, columns)
-        part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=())
+            clock = id(column.time) if self.channels.topics else 0
+            if clock in self.rows:  # of a channel
+                columns[key] = replace(column, values=column.values[self.rows[clock][run]], time=times.get(clock))
+        if 0 in self.rows:
+            first_row += int(self.segments.start[run]) if first_row else 0
+            columns, start = self._from_start(columns)
         channels, absent = self._present(columns)
         mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
-        part = replace(part, findings=tuple(absent))
+        origin = source.origin + start
+        part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=tuple(absent))
         recording = assemble_recording(part, channels, self.machine_file.machine, mark)
         recording = replace(recording, name=f"{log_stem(self.path)}{_MARK}{name}")
         factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
         details = in_words(source.details, source.topics)
         return LoggedRecording(recording, factors, channels.speed_low_pass, source.format, details, source.dialect)
 
-    def _from_start(self, run: int, columns: dict[str, Column]) -> tuple[dict[str, Column], float]:
-        """Return the columns of a run with times from its own start if the log counts from its start; the new origin.
+    def _times(self, run: int) -> tuple[dict[int, FloatArray], float]:
+        """Return the times of a run by clock, and their start [s].
 
-        A message's time, and one that counts from an epoch, then is what it is in a file with this run alone.
+        A message's time, and one that counts from an epoch, is what it is in a file with this run alone: it counts from
+        the run's start.
         """
-        time, origin = self.channels.time, self.source.origin
-        if not self.channels.topics:
-            if not origin or time.column is None:
-                return columns, origin
-            clock = columns[time.key]
-            first = float(next(iter(clock.values[np.isfinite(clock.values)]), 0.0))
-            columns = columns | {time.key: replace(clock, values=clock.values - first)}
-            return columns, origin + first * time.factor
-        if not origin and not any(item.topic for item in self.channels.sources):
-            return columns, origin
-        starts = [float(column.time[0]) for column in columns.values() if column.time is not None and len(column.time)]
+        times = {clock: time[self.rows[clock][run]] for clock, time in self._clocks().items() if clock in self.rows}
+        if not self.source.origin and not any(item.topic for item in self.channels.sources):
+            return times, 0.0
+        starts = [float(time[0]) for time in times.values() if len(time)]
         first = float(self.begins[run]) if self.begins is not None else min(starts, default=0.0)
-        shifted: dict[int, FloatArray] = {}
-        for key, column in columns.items():
-            if column.time is not None:
-                if id(column.time) not in shifted:
-                    shifted[id(column.time)] = column.time - first
-                columns[key] = replace(column, time=shifted[id(column.time)])
-        return columns, origin + first
+        return {clock: time - first for clock, time in times.items()}, first
+
+    def _from_start(self, columns: dict[str, Column]) -> tuple[dict[str, Column], float]:
+        """Return the columns of a run of a table, whose clock counts from its start if the log's counts from one."""
+        time = self.channels.time
+        if not self.source.origin or time.column is None:
+            return columns, 0.0
+        clock = columns[time.key]
+        first = float(next(iter(clock.values[np.isfinite(clock.values)]), 0.0))
+        return columns | {time.key: replace(clock, values=clock.values - first)}, first * time.factor
 
     def _present(self, columns: Mapping[str, Column]) -> tuple[ChannelMap, list[Finding]]:
         """Return the map without ground truth that has no sample in a run, each with a note."""
@@ -328,7 +311,10 @@ class _CutLog:
             for item in self.channels.sources
             if item.channel in GROUND_TRUTH and not all(len(columns[key].values) for key in item.keys)
         ]
-        notes = [Finding(AbsentTruth("column", item.described, ""), item.channel, "note") for item in absent]
+        notes = [
+            Finding("absent_truth", item.channel, {"what": "column", "name": item.described, "similar": ""})
+            for item in absent
+        ]
         sources = tuple(item for item in self.channels.sources if item not in absent)
         return replace(self.channels, sources=sources), notes
 
@@ -336,14 +322,13 @@ class _CutLog:
         """Yield a warning for each clock with samples that are in no run."""
         if self.cut.by == "clock-reset":
             return
+        columns = self.source.columns
+        channels = {id(columns[item.keys[0]].time): item.channel for item in reversed(self.channels.sources)}
+        totals = {id(column.time) if self.channels.topics else 0: len(column.values) for column in columns.values()}
         for clock, rows in self.rows.items():
-            if rows.outside:
-                fact = SamplesOutsideRuns(rows.outside, rows.total, self.cut.column)
-                yield Finding(fact, self._channel(clock) if self.channels.topics else "")
-
-    def _channel(self, clock: int) -> str:
-        of = (item for item in self.channels.sources if id(self.source.columns[item.keys[0]].time) == clock)
-        return next((item.channel for item in of), "")
+            if outside := totals[clock] - sum(map(len, rows)):
+                fact = {"count": outside, "total": totals[clock], "column": self.cut.column}
+                yield Finding("samples_outside_runs", channels.get(clock, "") if self.channels.topics else "", fact)
 
     def no_run(self, longest: int) -> RecordingError:
         """Return the error for a log without a run that can be used."""
@@ -358,49 +343,18 @@ class _CutLog:
         )
 
 
-@dataclass(frozen=True)
-class _RunRows:
-    """The rows of one clock by run: from `begins` (r,) up to, not including, `stops` (r,).
+def _consecutive(segments: Segments) -> list[Rows]:
+    """Return the rows of runs of consecutive rows."""
+    return [np.arange(start, stop) for start, stop in zip(segments.start, segments.stop, strict=True)]
 
-    `order` (total,) sorts the rows by run; None if they are in this order.
-    """
 
-    order: Rows | None
-    begins: Rows
-    stops: Rows
-    total: int
-
-    @classmethod
-    def consecutive(cls, segments: Segments, total: int) -> _RunRows:
-        """Return the rows of runs of consecutive rows."""
-        return cls(None, segments.start, segments.stop, total)
-
-    @classmethod
-    def between(cls, time: FloatArray, begins: FloatArray, ends: FloatArray) -> _RunRows:
-        """Return the rows whose time [s] is at least the beginning of a run (r,) and below its end (r,)."""
-        run = np.searchsorted(begins, time, side="right") - 1
-        inside = (run >= 0) & (time < np.append(ends, -np.inf)[run])  # run -1 is the last one, which is -inf
-        run[~inside] = len(begins)
-        order = None if np.all(run[1:] >= run[:-1]) else np.argsort(run, kind="stable")
-        ordered = run if order is None else run[order]
-        numbers = np.arange(len(begins))
-        first, stop = (np.searchsorted(ordered, numbers, side=side) for side in ("left", "right"))
-        return cls(order, first, stop, len(time))
-
-    @property
-    def counts(self) -> Rows:
-        """The number of rows (r,) of each run."""
-        return self.stops - self.begins
-
-    @property
-    def outside(self) -> int:
-        """The number of rows in no run."""
-        return self.total - int(self.counts.sum())
-
-    def of(self, values: FloatArray, run: int) -> FloatArray:
-        """Return the values in a run, in the order of the file."""
-        rows = slice(int(self.begins[run]), int(self.stops[run]))
-        return values[rows] if self.order is None else values[self.order[rows]]
+def _between(time: FloatArray, begins: FloatArray, ends: FloatArray) -> list[Rows]:
+    """Return the rows whose time [s] is at least the beginning of a run (r,) and below its end (r,)."""
+    run = np.searchsorted(begins, time, side="right") - 1
+    inside = (run >= 0) & (time < np.append(ends, -np.inf)[run])  # run -1 is the last one, which is -inf
+    run[~inside] = len(begins)
+    order = np.argsort(run, kind="stable")
+    return np.split(order, np.searchsorted(run[order], np.arange(1, len(begins) + 1)))[: len(begins)]
 
 
 def _none() -> Segments:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -154,10 +155,9 @@ def _wraps(before: float, after: float, usual: float) -> bool:
 
 def _occurrences(ids: FloatArray) -> Rows:
     """Return for each id how many equal ones are before it (r,)."""
-    _, group = np.unique(ids, return_inverse=True)
-    order = np.argsort(group, kind="stable")
-    ordered = group[order]
-    first = np.searchsorted(ordered, ordered)
+    before: Counter[float] = Counter()
     number = np.empty(len(ids), dtype=np.intp)
-    number[order] = np.arange(len(ids)) - first
+    for i, each in enumerate(ids.tolist()):
+        number[i] = before[each]
+        before[each] += 1
     return number

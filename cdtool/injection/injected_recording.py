@@ -10,7 +10,6 @@ import numpy as np
 from cdtool.dynamics import Machine
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.injection import InjectedContactFact
 from cdtool.injection.channel_change import ChannelChange
 from cdtool.recording import FloatArray, Recording, Series
 
@@ -58,8 +57,13 @@ def injected_recording(
     if "force" not in channels:
         clock = _clock(channels)
         channels["force"] = Series(clock, force.at(clock), machine.accepted_units("force")[0])
-    fact = InjectedContactFact(force.start, float(np.max(force.values)))
-    return replace(logged, channels=channels, findings=(*logged.findings, Finding(fact, "force", "note")), digest="")
+    fact = {"start": force.start, "peak": float(np.max(force.values))}
+    return replace(
+        logged,
+        channels=channels,
+        findings=(*logged.findings, Finding("injected_contact_fact", "force", fact)),
+        digest="",
+    )
 
 
 def _clock(channels: Mapping[str, Series]) -> FloatArray:

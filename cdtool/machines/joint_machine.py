@@ -14,7 +14,6 @@ import numpy as np
 
 from cdtool.clock import differentiate, integrate, previous_value
 from cdtool.findings import Finding
-from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference, SpeedWithoutValue
 from cdtool.recording import RIG_UNITS, UNITLESS, FloatArray, Recording, Series
 from cdtool.tables import Table
 
@@ -127,16 +126,16 @@ class JointMachine:
         channels = {name: self._referred(name, series) for name, series in recording.channels.items()}
         findings = list(recording.findings)
         if {"speed", "position"} <= channels.keys() and not np.isfinite(channels["speed"].values).any():
-            findings.append(Finding(SpeedWithoutValue(), "speed"))
+            findings.append(Finding("speed_without_value", "speed"))
         if "speed" not in channels and "position" in channels:
             channels["speed"] = differentiate(channels["position"], speed_low_pass, self.speed_unit)
-            findings.append(Finding(DerivedSpeed(speed_low_pass), "speed", "note"))
+            findings.append(Finding("derived_speed", "speed", {"low_pass": speed_low_pass}))
         if "position" not in channels and "speed" in channels and self.derives_position:
             channels["position"] = integrate(channels["speed"], self.load_units["position"])
-            findings.append(Finding(IntegratedPosition(), "position", "note"))
+            findings.append(Finding("integrated_position", "position"))
         if "reference_position" not in channels and "reference_speed" in channels and self.derives_position:
             channels["reference_position"] = self._integrated_reference(channels)
-            findings.append(Finding(IntegratedReference(), "reference_position", "note"))
+            findings.append(Finding("integrated_reference", "reference_position"))
         return replace(recording, channels=channels, findings=tuple(findings))
 
     def _integrated_reference(self, channels: Mapping[str, Series]) -> Series:

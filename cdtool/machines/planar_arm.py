@@ -11,7 +11,6 @@ from cdtool.clock import previous_value
 from cdtool.dynamics import JointEquation, Pendulum
 from cdtool.errors import ConfigurationError, RecordingError, nearest
 from cdtool.findings import Finding
-from cdtool.findings.channels import LinkAccelerations
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import FloatArray, Recording, Series
 from cdtool.tables import Table
@@ -48,7 +47,7 @@ class PlanarArm(CoupledMachine):
         keys = cls.drive_keys(table, cls.link_names)
         if len(keys["joints"]) != _LINKS:
             raise table.fault("joints", f"names {len(keys['joints'])} joints", "a planar arm has 2: arm and forearm")
-        return cls(
+        arm = cls(
             **keys,
             link_mass=table.numbers("link_mass", _LINKS, above=0.0),
             link_length=table.number("link_length", above=0.0),
@@ -57,6 +56,10 @@ class PlanarArm(CoupledMachine):
             imu_position=table.numbers("imu_position", _LINKS, 0.0, minimum=0.0),
             gravity_acceleration=table.number("gravity", 9.81, minimum=0.0),
         )
+        if not arm.nominal_inertia[1] > 0.0:
+            problem = f"joint '{arm.joints[1]}' moves no inertia"
+            raise table.fault("link_inertia", problem, "give it, its centre_of_mass, or motor_inertia")
+        return arm
 
     @property
     def nominal_inertia(self) -> FloatArray:
@@ -168,7 +171,7 @@ class PlanarArm(CoupledMachine):
                 "give the sensors' distances from their joints [m], or accelerations in rad/s2",
             )
         channels = {**referred.channels, "acceleration": self.link_acceleration(referred)}
-        findings = (*referred.findings, Finding(LinkAccelerations(), "acceleration", "note"))
+        findings = (*referred.findings, Finding("link_accelerations", "acceleration"))
         return replace(referred, channels=channels, findings=findings)
 
     def link_acceleration(self, recording: Recording) -> Series:

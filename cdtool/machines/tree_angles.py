@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from cdtool.instructions import widest_vectors
 from cdtool.kernels import kernel
 from cdtool.machines.tree_rows import BLOCK, COSINE, OFFSET, ROW, SINE, SLOT
 from cdtool.recording import FloatArray
@@ -22,7 +21,6 @@ def fill_sine_cosine(pair: FloatArray, slides: float) -> None:
 
     q = k pi + r with |r| <= pi/2: sin q = (-1)^k sin r, cos q = (-1)^k cos r, each by its Taylor series.
     """
-    widest_vectors()
     if slides != 0.0:
         for j in range(BLOCK):
             pair[SLOT + SINE + j] = 0.0

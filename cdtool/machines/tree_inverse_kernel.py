@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from cdtool.instructions import widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.machines.tree_angles import fill_sine_cosine
 from cdtool.machines.tree_rows import (
@@ -70,7 +69,6 @@ def _carry_acceleration(body: FloatArray, pair: FloatArray) -> None:
     dw = E dw_p + w x z qd + z qdd, dv = E (dv_p + dw_p x t) + v x z qd for a joint that turns; one that slides has
     dv + w x z qd + z qdd. f = m dv + dw x s + w x l, n = I dw + s x dv + w x k + v x l.
     """
-    widest_vectors()
     inverse, inertia = inverse_rotation_of(body), inertia_of(body)
     mass, moment, (tx, ty, tz) = body[MASS], vector_of(body, MOMENT), vector_of(body, TRANSLATION)
     slides = body[SLIDES]
@@ -108,7 +106,6 @@ def _joint_torque(body: FloatArray, pair: FloatArray) -> None:
 
     Force and torque, in place of l and k, are added to the parent's: l_p += R l, k_p += R (k + t x l).
     """
-    widest_vectors()
     slides, drive = body[SLIDES], body[DRIVE]
     turns = 1.0 - slides
     rotation, (tx, ty, tz) = rotation_of(body), vector_of(body, TRANSLATION)
@@ -148,7 +145,6 @@ def _sweep(
     torque: FloatArray,
 ) -> None:
     """As `sweep_inverse_dynamics`, with the work space, whose base has its acceleration."""
-    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.instructions import part_of, widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.machines.tree_angles import fill_sine_cosine
 from cdtool.machines.tree_rows import (
@@ -77,7 +76,6 @@ def _carry_motion(body: FloatArray, pair: FloatArray) -> None:
     w = E w_p + z qd, v = E (v_p + w_p x t), g = E g_p; l = m v + w x s, k = I w + s x v. A joint that slides adds z qd
     to v instead.
     """
-    widest_vectors()
     inverse, inertia = inverse_rotation_of(body), inertia_of(body)
     mass, moment, (tx, ty, tz) = body[MASS], vector_of(body, MOMENT), vector_of(body, TRANSLATION)
     slides = body[SLIDES]
@@ -100,7 +98,6 @@ def _carry_motion(body: FloatArray, pair: FloatArray) -> None:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _carry_twist(body: FloatArray, pair: FloatArray) -> None:
     """As `_carry_motion` without gravity and first moment: what the momentum alone needs."""
-    widest_vectors()
     inverse, inertia = inverse_rotation_of(body), inertia_of(body)
     mass, moment, (tx, ty, tz) = body[MASS], vector_of(body, MOMENT), vector_of(body, TRANSLATION)
     slides = body[SLIDES]
@@ -121,7 +118,6 @@ def _carry_twist(body: FloatArray, pair: FloatArray) -> None:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _joint_momentum(body: FloatArray, pair: FloatArray) -> None:
     """p of a joint as in `_joint_terms`, and l and k added to its parent's as in `carry_load`."""
-    widest_vectors()
     slides, drive = body[SLIDES], body[DRIVE]
     turns = 1.0 - slides
     rotation, (tx, ty, tz) = rotation_of(body), vector_of(body, TRANSLATION)
@@ -142,7 +138,6 @@ def _joint_terms(body: FloatArray, pair: FloatArray) -> None:
 
     Turning: p = z.k, C^T qd = z.(l x v + k x w), g = -z.(s x g_vec); sliding: z.l, z.(l x w), -m z.g_vec.
     """
-    widest_vectors()
     slides, drive, mass = body[SLIDES], body[DRIVE], body[MOVED_MASS]
     turns = 1.0 - slides
     for j in range(BLOCK):
@@ -203,7 +198,6 @@ def _sweep_momentum_alone(
     fault: FloatArray,
     momentum: FloatArray,
 ) -> None:
-    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)
@@ -244,7 +238,6 @@ def _sweep(
     potential: FloatArray,
 ) -> None:
     """Momentum, velocity force and gravity, or else the energies: of the results those that are not empty."""
-    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)
@@ -301,7 +294,6 @@ def _times_transposed(r: Matrix, s: Matrix) -> Matrix:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _put_body(body: FloatArray, pair: FloatArray) -> None:
     """The joint's own body, added to what its children gave it."""
-    widest_vectors()
     moment = vector_of(body, MOMENT)
     upper, lower = vector_of(body, INERTIA), vector_of(body, INERTIA + 3)
     for j in range(BLOCK):
@@ -316,7 +308,6 @@ def _unit_momentum(body: FloatArray, pair: FloatArray) -> None:
 
     Turning: l = z x s, k = I z; sliding: l = m z, k = s x z.
     """
-    widest_vectors()
     slides, drive, mass = body[SLIDES], body[DRIVE], body[MOVED_MASS]
     turns = 1.0 - slides
     for j in range(BLOCK):
@@ -333,7 +324,6 @@ def _carry_body(body: FloatArray, pair: FloatArray) -> None:
 
     Turned about z and moved by d: s + m d, and I + 2 (s.d) E - s d' - d s' + m (d.d E - d d'); then turned by R.
     """
-    widest_vectors()
     rotation = rotation_of(body)
     mass, (tx, ty, tz) = body[MOVED_MASS], vector_of(body, TRANSLATION)
     for j in range(BLOCK):
@@ -364,7 +354,6 @@ def _carry_body(body: FloatArray, pair: FloatArray) -> None:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _carry_momentum(body: FloatArray, pair: FloatArray) -> None:
     """The momentum of one column of M, from a joint's frame into its parent's: R l, R (k + t x l)."""
-    widest_vectors()
     rotation = rotation_of(body)
     tx, ty, tz = vector_of(body, TRANSLATION)
     for j in range(BLOCK):
@@ -376,7 +365,7 @@ def _carry_momentum(body: FloatArray, pair: FloatArray) -> None:
         put_vector(pair, V + j, times(rotation, angular))
 
 
-@kernel(f"void({ROW}, int64, {_MATRICES}, int64, int64, int64, int64, {ROW})", inline=True)
+@kernel(f"void({ROW}, int64, {_MATRICES}, int64, int64, int64, int64, {ROW})")
 def _give_element(
     rows: FloatArray,
     first: int,
@@ -388,20 +377,8 @@ def _give_element(
     fault: FloatArray,
 ) -> None:
     """An element of M and its mirror image, NaN where the sample has a fault."""
-    size = matrix.shape[1]
-    elements = size * size
-    samples = part_of(matrix, begin * elements, count * elements)
-    own, mirrored = row * size + column, column * size + row
-    if count == BLOCK:
-        for j in range(BLOCK):
-            value = rows[first + j] + fault[j]
-            samples[j * elements + own] = value
-            samples[j * elements + mirrored] = value
-    else:
-        for j in range(count):
-            value = rows[first + j] + fault[j]
-            samples[j * elements + own] = value
-            samples[j * elements + mirrored] = value
+    for j in range(count):
+        matrix[begin + j, row, column] = matrix[begin + j, column, row] = rows[first + j] + fault[j]
 
 
 @kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_TABLE}, {ROW}, {ROW}, {TABLE}, {_MATRICES})")
@@ -414,7 +391,6 @@ def _sweep_bodies(
     diagonal: FloatArray,
     matrix: FloatArray,
 ) -> None:
-    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)
@@ -439,11 +415,8 @@ def _sweep_bodies(
             give_column(pair, TERMS, diagonal, route[i, COLUMN], begin, count, fault)
         if len(matrix) == 0:
             continue
-        elements = matrix.shape[1] * matrix.shape[2]
         for j in range(count):
-            own = part_of(matrix, (begin + j) * elements, elements)
-            for element in range(elements):
-                own[element] = fault[j]
+            matrix[begin + j] = fault[j]
         # Outward: the momentum of a column overwrites those of the columns before it.
         for i in range(len(bodies)):
             column, of = route[i, COLUMN], i

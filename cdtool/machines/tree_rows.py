@@ -17,7 +17,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.instructions import LANES, add_products, aligned_zeros, part_of, widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
 
@@ -51,23 +50,22 @@ MATRIX = "UniTuple(float64, 9)"
 
 
 def work_space(route: IndexArray, first: int, base: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Slots for a sweep, with a vector in the base's slot from row `first` on; a row of faults and one of zeros."""
-    slots = aligned_zeros((int(route[:, BEFORE].max()) + 2) * SLOT)
+    """Slots for a sweep, with a vector in the base's slot from row `first` on; a row of faults."""
+    slots = np.zeros((int(route[:, BEFORE].max()) + 2) * SLOT)
     slots[first : first + 3 * BLOCK] = np.repeat(base, BLOCK)
-    return slots, aligned_zeros(2 * BLOCK)
+    return slots, np.zeros(BLOCK)
 
 
-@kernel(f"{ROW}({ROW}, int64)", inline=True)
+@kernel(f"{ROW}({ROW}, int64)")
 def pair_of(slots: FloatArray, before: int) -> FloatArray:
     """The slot before a joint's own, and its own."""
-    pair: FloatArray = part_of(slots, before * SLOT, 2 * SLOT)
-    return pair
+    return slots[before * SLOT : (before + 2) * SLOT]
 
 
-@kernel(f"{READ_ONLY}({READ_TABLE}, int64)", inline=True)
+@kernel(f"{READ_ONLY}({READ_TABLE}, int64)")
 def body_of(bodies: FloatArray, joint: int) -> FloatArray:
     """The constants of a joint."""
-    body: FloatArray = part_of(bodies, joint * CONSTANTS, CONSTANTS)
+    body: FloatArray = bodies[joint]
     return body
 
 
@@ -143,38 +141,25 @@ def inverse_rotation_of(body: FloatArray) -> Matrix:
     return body[0], body[3], body[6], body[1], body[4], body[7], body[2], body[5], body[8]
 
 
-@kernel(f"void({READ_TABLE}, int64, int64, int64, {ROW}, int64, {ROW})", inline=True)
+@kernel(f"void({READ_TABLE}, int64, int64, int64, {ROW}, int64, {ROW})")
 def take_column(
     values: FloatArray, column: int, begin: int, count: int, pair: FloatArray, row: int, fault: FloatArray
 ) -> None:
     """One column of a recording into a row; `fault` becomes NaN where a value is not finite."""
-    joints = values.shape[1]
-    samples = part_of(values, begin * joints + column, (count - 1) * joints + 1)
-    # Of a whole block, the number of samples is known at compile time.
-    if count == BLOCK:
-        for j in range(BLOCK):
-            pair[SLOT + row + j] = samples[j * joints]
-    else:
-        for j in range(count):
-            pair[SLOT + row + j] = samples[j * joints]
+    for j in range(count):
+        pair[SLOT + row + j] = values[begin + j, column]
     # A value times 0 is NaN if it is not finite, else 0.
-    for j in range(0, BLOCK, LANES):
-        add_products(fault, j, pair, SLOT + row + j, fault, BLOCK + j, 1)
+    for j in range(BLOCK):
+        fault[j] += 0.0 * pair[SLOT + row + j]
 
 
-@kernel(f"void({ROW}, int64, {TABLE}, int64, int64, int64, {ROW})", inline=True)
+@kernel(f"void({ROW}, int64, {TABLE}, int64, int64, int64, {ROW})")
 def give_column(
     pair: FloatArray, row: int, values: FloatArray, column: int, begin: int, count: int, fault: FloatArray
 ) -> None:
     """A row into one column of a result, NaN where the sample has a fault."""
-    joints = values.shape[1]
-    samples = part_of(values, begin * joints + column, (count - 1) * joints + 1)
-    if count == BLOCK:
-        for j in range(BLOCK):
-            samples[j * joints] = pair[SLOT + row + j] + fault[j]
-    else:
-        for j in range(count):
-            samples[j * joints] = pair[SLOT + row + j] + fault[j]
+    for j in range(count):
+        values[begin + j, column] = pair[SLOT + row + j] + fault[j]
 
 
 @kernel(f"void({ROW}, {ROW})")
@@ -205,7 +190,6 @@ def return_load(slots: FloatArray, origin: int, copy: int) -> None:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def carry_load(body: FloatArray, pair: FloatArray) -> None:
     """What a joint moves, added to its parent's load: l_p += R l, k_p += R (k + t x l), s_p += R (s + m t)."""
-    widest_vectors()
     rotation = rotation_of(body)
     mass, (tx, ty, tz) = body[MOVED_MASS], vector_of(body, TRANSLATION)
     for j in range(BLOCK):

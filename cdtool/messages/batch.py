@@ -1,4 +1,4 @@
-"""A batch of undecoded messages of one channel, in one buffer."""
+"""Undecoded messages of one channel, in one buffer, the same for every container format."""
 
 from __future__ import annotations
 
@@ -14,10 +14,24 @@ _SEQUENCE, _PUBLISH_TIME = 20, 8
 
 
 @dataclass(frozen=True)
+class Stream:
+    """A channel, identified by its number in the log; several channels may write to one topic.
+
+    `encoding` is the encoding of the messages, such as `cdr`. `definition` is their schema: its language, such as
+    `ros2msg`, the message type, such as `sensor_msgs/msg/JointState`, and its text; all three are empty if unknown.
+    """
+
+    id: int
+    topic: str
+    encoding: str
+    definition: tuple[str, str, bytes]
+
+
+@dataclass(frozen=True)
 class Batch:
     """Messages of one channel in the order of the file, in one buffer.
 
-    `data` (bytes,) uint8 is a decompressed chunk or a section of the file. `start` and `length` (n,) int64 locate the
+    `data` (bytes,) uint8 are decompressed chunks or a section of the file. `start` and `length` (n,) int64 locate the
     payload of each message in it. `log_time` (n,) uint64 is in ns.
     """
 
@@ -32,24 +46,25 @@ class Batch:
     @property
     def publish_time(self) -> npt.NDArray[np.uint64]:
         """Publish times (n,) in ns, read from the message records."""
-        return self._before(_PUBLISH_TIME, "<u8").astype(np.uint64)
+        return numbers_at(self.data, self.start - _PUBLISH_TIME, "<u8")
 
     @property
     def sequence(self) -> npt.NDArray[np.uint32]:
         """Sequence numbers (n,), read from the message records."""
-        return self._before(_SEQUENCE, "<u4").astype(np.uint32)
+        return numbers_at(self.data, self.start - _SEQUENCE, "<u4")
 
-    def first(self, count: int) -> Batch:
-        """Return a batch of the first `count` messages."""
-        cut = slice(count)
-        return Batch(self.data, self.start[cut], self.length[cut], self.log_time[cut])
+    def payload(self, row: int) -> bytes:
+        """Return the bytes of one message."""
+        return self.data[self.start[row] : self.start[row] + self.length[row]].tobytes()
 
-    def _before(self, distance: int, dtype: str) -> npt.NDArray[Any]:
-        """Return the number `distance` bytes before each payload."""
-        count = len(self.data) + 1 - np.dtype(dtype).itemsize
-        # A number starting at every byte: unaligned reads without a copy per message.
-        overlapping: npt.NDArray[Any] = np.ndarray((max(0, count),), dtype, self.data, strides=(1,))
-        return overlapping[self.start - distance]
+    def rows(self, rows: slice | npt.NDArray[np.intp]) -> Batch:
+        """Return a batch of these messages."""
+        return Batch(self.data, self.start[rows], self.length[rows], self.log_time[rows])
 
 
-NO_BATCH = Batch(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.uint64))
+def numbers_at(data: npt.NDArray[np.uint8], at: npt.NDArray[np.int64], dtype: str) -> npt.NDArray[Any]:
+    """Return the number that begins at each of these bytes, which must exist."""
+    count = max(0, len(data) + 1 - np.dtype(dtype).itemsize)
+    # A number starting at every byte: unaligned reads without a copy per message.
+    overlapping: npt.NDArray[Any] = np.ndarray((count,), dtype, data, strides=(1,))
+    return overlapping[at]

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 from cdtool.errors import RecordingError, nearest
@@ -16,6 +15,8 @@ LONGEST_ARRAY = 16  # a survey lists only arrays up to this length
 STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # members of a header stamp: ROS 2, Gazebo, ROS 1
 
 Value = float | list[float] | None
+# In place of a nested message that is not there: all its numbers are NaN.
+NO_MESSAGE = object()
 
 
 class FieldMissingError(Exception):
@@ -52,13 +53,15 @@ class Field:
         value = message
         for name, index in self.steps:
             parent = value
+            if parent is NO_MESSAGE:
+                return [] if self.whole else math.nan
             value = _member(parent, name)
             if index is None:
                 continue
             if not _is_array(value):
                 raise FieldMissingError(f"'{name}' is not an array", [name])
             if index == ":":
-                return self._in_order(value, _element_names(parent), joints)
+                return self._in_order(value, element_names(parent), joints)
             element = _element_number(index, name, value, parent)
             if element is None:
                 return None
@@ -67,7 +70,7 @@ class Field:
             value = value[element]
         if _is_array(value):
             raise FieldMissingError(f"'{self.text}' is an array", [f"{self.text}[0]", f"{self.text}[:]"])
-        return _number(value, self.text)
+        return math.nan if value is NO_MESSAGE else _number(value, self.text)
 
     def _in_order(self, array: Any, names: Sequence[str], joints: Sequence[str]) -> list[float]:
         """Return a whole array's numbers, in the order of the joints if its elements are named."""
@@ -87,7 +90,7 @@ def _element_number(index: str, name: str, array: Any, parent: Any) -> int | Non
         return int(index)
     if not _is_array(_member(parent, "name")):
         raise FieldMissingError("'name' is not an array", ["name"])
-    names = _element_names(parent)
+    names = element_names(parent)
     return names.index(index) if index in names else None
 
 
@@ -128,8 +131,8 @@ def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[flo
     return found
 
 
-def header_stamp(message: Any) -> int | None:
-    """Return the header's time stamp [ns]; None if the message has no header stamp."""
+def stamp_parts(message: Any) -> tuple[Any, Any] | None:
+    """Return seconds and nanoseconds of the header's time stamp; None if the message has no header stamp."""
     try:
         stamp = _member(_member(message, "header"), "stamp")
     except FieldMissingError:
@@ -137,7 +140,7 @@ def header_stamp(message: Any) -> int | None:
     for seconds, nanoseconds in STAMPS:
         names = _member_names(stamp)
         if seconds in names and nanoseconds in names:
-            return int(_member(stamp, seconds)) * 10**9 + int(_member(stamp, nanoseconds))
+            return _member(stamp, seconds), _member(stamp, nanoseconds)
     return None
 
 
@@ -146,11 +149,9 @@ def missing_field(where: str, text: str, fault: FieldMissingError) -> RecordingE
     return RecordingError(f"{where}: no field '{text}': {fault.problem}", fault.advice or nearest(text, fault.known))
 
 
-def _element_names(message: Any) -> list[str]:
-    return _texts(_member(message, "name")) if "name" in _member_names(message) else []
-
-
-def _texts(names: Any) -> list[str]:
+def element_names(message: Any) -> list[str]:
+    """Return the texts of the array `name`, which name the elements of the arrays next to it."""
+    names = _member(message, "name") if "name" in _member_names(message) else ()
     return [str(name) for name in names] if _is_array(names) else []
 
 
@@ -178,22 +179,14 @@ def joint_order(count: int, names: Sequence[str], joints: Sequence[str]) -> list
 
 
 def _member(value: Any, name: str) -> Any:
-    if isinstance(value, dict):
-        if name in value:
-            return value[name]
-    elif name in _member_names(value):
-        return getattr(value, name)
     known = _member_names(value)
-    raise FieldMissingError(f"there is no '{name}'", known)
+    if name not in known:
+        raise FieldMissingError(f"there is no '{name}'", known)
+    return value[name]
 
 
-def _member_names(value: Any) -> Sequence[str]:
-    if isinstance(value, dict):
-        return [str(name) for name in value]
-    # The ROS 2 decoder creates a class for each message type, with the fields as slots.
-    if isinstance(value, SimpleNamespace):
-        return tuple(getattr(type(value), "__slots__", ())) or tuple(vars(value))
-    return ()
+def _member_names(value: Any) -> list[str]:
+    return list(value) if isinstance(value, dict) else []
 
 
 def _is_array(value: Any) -> bool:
@@ -207,6 +200,9 @@ def _is_number(value: Any) -> bool:
 def _number(value: Any, text: str) -> float:
     if value is None:  # JSON's null
         return math.nan
+    if isinstance(value, dict):
+        known = [f"{text}.{name}" for name in _member_names(value)]
+        raise FieldMissingError(f"'{text}' has members, it is not a number", known)
     if not _is_number(value):
         raise FieldMissingError(f"'{text}' contains {str(value)[:40]!r}, not a number")
     return _float(value)

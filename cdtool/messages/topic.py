@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,23 +15,33 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
-from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
-from cdtool.kernels import kernel
-from cdtool.messages.batch import Batch
-from cdtool.messages.column_memory import ColumnMemory
-from cdtool.messages.columns import FieldValues
-from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch
+from cdtool.messages.batch import Batch, Stream
+from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch, FieldValues
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.fields import FieldMissingError, missing_field, parse_field
+from cdtool.messages.fields import FieldMissingError, element_names, missing_field, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps
-from cdtool.messages.stream import Stream
 from cdtool.recording import GROUND_TRUTH, BoolArray, FloatArray
 
+# The messages in which the names of other joints are looked for.
+_FIRST = 10
 # A field's values in a batch, and which messages name other joints only. Values are None for an array that has been
 # empty so far, so that its width is unknown; the mask is None if no message names other joints only.
 Values = tuple[FloatArray | None, BoolArray | None]
-# The time stamps [ns] of a batch's messages, and each field's values.
-BatchValues = tuple[Stamps, dict[str, Values]]
+
+
+class BatchValues(NamedTuple):
+    """The time stamps [ns] of a batch's messages, and each field's values."""
+
+    stamps: Stamps
+    values: dict[str, Values]
+
+
+class FieldRows(NamedTuple):
+    """One field in a batch's messages that name its joints: time stamps [ns], exact times [s] if the log has them."""
+
+    stamps: Stamps
+    exact: FloatArray | None
+    values: FloatArray | None
 
 
 class WantedField:
@@ -47,41 +57,36 @@ class WantedField:
         self.widths: Counter[int] = Counter()
         self.width: int | None = None  # of the first array that is not empty
 
-    def count(self, messages: int, widths: Counter[int]) -> None:
-        """Count messages that have the field, and the widths of their arrays."""
-        self.found += messages
+    def add(self, field_values: FieldValues, whole: BoolArray) -> Values:
+        """Return the values of a batch's decoded messages (`whole`), and count them."""
+        values, other = field_values.values[whole], field_values.state[whole] == OTHER_JOINTS
+        elsewhere = int(np.count_nonzero(other))
+        self.elsewhere += elsewhere
+        self.found += len(values) - elsewhere
+        if field_values.count is None:
+            return values, other if elsewhere else None
+        widths = count_values(field_values.count[whole][~other])
+        self.widths.update(widths)
         if self.width is None:
             self.width = next((width for width in widths if width > 0), None)
-        self.widths.update(widths)
-
-    def add(self, field_values: FieldValues, whole: BoolArray, all_whole: bool) -> Values:
-        """Return the values of a batch's decoded messages (`whole`), and count them."""
-        values, count, other = field_values.values, field_values.count, None
-        if not (field_values.uniform and all_whole):
-            elsewhere = field_values.state == OTHER_JOINTS
-            if not all_whole:
-                values, elsewhere, count = values[whole], elsewhere[whole], None if count is None else count[whole]
-            if elsewhere.any():
-                other, count = elsewhere, None if count is None else count[~elsewhere]
-                self.elsewhere += int(np.count_nonzero(elsewhere))
-        found = len(values) - (0 if other is None else int(np.count_nonzero(other)))
-        self.count(found, Counter() if count is None else count_values(count))
-        if field_values.count is None:
-            return values, other
-        if self.width is None:
-            return None, other
-        return values if values.shape[1:] == (self.width,) else np.full((len(values), self.width), np.nan), other
+        if self.width is not None and values.shape[1:] != (self.width,):
+            values = np.full((len(values), self.width), np.nan)
+        return None if self.width is None else values, other if elsewhere else None
 
 
 class Topic:
     """The wanted fields of a topic, batch by batch.
 
-    `texts` are the fields in the field language; whole arrays with named elements are in the order of `joints`.
+    `texts` are the fields in the field language; whole arrays with named elements are in the order of `joints`. `exact`
+    is the field with the time [s] of each message, if the log's time stamps are rounded.
     """
 
-    def __init__(self, path: Path, topic: str, texts: Iterable[str], clock: str, joints: Sequence[str]) -> None:
+    def __init__(
+        self, path: Path, topic: str, texts: Iterable[str], clock: str, joints: Sequence[str], exact: str = ""
+    ) -> None:
         self.where, self.topic, self.clock, self.joints = f"{path}: {topic}", topic, clock, joints
-        self.fields = {text: WantedField(text, self.where) for text in texts}
+        self.exact = exact
+        self.fields = {text: WantedField(text, self.where) for text in (*texts, *([exact] if exact else ()))}
         self.wanted = [each.field for each in self.fields.values()]
         self.decoders, self.orders = Decoders(), StampOrders(topic)
         self.first_stamp: int | None = None  # [ns], by the chosen clock
@@ -93,26 +98,37 @@ class Topic:
         Raises RecordingError if a field or the header's time stamp is missing.
         """
         by_header = self.clock == "header"
-        outcome = self.decoders.decode(self.where, stream, batch, self.wanted, self.joints, stamps=by_header)
-        if outcome is None:
+        decoded = self.decoders.attempt(
+            stream, batch, lambda decoder: decoder.decode(batch, self.wanted, self.joints, by_header)
+        )
+        if decoded is None:
             return None
-        decoder, decoded = outcome
         whole = self.decoders.keep(decoded)
         self._check(decoded, whole)
         stamps: Stamps = batch.log_time if self.clock == "log" else batch.publish_time
         if by_header and decoded.stamps is not None:
             stamps = decoded.stamps
-        all_whole = bool(whole.all())
-        stamps = stamps if all_whole else stamps[whole]
+        stamps = stamps[whole]
         self.orders.add(stream.id, stamps)
         if self.first_stamp is None and len(stamps):
             self.first_stamp = int(stamps[0])
         values: dict[str, Values] = {}
         for (text, each), field_values in zip(self.fields.items(), decoded.fields, strict=True):
-            values[text] = each.add(field_values, whole, all_whole)
+            values[text] = each.add(field_values, whole)
             if each.elsewhere and not each.names:
-                each.names = decoder.names(batch, each.field)
-        return stamps, values
+                first = batch.rows(slice(_FIRST))
+                contents = self.decoders.attempt(stream, first, lambda decoder, first=first: decoder.contents(first))  # type: ignore[misc]
+                each.names = sorted({name for content in contents or () for name in element_names(content)})
+        return BatchValues(stamps, values)
+
+    def rows_of(self, decoded: BatchValues, text: str) -> FieldRows:
+        """Return one field of the messages that name its joints."""
+        (values, other), stamps = decoded.values[text], decoded.stamps
+        exact = decoded.values[self.exact][0] if self.exact else None
+        if other is not None:
+            stamps = stamps[~other]
+            values, exact = (None if each is None else each[~other] for each in (values, exact))
+        return FieldRows(stamps, exact, values)
 
     def _check(self, decoded: DecodedBatch, whole: BoolArray) -> None:
         """Raise RecordingError for the first message without a field or without the header's time stamp.
@@ -141,7 +157,7 @@ class Topic:
         if each.elsewhere:
             if not each.found:
                 raise missing_field(self.where, text, FieldMissingError("no message names this joint", each.names))
-            findings.append(Finding(OtherJointsOnly(each.elsewhere), name, "note"))
+            findings.append(Finding("other_joints_only", name, {"count": each.elsewhere}))
         widths = each.widths - Counter({0: each.widths[0]})
         if len(widths) > 1:
             lengths = ", ".join(f"{width} in {count}" for width, count in widths.most_common())
@@ -150,7 +166,7 @@ class Topic:
                 "select one element, e.g. position[0]",
             )
         if each.widths[0]:
-            findings.append(Finding(EmptyArrays(each.widths[0]), name))
+            findings.append(Finding("empty_arrays", name, {"count": each.widths[0]}))
         shape = (0, each.width or 1) if each.widths else (0,)
         return Column(name, np.empty(shape), np.empty(0)), findings
 
@@ -158,18 +174,13 @@ class Topic:
 _Topic = TypeVar("_Topic", bound=Topic)
 
 
-def wanted_topics(
-    path: Path, wanted: ChannelMap, make: Callable[..., _Topic], also: Sequence[str] = ()
-) -> dict[str, _Topic]:
-    """Return the topics that a map names, each with its fields and those of `also`.
-
-    `make` creates a topic; its parameters are those of Topic.
-    """
+def wanted_topics(path: Path, wanted: ChannelMap, make: Callable[..., _Topic], exact: str = "") -> dict[str, _Topic]:
+    """Return the topics that a map names, each with its fields; `make` has the parameters of Topic."""
     texts: dict[str, dict[str, None]] = {}
     for source in wanted.sources:
         texts.setdefault(source.topic, {})[source.field] = None
     clock, joints = wanted.time.clock, wanted.joint_names
-    return {name: make(path, name, fields | dict.fromkeys(also), clock, joints) for name, fields in texts.items()}
+    return {name: make(path, name, fields, clock, joints, exact) for name, fields in texts.items()}
 
 
 def wanted_columns(
@@ -220,34 +231,20 @@ def count_values(counts: npt.NDArray[np.int64]) -> Counter[int]:
 
 
 def sort_times(
-    stamps: Stamps, origin: int, memory: ColumnMemory | None = None
+    stamps: Stamps, origin: int, exact: FloatArray | None = None
 ) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
-    """Return times [s] after `origin` [ns] in ascending order, and the order; None if they are already ascending."""
-    time: FloatArray = np.empty(len(stamps)) if memory is None else memory.empty((len(stamps),))
-    earliest = min(max(origin, int(np.iinfo(stamps.dtype).min)), int(np.iinfo(stamps.dtype).max))
-    words = np.ascontiguousarray(stamps).view(np.uint64)
-    zero = np.uint64(earliest % 2**64)
-    if _seconds_after(words, np.uint64(origin % 2**64), zero, stamps.dtype.kind == "i", time):
-        return time, None
-    order = np.argsort(time, kind="stable")
-    return time[order], order
+    """Return times [s] after `origin` [ns] in ascending order, and the order; None if they are already ascending.
 
-
-@kernel("b1(Array(uint64, 1, 'C', readonly=True), uint64, uint64, b1, float64[::1])")
-def _seconds_after(stamps: npt.NDArray[np.uint64], origin: int, earliest: int, signed: bool, time: FloatArray) -> bool:
-    """Write the times [s] of `stamps` [ns] after `origin` to `time` (n,); return whether they are ascending.
-
-    The difference is between integers, as an epoch in ns has more digits than a float64; it may need all 64 bits.
-    Stamps below `earliest` are before the origin. `signed`: the words are int64.
+    With `exact` times [s] these are returned, in the order of the stamps. The difference is between integers, as an
+    epoch in ns has more digits than a float64; it may need all 64 bits.
     """
-    early = 0  # whether any stamp is before the origin; a sum, so that the loop needs no branch
-    for i in range(stamps.size):
-        early += int(np.int64(stamps[i]) < np.int64(earliest) if signed else stamps[i] < earliest)
-        time[i] = np.float64(stamps[i] - origin) / 1e9
-    for i in range(stamps.size if early else 0):
-        if np.int64(stamps[i]) < np.int64(earliest) if signed else stamps[i] < earliest:
-            time[i] = -(np.float64(~(stamps[i] - origin) + np.uint64(1)) / 1e9)
-    descending = 0
-    for i in range(1, stamps.size):
-        descending += int(time[i] < time[i - 1])
-    return descending == 0
+    after = np.ascontiguousarray(stamps).view(np.uint64) - np.uint64(origin % 2**64)
+    limits = np.iinfo(stamps.dtype)
+    early = stamps < np.clip(origin, limits.min, limits.max).astype(stamps.dtype)
+    time: FloatArray = after.astype(np.float64)
+    time[early] = -((~after[early] + np.uint64(1)).astype(np.float64))
+    time /= 1e9
+    if not (time[1:] < time[:-1]).any():
+        return time if exact is None else exact, None
+    order = np.argsort(time, kind="stable")
+    return (time if exact is None else exact)[order], order

@@ -12,15 +12,12 @@ from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import HeaderDelay, HeaderUnset
-from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.messages.batch import Batch
-from cdtool.messages.columns.decoded_batch import ABSENT, DecodedBatch, FieldValues, UndecodableError
+from cdtool.messages.batch import Batch, Stream
+from cdtool.messages.decoded_batch import ABSENT, DecodedBatch, Decoder, FieldValues
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import Field, parse_field
 from cdtool.messages.stamp_order import StampOrders
-from cdtool.messages.stream import Stream
 from cdtool.messages.topic import count_values, sort_times
 from cdtool.recording import FloatArray
 
@@ -49,29 +46,25 @@ class TopicSurvey:
         longest = int(batch.length.max()) if len(batch) else 1
         some = max(1, _LONGEST_BATCH // max(1, longest))
         for start in range(0, len(batch), some):
-            rows = slice(start, start + some)
-            part = Batch(batch.data, batch.start[rows], batch.length[rows], batch.log_time[rows])
+            part = batch.rows(slice(start, start + some))
             if (piece := self._piece(stream, part, origin)) is not None:
                 yield piece
 
     def _piece(self, stream: Stream, batch: Batch, origin: int) -> Piece | None:
-        decoder = self.decoders.of(stream, batch)
-        if decoder is None:
-            return None
         fields = dict(self._fields)
-        for name in decoder.fields(batch):
-            if name not in fields and (parsed := _parsed(name)) is not None:
-                fields[name] = parsed
-        try:
-            decoded = decoder.decode(batch, list(fields.values()), stamps=True)
-        except UndecodableError as fault:
-            self.decoders.give_up(stream, batch, fault)
+
+        def read(decoder: Decoder) -> DecodedBatch:
+            fields.update({name: parsed for name in decoder.fields(batch) if (parsed := _parsed(name)) is not None})
+            return decoder.decode(batch, list(fields.values()), stamps=True)
+
+        decoded = self.decoders.attempt(stream, batch, read)
+        if decoded is None:
             return None
         self._widths |= {name: Counter() for name in fields.keys() - self._fields.keys()}
         self._fields = fields
         whole = self.decoders.keep(decoded)
         self._add_stamps(batch, decoded, whole)
-        stamps = batch.log_time if whole.all() else batch.log_time[whole]
+        stamps = batch.log_time[whole]
         self._orders.add(stream.id, stamps)
         time, order = sort_times(stamps, origin)
         values: dict[str, FloatArray] = {}
@@ -93,11 +86,9 @@ class TopicSurvey:
 
     def _column(self, name: str, field_values: FieldValues, whole: npt.NDArray[np.bool_]) -> FloatArray | None:
         """Return the field's values, NaN where a message does not have it; None if no message so far has it."""
-        values, count, present = field_values.values, field_values.count, field_values.state != ABSENT
-        if not whole.all():
-            values, present, count = values[whole], present[whole], None if count is None else count[whole]
-        widths = self._widths[name]
-        if count is not None:
+        values, present, widths = field_values.values[whole], field_values.state[whole] != ABSENT, self._widths[name]
+        if field_values.count is not None:
+            count = field_values.count[whole]
             present &= (count >= 0) & (count <= _LONGEST_ARRAY)
             filled = count_values(count[present & (count > 0)])
             if filled:
@@ -122,7 +113,7 @@ class TopicSurvey:
         for name in self._fields:
             widths, full = self._widths[name], f"{self.topic} {name}"
             if len(widths) > 1:
-                findings.append(Finding(ArrayLengthsDiffer(tuple(sorted(widths))), full, "note"))
+                findings.append(Finding("array_lengths_differ", full, {"lengths": tuple(sorted(widths))}))
             elif widths:
                 findings += rounding_finding(full, self._rounded[name], "note")
                 columns[full] = Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
@@ -132,9 +123,9 @@ class TopicSurvey:
         if not self._is_late:
             return []
         if not self._stamped:
-            return [Finding(HeaderUnset(), self.topic, "note")]
+            return [Finding("header_unset", self.topic)]
         low, median, high = (self._late.percentile(percent) for percent in (5, 50, 95))
-        return [Finding(HeaderDelay(median, low, high), self.topic, "note")]
+        return [Finding("header_delay", self.topic, {"median": median, "low": low, "high": high})]
 
 
 def _parsed(name: str) -> Field | None:

@@ -9,7 +9,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.speed_course import SpeedCourse, fitting_samples
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
@@ -138,37 +137,12 @@ def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
     """Return the mean speed (n,) over `seconds` about each sample: travel by time, so that jitter of stamps cancels."""
     if len(time) < 2:
         return speed
-    mean = np.empty(len(time))
-    _average(np.ascontiguousarray(time), np.ascontiguousarray(speed), 0.5 * seconds, mean)
-    return mean
-
-
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[::1])", exact=True)
-def _average(time: FloatArray, speed: FloatArray, half: float, mean: FloatArray) -> None:
-    """Fill the mean speed over `half` [s] before and after each sample."""
-    count = len(time)
     # The first step is unknown: the second replaces it, so that the first sample counts too.
-    ends = np.empty(count + 1)
-    travel = np.empty(count + 1)
-    ends[0], travel[0] = time[0] - (time[1] - time[0]), 0.0
-    for k in range(count):
-        ends[k + 1] = time[k]
-        moved = (time[max(k, 1)] - time[max(k, 1) - 1]) * speed[k]
-        travel[k + 1] = travel[k] + moved if k else moved
-    first = 0
-    last = 0
-    for k in range(count):
-        before, after = max(time[k] - half, ends[0]), min(time[k] + half, ends[count])
-        while first < count and ends[first + 1] <= before:
-            first += 1
-        while last < count and ends[last + 1] <= after:
-            last += 1
-        start, end = travel[first], travel[last]
-        if ends[first] != before:
-            start += (travel[first + 1] - travel[first]) / (ends[first + 1] - ends[first]) * (before - ends[first])
-        if ends[last] != after:
-            end += (travel[last + 1] - travel[last]) / (ends[last + 1] - ends[last]) * (after - ends[last])
-        mean[k] = (end - start) / (after - before)
+    steps = np.diff(time)
+    ends = np.concatenate(([time[0] - steps[0]], time))
+    travel = np.concatenate(([0.0], np.cumsum(np.concatenate((steps[:1], steps)) * speed)))
+    before, after = np.maximum(time - 0.5 * seconds, ends[0]), np.minimum(time + 0.5 * seconds, ends[-1])
+    return np.asarray((np.interp(after, ends, travel) - np.interp(before, ends, travel)) / (after - before))
 
 
 def _class_of(time: FloatArray, speed: FloatArray, joint: int, period: float) -> MotionClass:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.clock import previous_value
-from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.short_repr import short_repr
 
@@ -70,60 +69,31 @@ def _progress(
     speed = recording["speed"]
     forward = np.ascontiguousarray(speed.values[:, joint])
     starts, runs = _begin(speed.time, forward, direction, start_speed, running_speed)
-    elapsed, travel = np.empty(len(clock)), np.empty(len(clock))
-    running = np.empty(len(clock), dtype=np.bool_)
-    # Without a motion no position is needed.
-    moves = not math.isnan(starts)
-    position = np.ascontiguousarray(previous_value(recording["position"], clock)[:, joint]) if moves else np.empty(0)
-    _advance(np.ascontiguousarray(clock), position, direction, starts, runs, elapsed, travel, running)
+    moves = clock >= starts
+    elapsed = np.where(moves, clock - starts, np.nan)
+    travel, running = np.full(len(clock), np.nan), clock >= runs
+    if moves.any():  # otherwise no position is needed
+        with np.errstate(invalid="ignore"):
+            along = direction * previous_value(recording["position"], clock)[moves, joint]
+        furthest = np.maximum.accumulate(np.where(np.isnan(along), -np.inf, along))
+        first = along[np.isfinite(along).argmax()]
+        reached = np.isfinite(furthest)
+        travel[np.flatnonzero(moves)[reached]] = furthest[reached] - first
     for part in (elapsed, travel, running):
         part.flags.writeable = False
     return Progress(elapsed, travel, running)
 
 
-@kernel(f"UniTuple(float64, 2)({READ_ONLY}, {READ_ONLY}, float64, float64, float64)")
 def _begin(
-    time: FloatArray, speed: FloatArray, direction: float, start_speed: float, running_speed: float
+    time: FloatArray, speed: FloatArray, direction: int, start_speed: float, running_speed: float
 ) -> tuple[float, float]:
     """Return when the motion is confirmed to have begun, and when it first runs from there on [s]; NaN: never."""
-    starts = math.nan
-    moving = 0
-    for k in range(len(time)):
-        forward = direction * speed[k]
-        if math.isnan(starts):
-            moving = moving + 1 if forward >= start_speed else 0
-            if moving >= CONFIRM:
-                starts = time[k]
-        if time[k] >= starts and forward >= running_speed:
-            return starts, time[k]
-    return starts, math.nan
-
-
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64, float64, float64[::1], float64[::1], b1[::1])", exact=True)
-def _advance(  # noqa: PLR0913  kernels take arrays and scalars separately
-    clock: FloatArray,
-    position: FloatArray,
-    direction: float,
-    starts: float,
-    runs: float,
-    elapsed: FloatArray,
-    travel: FloatArray,
-    running: BoolArray,
-) -> None:
-    """Fill the progress of a motion that begins at `starts` and runs from `runs` on [s]; NaN: it does not."""
-    furthest = -math.inf
-    first = math.nan
-    for k in range(len(clock)):
-        elapsed[k] = math.nan
-        travel[k] = math.nan
-        running[k] = clock[k] >= runs
-        if not clock[k] >= starts:
-            continue
-        elapsed[k] = clock[k] - starts
-        along = direction * position[k]
-        if along > furthest:
-            furthest = along
-        if math.isnan(first) and math.isfinite(along):
-            first = along
-        if math.isfinite(furthest):
-            travel[k] = furthest - first
+    with np.errstate(invalid="ignore"):  # 0 times infinity
+        forward = direction * speed
+    moving = np.cumsum(np.concatenate(([0], forward >= start_speed)))
+    confirmed = np.flatnonzero(moving[CONFIRM:] - moving[:-CONFIRM] == CONFIRM)
+    if not len(confirmed):
+        return math.nan, math.nan
+    starts = int(confirmed[0]) + CONFIRM - 1
+    runs = np.flatnonzero(forward[starts:] >= running_speed)
+    return float(time[starts]), float(time[starts + runs[0]]) if len(runs) else math.nan

@@ -12,7 +12,7 @@ import numpy as np
 
 from cdtool.clock import integrate
 from cdtool.derived import SendsFields
-from cdtool.kernels import READ_ONLY, kernel, read_only
+from cdtool.kernels import READ_ONLY, fields_of, kernel, read_only
 from cdtool.motion.progress import ALIGNMENTS, CONFIRM, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -223,8 +223,8 @@ _NO_CURVES = Curves(_NOTHING, _NOTHING, _NOTHING, time_points=0.0, travel_end=0.
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), Expected, Curves, "
-    "b1[::1], b1[::1])",
+    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(Expected)}, "
+    f"{fields_of(Curves)}, b1[::1], b1[::1])",
     exact=True,
 )
 def fit_course(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one

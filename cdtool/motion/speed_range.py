@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cdtool.derived import SendsFields
-from cdtool.kernels import READ_ONLY, kernel, read_only
+from cdtool.kernels import READ_ONLY, fields_of, kernel, read_only
 from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.progress import CONFIRM, RUNNING_SHARE, START_SHARE
 from cdtool.motion.speed_course import SLOW, SPREADS, TOLERANCE, stroke_progress
@@ -160,8 +160,8 @@ def in_ranges(classes: Sequence[MotionClass]) -> list[list[int]]:
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, Courses, {_TABLE}, {_TABLE}, b1[::1], b1[::1], "
-    "float64[::1])",
+    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {fields_of(Courses)}, {_TABLE}, {_TABLE}, b1[::1], "
+    "b1[::1], float64[::1])",
 )
 def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,

@@ -14,7 +14,6 @@ from cdtool.detection import Status
 from cdtool.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
 from cdtool.evaluation.frames import OUTCOMES, rows_as_frame
 from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
-from cdtool.frozen import frozen
 from cdtool.html_table import html_table
 from cdtool.near_attributes import NearAttributes
 from cdtool.notebook.log_by_name import UnknownLogError, number_of
@@ -36,7 +35,7 @@ _Settings = ParamSpec("_Settings")
 VERDICTS = ("alarm", "no alarm", "not_assessable")
 
 
-@frozen
+@dataclass(frozen=True)
 class AlarmRow:
     """One alarm: a row of `DetectionResult.alarms`."""
 
@@ -51,7 +50,7 @@ class AlarmRow:
     contact_onset_s: float | None
 
 
-@frozen
+@dataclass(frozen=True)
 class OperationRow:
     """The verdict on one operation: a row of `DetectionResult.summary()`."""
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from cdtool.findings import Finding
-from cdtool.findings.plausibility import ChannelCheck
+from cdtool.plausibility.check import ChannelCheck
 from cdtool.plausibility.windows import windows_of
 from cdtool.recording import FloatArray, Recording
 
@@ -65,7 +65,7 @@ def derivative_checks(recordings: Sequence[Recording], channel: str, other: str)
                 still = float(np.mean(np.abs(change[seen, j]) < _STILL * expected[seen]))
                 if still > _ODD:  # no ratio shows it: at rest there is no ratio
                     check = replace(check, answer="contradicts", found="still", share=still)
-        yield Finding(check, channel, "loss" if check.answer == "contradicts" else "note")
+        yield check.finding()
 
 
 def _ratios(path: FloatArray, of_path: float, change: FloatArray, of_change: float) -> FloatArray:

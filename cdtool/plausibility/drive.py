@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.dynamics import Machine
 from cdtool.findings import Finding
-from cdtool.findings.plausibility import Answer, ChannelCheck
+from cdtool.plausibility.check import Answer, ChannelCheck
 from cdtool.plausibility.windows import Windows, windows_of
 from cdtool.recording import BoolArray, FloatArray, Recording
 
@@ -78,7 +78,7 @@ def drive_checks(recordings: Sequence[Recording], machine: Machine) -> Iterator[
     for item in checks:
         if item in against:
             item = replace(item, answer="contradicts", found="friction") if is_sure else replace(item, found="unclear")
-        yield Finding(item, "torque", "loss" if item.answer == "contradicts" else "note")
+        yield item.finding()
 
 
 def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) -> Iterator[ChannelCheck]:

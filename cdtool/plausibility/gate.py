@@ -11,8 +11,6 @@ from dataclasses import replace
 
 from cdtool.dynamics import Machine
 from cdtool.findings import Finding
-from cdtool.findings.channels import DerivedSpeed, IntegratedPosition
-from cdtool.findings.plausibility import Confirmed
 from cdtool.plausibility.derivatives import derivative_checks
 from cdtool.plausibility.drive import drive_checks
 from cdtool.recording import Recording
@@ -38,8 +36,8 @@ def check_channels(recordings: Sequence[Recording], machine: Machine) -> tuple[F
     --------
     >>> import cdtool
     >>> machine = cdtool.read_machine_file("sample_logs/gate/machine.toml")
-    >>> log = cdtool.read("sample_logs/gate/free/01.csv", machine)
-    >>> [(item.channel, item.fact.answer) for item in check_channels([log], machine.machine)][0]
+    >>> log = cdtool.read("sample_logs/gate/free/03.csv", machine)
+    >>> [(item.channel, item.numbers["answer"]) for item in check_channels([log], machine.machine)][0]
     ('speed', 'agrees')
     """
     found = derivatives(recordings)
@@ -59,7 +57,7 @@ def derivatives(recordings: Sequence[Recording]) -> list[Finding]:
     measured = [
         item
         for item in _with("speed", recordings)
-        if not any(isinstance(found.fact, DerivedSpeed | IntegratedPosition) for found in item.findings)
+        if not any(found.kind in ("derived_speed", "integrated_position") for found in item.findings)
     ]
     found = list(derivative_checks(measured, "speed", "position"))
     if any(item.severity == "loss" for item in found):
@@ -73,5 +71,5 @@ def _with(channel: str, recordings: Sequence[Recording]) -> list[Recording]:
         item
         for item in recordings
         if {"speed", channel} <= item.channels.keys()
-        and not any(found.channel == channel and isinstance(found.fact, Confirmed) for found in item.findings)
+        and not any(found.channel == channel and found.kind == "confirmed" for found in item.findings)
     ]

@@ -35,7 +35,7 @@ TABLE = "float64[:, ::1]"
 ROW = "float64[::1]"
 
 
-@kernel(f"void({TABLE}, {TABLE}, {ROW}, {TABLE})", entry=True)
+@kernel(f"void({TABLE}, {TABLE}, {ROW}, {TABLE})")
 def place_bodies(bodies: Array, combination: Array, position: Array, work: Array) -> None:
     """Fill the frames of the work space (J, WORK) for machine positions (J,)."""
     count = len(bodies)
@@ -78,7 +78,7 @@ def place_bodies(bodies: Array, combination: Array, position: Array, work: Array
             work[i, _ORIGIN + row] = place
 
 
-@kernel(f"void({TABLE}, {TABLE}, {ROW}, UniTuple(float64, 3), {TABLE}, {TABLE}, {ROW})", entry=True)
+@kernel(f"void({TABLE}, {TABLE}, {ROW}, UniTuple(float64, 3), {TABLE}, {TABLE}, {ROW})")
 def fill_dynamics(
     bodies: Array,
     combination: Array,
@@ -216,7 +216,6 @@ def fill_dynamics(
 
 @kernel(
     f"float64({TABLE}, {TABLE}, int64, UniTuple(float64, 3), UniTuple(float64, 3), {TABLE}, {ROW})",
-    entry=True,
 )
 def fill_lever(
     bodies: Array,

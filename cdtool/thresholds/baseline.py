@@ -12,7 +12,6 @@ import numpy as np
 from cdtool.detection import Band, Signal, Status
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.median_kernel import quantile_of
 from cdtool.motion.evident_motion import evident_speed
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.settings import check_above, check_sides
@@ -247,7 +246,6 @@ def _first_seconds(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scala
                 seconds += picked_step[i]
         count = kept
         if seconds >= warm_up - _ROUNDING and count >= _FEWEST:
-            middle = quantile_of(picked[:count].copy(), count, 0.5)
-            low = quantile_of(picked[:count].copy(), count, _BELOW)
+            middle = np.quantile(picked[:count], 0.5)
             since = time[k]
-            width = 0.5 * (quantile_of(picked[:count].copy(), count, _ABOVE) - low)
+            width = 0.5 * (np.quantile(picked[:count], _ABOVE) - np.quantile(picked[:count], _BELOW))

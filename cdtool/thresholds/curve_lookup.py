@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.kernels import READ_ONLY, fields_of, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 # More grid steps than a number holds exactly: the nearest grid point is then the first.
@@ -29,7 +29,7 @@ class LearnedColumn(NamedTuple):
     infinite: float
 
 
-@kernel("float64(float64, float64, float64, float64, float64)", exact=True, inline=True)
+@kernel("float64(float64, float64, float64, float64, float64)", exact=True)
 def _between(value: float, after: float, slope: float, since: float, until: float) -> float:
     """Return the straight line from a value to the one `after` it, at `since` from the first, `until` the second."""
     result = slope * since + value
@@ -41,7 +41,7 @@ def _between(value: float, after: float, slope: float, since: float, until: floa
 
 
 @kernel(
-    f"void({READ_ONLY}, Array(bool, 1, 'C', readonly=True), boolean, LearnedColumn, float64, float64, "
+    f"void({READ_ONLY}, Array(bool, 1, 'C', readonly=True), boolean, {fields_of(LearnedColumn)}, float64, float64, "
     "float64[::1], float64[::1])",
     exact=True,
 )

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from cdtool.derived import SendsFields
 from cdtool.detection import Band, Signal, Status, StatusArray
 from cdtool.errors import SignatureError, UsageError, nearest
-from cdtool.kernels import READ_ONLY, kernel, read_only
+from cdtool.kernels import READ_ONLY, fields_of, kernel, read_only
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.speed_course import SpeedCourse
@@ -340,7 +340,8 @@ def known(what: str, value: Any, allowed: Sequence[str]) -> str:
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), Grids, int32[::1], int32[::1], float64[::1])",
+    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(Grids)}, int32[::1], int32[::1], "
+    "float64[::1])",
     exact=True,
 )
 def locate(  # noqa: C901  a kernel: one loop, arrays one by one

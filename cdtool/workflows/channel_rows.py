@@ -7,12 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.pieces import MappedLog, open_mapped_log
-from cdtool.ingest.channel_pieces import ChannelPieces
-from cdtool.ingest.reading import LogFolder, choose_format, read_as_logged
+from cdtool.ingest.reading import read_as_logged
 from cdtool.machine_file import MachineFile
 from cdtool.recording import FloatArray, Series
 
@@ -48,36 +45,6 @@ class ChannelRows:
         first = self._recording[channels[0]]
         columns = tuple(_header(channel, self._recording[channel]) for channel in channels)
         return Group(name, columns, len(first), True, float(first.time[0]), self._recording.joints)
-
-
-def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelPieces:
-    """Return the channels of a log or of its folder of parts: in pieces if the format supports it, else in memory.
-
-    Four cases are also read into memory: a coarse clock, which is fitted as one straight line, the torque of a duty
-    cycle, which needs the speed, a force of several fields, and one in a file beside the log. Raises RecordingError or
-    ConfigurationError.
-    """
-    folder = LogFolder.of(log) if log.is_dir() else None
-    files = (log,) if folder is None else folder.filled
-    mapped = machine_file.topics.sources
-    plain = bool(mapped) and not (machine_file.topics.beside or any(item.duty or item.fields for item in mapped))
-    logs = _mapped_logs(files, machine_file.topics) if plain else {}
-    if logs:
-        pieces = ChannelPieces(logs, machine_file, folder)
-        if not pieces.is_coarse:
-            return pieces
-    return ChannelRows(log, machine_file)
-
-
-def _mapped_logs(files: Sequence[Path], channels: ChannelMap) -> dict[Path, MappedLog]:
-    """Return the mapped fields of each file; empty if the format of one file cannot read mapped fields in pieces."""
-    logs: dict[Path, MappedLog] = {}
-    for path in files:
-        log = open_mapped_log(choose_format(path), path, channels)
-        if log is None:
-            return {}
-        logs[path] = log
-    return logs
 
 
 def _header(name: str, series: Series) -> Column:

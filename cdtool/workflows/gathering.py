@@ -23,8 +23,7 @@ from cdtool.evaluation.results import (
 from cdtool.evaluation.rows import Rows
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.findings import Finding, Remark
-from cdtool.findings.scoring import PlotsLeftOut
+from cdtool.findings import Finding, remark
 from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
@@ -96,7 +95,7 @@ class Gathering:
         self.forces = Rows(ForceResult)
         self.skipped = Rows(Skipped)
         self.findings = Rows(RecordingFinding)
-        self.findings += (RecordingFinding.of(str(setup.path), Finding(Remark(words))) for words in setup.migrated)
+        self.findings += (RecordingFinding.of(str(setup.path), remark(words)) for words in setup.migrated)
         self.findings += setup.rules_of("").findings
         # SHA-256 of the files beside the logs.
         self._beside: dict[str, str] = {}
@@ -274,7 +273,7 @@ class Gathering:
             hint = "" if first else "check with cdtool info"
             raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", hint)
         if self._choice.left_out:
-            left_out = Finding(PlotsLeftOut(self._choice.left_out))
+            left_out = Finding("plots_left_out", "", {"count": self._choice.left_out})
             self.findings.append(RecordingFinding.of(str(self.setup.path), left_out))
         profiles = {name: group.force for name, group in self.setup.impacts.items()}
         return Results(

@@ -17,19 +17,7 @@ from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.evaluation.truth.force_vector import with_scalar_force
-from cdtool.findings import Fact, Finding, worst_first
-from cdtool.findings.clocks import (
-    BackwardClock,
-    CoarseClock,
-    CoarseStamps,
-    DroppedStamps,
-    EmptyClock,
-    Jitter,
-    NoClock,
-    StandingClock,
-    SteadyHeader,
-)
-from cdtool.findings.truth import InProgress
+from cdtool.findings import Finding, worst_first
 from cdtool.formats.source import Source, in_words
 from cdtool.ingest.clock_guess import ReadColumn, TableClock, is_clock_name
 from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
@@ -178,7 +166,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     recording = with_scalar_force(recording, rules.onset)
     contacts = any_contacts(recording, rules)
     findings = list(log_findings(recording, contacts, rules.onset))
-    findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
+    findings += [Finding("in_progress", "force", {"end": item.end}) for item in contacts if item.in_progress]
     findings += check_channels([before_contact(recording, contacts)], machine_file.machine)
     findings += placeholder_findings(recording, machine_file)
     findings += _steady_header(log, machine_file, findings)
@@ -193,7 +181,7 @@ def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Find
     """Return the advice to use the stamps in the headers of messages, if these are regular and the log's are not."""
     from cdtool.ingest.reading import read_recording
 
-    jittery = [item.channel for item in findings if isinstance(item.fact, Jitter) and item.channel != "time"]
+    jittery = [item.channel for item in findings if item.kind == "jitter" and item.channel != "time"]
     time = machine_file.topics.time
     if not jittery or time.clock == "header":
         return []
@@ -202,8 +190,20 @@ def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Find
         found = read_recording(log, replace(machine_file, topics=topics)).findings
     except RecordingError:  # messages without a header, or with one that is never set
         return []
-    is_steady = not any(isinstance(item.fact, Jitter | CoarseClock | DroppedStamps) for item in found)
-    return [Finding(SteadyHeader(), ", ".join(jittery))] if is_steady else []
+    is_steady = not any(
+        item.kind
+        in (
+            "jitter",
+            "coarse_clock",
+            "repeated_stamps",
+            "unknown_stamps",
+            "stray_stamps",
+            "stuck_stamps",
+            "backward_stamps",
+        )
+        for item in found
+    )
+    return [Finding("steady_header", ", ".join(jittery))] if is_steady else []
 
 
 def common_latencies(surveys: Sequence[Info]) -> list[Finding]:
@@ -263,11 +263,10 @@ def _clock_doubts(
     tables = [column for column in source.columns.values() if column.time is None and column.values.ndim == 1]
     found = list(_named_ones(tables, statistics, read_column, clock))
     if tables and clock is None:
-        found.append(Finding(NoClock()))
+        found.append(Finding("no_clock"))
     for name, known in clocks.items():
-        doubt = _doubt(known.steps, named=False) if name and known.rows > 2 else None
-        if doubt:
-            found.append(Finding(doubt, f"{name} time"))
+        if name and known.rows > 2 and (doubt := _doubt(known.steps, f"{name} time", named=False)):
+            found.append(doubt)
     return found
 
 
@@ -283,17 +282,17 @@ def _named_ones(
             steps.add(np.diff(known))
             last = known[-1:]
         forward = statistics[column.name]
-        if doubt := _doubt(steps, named=True):
-            yield Finding(doubt, column.name)
+        if doubt := _doubt(steps, column.name, named=True):
+            yield doubt
         elif forward.present == 0:
-            yield Finding(EmptyClock(), column.name)
+            yield Finding("empty_clock", column.name)
         elif clock is None and forward.forward < forward.steps:
-            yield Finding(BackwardClock(forward.steps - forward.forward), column.name)
+            yield Finding("backward_clock", column.name, {"steps": forward.steps - forward.forward})
 
 
-def _doubt(steps: Distribution, *, named: bool) -> Fact | None:
+def _doubt(steps: Distribution, name: str, *, named: bool) -> Finding | None:
     """Return the problem with the steps of a clock, or None; `named`: a column with the name of a clock."""
     repeated = steps.share(0.0, 0.0) if steps.count else 0.0
     if repeated >= 1.0:
-        return StandingClock(steps.count + 1, named)
-    return CoarseStamps(repeated, named) if repeated > COARSE_SHARE else None
+        return Finding("standing_clock", name, {"stamps": steps.count + 1, "named": named})
+    return Finding("coarse_stamps", name, {"share": repeated, "named": named}) if repeated > COARSE_SHARE else None

@@ -10,7 +10,6 @@ from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.truth.labels import CLOCKS, Labels, read_labels
 from cdtool.evaluation.truth.named_rows import by_recording
 from cdtool.findings import Finding
-from cdtool.findings.truth import RowsNotScored
 from cdtool.ingest.run_reading import split_run
 from cdtool.log_section import MARK_HINT, LogSection, Mark
 from cdtool.machine_file import MachineFile
@@ -153,5 +152,5 @@ def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Seque
             f"{path}: no row is about a scored recording: {first_of(strangers)}",
             f"give paths relative to the benchmark file, such as {recordings[0]}",
         )
-    note = Finding(RowsNotScored(first_of(strangers), recordings[0]), severity="note")
+    note = Finding("rows_not_scored", "", {"names": first_of(strangers), "scored": recordings[0]})
     return replace(labels, findings=(*labels.findings, note))

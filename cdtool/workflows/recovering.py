@@ -15,11 +15,10 @@ from cdtool.remote.remote_path import is_remote
 from cdtool.remote.uploads import check_place
 
 if TYPE_CHECKING:
-    from cdtool.formats.mcap.container.clean_file import CleanFile
-    from cdtool.formats.mcap.container.log import Log
+    from cdtool.formats.mcap.clean_file import CleanFile
+    from cdtool.formats.mcap.log import Log
     from cdtool.workflows.execution.workers import Progress
 
-_PIECE = 1 << 20
 _RECORD = "cdtool.recovered"
 
 
@@ -86,13 +85,13 @@ def recover(
     (False, True)
     """
     from cdtool.formats.mcap import Mcap
-    from cdtool.formats.mcap.container.log import Log
+    from cdtool.formats.mcap.log import Log
 
     _check_names(source, output, force)
     if not Mcap().sniff(source) and source.suffix.lower() != ".mcap":
         raise RecordingError(f"{source}: is not an MCAP file", "only MCAP files have checksums to recover by")
     surveyed = Log(source, strict=False)
-    for _ in surveyed.pieces():
+    for _ in surveyed.blocks():
         pass
     findings = surveyed.findings()
     if not surveyed.count:
@@ -113,13 +112,12 @@ def recover(
 def _write(
     source: Path, file: IO[bytes], result: Recovered, all_covered: bool, progress: Progress | None = None
 ) -> None:
-    from cdtool.formats.mcap.container.clean_file import CleanFile
-    from cdtool.formats.mcap.container.log import Log
-    from cdtool.formats.mcap.container.records import Metadata
+    from cdtool.formats.mcap.clean_file import CleanFile
+    from cdtool.formats.mcap.log import Log
 
     log = Log(source, strict=False)
     clean = CleanFile(file, log.profile)
-    for piece in log.pieces():
+    for piece in log.blocks():
         covered = [item for item in piece if all_covered or item.covered]
         if covered:
             clean.add_messages(covered, covered=True)
@@ -138,24 +136,24 @@ def _write(
         "lost": "\n".join(lost) or "nothing",
         "unverified": f"{result.unverified} messages in chunks without a checksum, {result.left_out} left out",
     }
-    clean.add_metadata(Metadata(_RECORD, told))
+    clean.add_metadata(_RECORD, told)
     clean.finish()
 
 
 def _copy_extras(log: Log, clean: CleanFile) -> None:
     """Copy intact attachments and metadata; their checksums are kept, missing ones stay missing."""
-    from cdtool.formats.mcap.container.attachments import attachment_index
-    from cdtool.formats.mcap.container.file_bytes import FileBytes
-    from cdtool.formats.mcap.container.records import PREFIX, Attachment, Metadata
+    from cdtool.formats.mcap.file_bytes import FileBytes
+    from cdtool.formats.mcap.records import PREFIX, Opcode, parse
 
     with FileBytes(log.path) as file:
         for opcode, at, length in log.section.extras:
-            if opcode == Attachment.opcode:
-                ends = range(at + _PIECE, at + length + _PIECE, _PIECE)
-                pieces = (bytes(file.read(end - _PIECE, min(end, at + length) - end + _PIECE)) for end in ends)
-                clean.add_attachment(pieces, attachment_index(file, at, length))
+            content = file.read(at + PREFIX, length - PREFIX)
+            record = parse(opcode, content)
+            if opcode == Opcode.ATTACHMENT:
+                crc = 32 + len(record.name.encode()) + len(record.media_type.encode()) + len(record.data)
+                clean.add_attachment(record, covered=any(content[crc : crc + 4]))
             else:
-                clean.add_metadata(Metadata.read(file.read(at + PREFIX, length - PREFIX)))
+                clean.add_metadata(record.name, record.metadata)
 
 
 def _check_names(source: Path, output: Path, force: bool) -> None:

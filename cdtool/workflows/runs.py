@@ -15,7 +15,6 @@ from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
-from cdtool.findings.channels import AbsentTruth, UnitContradicted
 from cdtool.ingest.reading import is_bag_folder, read_as_logged, read_recording
 from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
@@ -393,7 +392,7 @@ def absent_truth(recording: Recording) -> list[Finding]:
     return [
         item
         for item in recording.findings
-        if isinstance(item.fact, AbsentTruth | UnitContradicted)
+        if item.kind in ("absent_truth", "absent_file", "unit_contradicted")
         and item.channel in SHOWS_CONTACTS
         and item.channel not in recording
     ]
@@ -401,7 +400,7 @@ def absent_truth(recording: Recording) -> list[Finding]:
 
 def _refuse_doubted(path: Path, recording: Recording) -> None:
     for item in recording.findings:
-        if isinstance(item.fact, UnitContradicted) and item.severity == "loss" and item.channel in _LEARNED_FROM:
+        if item.kind == "unit_contradicted" and item.severity == "loss" and item.channel in _LEARNED_FROM:
             raise RecordingError(f"{path}: {item}")
 
 

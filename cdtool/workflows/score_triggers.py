@@ -19,8 +19,6 @@ from cdtool.evaluation.results import RecordingFinding, RecordingResult, Skipped
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.findings import Finding
-from cdtool.findings.scoring import RecordingsWithoutRow
-from cdtool.findings.truth import RowsNotScored
 from cdtool.ingest.run_reading import split_run
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
@@ -133,7 +131,7 @@ def _run(
             f"give paths relative to the benchmark file, such as {min(known)}",
         )
     if strangers:
-        note = Finding(RowsNotScored(first_of(strangers), min(known)), severity="note")
+        note = Finding("rows_not_scored", "", {"names": first_of(strangers), "scored": min(known)})
         gathered.findings.append(RecordingFinding.of(str(given.path), note))
     gathered.findings += measured
     if not runs:
@@ -209,8 +207,14 @@ def _unlisted(
     for detector, by_name in said.items():
         missing = sorted(set(known) - set(by_name))
         if missing:
-            fact = RecordingsWithoutRow(detector, len(missing), len(known), listed_only, missing[0])
-            found.append(RecordingFinding.of(str(path), Finding(fact)))
+            fact = {
+                "detector": detector,
+                "missing": len(missing),
+                "recordings": len(known),
+                "left_out": listed_only,
+                "first": missing[0],
+            }
+            found.append(RecordingFinding.of(str(path), Finding("recordings_without_row", "", fact)))
     return found
 
 

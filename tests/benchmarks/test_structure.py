@@ -180,7 +180,7 @@ def test_the_package_of_a_format_is_one_room_and_the_modules_beside_it_are_not(s
         return script.room_of(name, "pkg.formats", "pkg.messages")
 
     assert room("pkg.formats.csv.table") == room("pkg.formats.csv") == "pkg.formats.csv"
-    assert room("pkg.formats.mcap.container.log") == "pkg.formats.mcap"
+    assert room("pkg.formats.mcap.log") == "pkg.formats.mcap"
     assert room("pkg.formats.source") == "pkg.formats.source"
     assert room("pkg.messages.columns.cdr") == room("pkg.messages.fields") == room("pkg.messages") == "pkg.messages"
     assert room("pkg.clock.stamps") == "pkg.clock.stamps" and room("pkg.formats") == "pkg.formats"

@@ -105,5 +105,5 @@ def test_dimensions_of_a_matlab_file_beyond_every_float_are_one_line(tmp_path):
     content = bytearray(path.read_bytes())
     content[156:160] = (224).to_bytes(4, "little")  # the size of the dimensions: 56 of them
     path.write_bytes(content)
-    with pytest.raises(CdtoolError, match=r"log\.mat: unpacks to .* MiB, .* times its size: refused"):
+    with pytest.raises(CdtoolError, match=r"log\.mat: damaged at byte 128: a part of an array has 224 bytes"):
         read_variables(path)

@@ -10,9 +10,9 @@ import pytest
 
 import cdtool as api
 from cdtool.errors import SignatureError
-from cdtool.findings.channels import AbsentTruth
 from cdtool.formats.mcap.write import Stream, write_mcap
 from tests.command import cdtool
+from tests.findings.facts import fact_of
 
 CELL = "load_cell"
 
@@ -104,7 +104,10 @@ def test_a_misspelt_column_is_reported_with_the_nearest(gate_folder, tmp_path):
     (tmp_path / "machine.toml").write_text(text.replace(f'"{CELL}"', '"loadcell"'), encoding="utf-8")
     found = api.info(gate_folder / "stiff" / "01.csv", machine=tmp_path / "machine.toml")
     (note,) = [item for item in found.findings if item.channel == "force"]
-    assert note.severity == "note" and note.fact == AbsentTruth("column", "loadcell", CELL)
+    assert note.severity == "note" and fact_of(note) == (
+        "absent_truth",
+        {"what": "column", "name": "loadcell", "similar": CELL},
+    )
 
 
 def test_a_repeated_column_is_not_reported_as_missing(gate_folder, tmp_path):

@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.clock import HOLD_PERIODS, previous_value
+from cdtool.clock.held_samples import hold_last
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.clock.recent_steps import RECENT_STEPS
-from cdtool.detectors.base import held_on, hold_last, missing_after_first
+from cdtool.detectors.base import held_on, missing_after_first
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # Steps [ms]: jitter, lost samples, pauses and bursts.

@@ -9,18 +9,12 @@ import pytest
 
 from cdtool.clock.plausible_unit import contradicted_by_epoch, contradicted_by_steps
 from cdtool.errors import RecordingError
-from cdtool.findings.clocks import (
-    ClockUnitContradicted,
-    FileUnitImplausible,
-    HeaderUnitImplausible,
-    StepsImplausible,
-    TwoReadings,
-)
 from cdtool.ingest.reading import read_recording
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.information import info
 from tests.command import cdtool
 from tests.data_folder import data, needs_data
+from tests.findings.facts import fact_of
 
 MACHINE = """
 [machine]
@@ -36,7 +30,7 @@ position = {{ column = "x", unit = "m" }}
 EPOCHS = {"s": 1.6e9, "ms": 1.6e12, "us": 1.6e15}
 ONE = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 # The findings on a clock whose unit cannot be right.
-WRONG_UNIT = (ClockUnitContradicted, FileUnitImplausible, HeaderUnitImplausible, StepsImplausible)
+WRONG_UNIT = ("clock_unit_contradicted", "file_unit_implausible", "header_unit_implausible", "steps_implausible")
 
 
 def log(folder: Path, header: str, stamps: np.ndarray, name: str = "log.csv") -> Path:
@@ -67,15 +61,21 @@ def test_stamps_since_1970_that_cannot_be_in_the_stated_unit_are_refused_with_bo
 def test_a_wrong_header_is_not_reported_if_the_machine_file_states_the_right_unit(tmp_path):
     recording = read(tmp_path, "Time [sec]", "ms", 1.6e12 + np.arange(40.0))
     assert recording.duration == pytest.approx(0.039)
-    assert not [item for item in recording.findings if isinstance(item.fact, WRONG_UNIT)]
+    assert not [item for item in recording.findings if item.kind in WRONG_UNIT]
 
 
 def test_info_without_a_machine_file_uses_the_only_possible_unit_and_warns(tmp_path):
     shown = info(log(tmp_path, "Time [sec]", 1.6e12 + np.arange(2000.0)))
     assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(1000.0, rel=1e-3)] * len(shown.channels)
     (warning,) = [item for item in shown.findings if item.severity == "warning"]
-    readings = TwoReadings(1.6e12, "sec", pytest.approx(50702.0, abs=0.5), "ms", "2020-09-13")
-    assert warning.fact == HeaderUnitImplausible(readings) and warning.channel == "Time [sec]"
+    readings = {
+        "stamp": 1.6e12,
+        "stated": "sec",
+        "years": pytest.approx(50702.0, abs=0.5),
+        "meant": "ms",
+        "day": "2020-09-13",
+    }
+    assert fact_of(warning) == ("header_unit_implausible", {"readings": readings}) and warning.channel == "Time [sec]"
 
 
 def test_a_drafted_machine_file_does_not_contain_the_contradicted_unit(tmp_path):
@@ -88,10 +88,10 @@ def test_a_drafted_machine_file_does_not_contain_the_contradicted_unit(tmp_path)
 @pytest.mark.parametrize(("step", "unit", "likely"), [(1e3, "s", "us"), (1e6, "s", "ns"), (1.0, "ns", "ms")])
 def test_implausible_steps_are_a_warning_with_both_readings(tmp_path, step, unit, likely):
     recording = read(tmp_path, f"t [{unit}]", unit, step * np.arange(40))
-    (fact,) = [item.fact for item in recording.findings if isinstance(item.fact, StepsImplausible)]
+    (fact,) = [fact_of(item) for item in recording.findings if item.kind == "steps_implausible"]
     rate = 1.0 / (step * ONE[likely])
-    assert (fact.stated, fact.header, fact.likely) == (unit, f"t [{unit}]", likely)
-    assert (fact.step, fact.rate) == (pytest.approx(step * ONE[unit]), pytest.approx(rate))
+    assert (fact.numbers["stated"], fact.numbers["header"], fact.numbers["likely"]) == (unit, f"t [{unit}]", likely)
+    assert (fact.numbers["step"], fact.numbers["rate"]) == (pytest.approx(step * ONE[unit]), pytest.approx(rate))
 
 
 @pytest.mark.parametrize(
@@ -119,14 +119,14 @@ def test_no_sample_log_has_a_warning():
     for name in ("gate/stiff/01.csv", "arm/trial_1/free/01.csv", "ur10e/link4.csv.gz"):
         path = next(Path("sample_logs").glob(name.replace("01.csv", "*")))
         shown = info(path)
-        assert not [item for item in shown.findings if isinstance(item.fact, WRONG_UNIT)]
+        assert not [item for item in shown.findings if item.kind in WRONG_UNIT]
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=needs_data(name)) for name in ("ur3e", "emps")])
 def test_no_real_recording_has_a_warning(name):
     for path in [path for path in sorted(data(name).rglob("*")) if path.suffix in (".csv", ".mat")][:2]:
         shown = info(path)
-        assert not [item for item in shown.findings if isinstance(item.fact, WRONG_UNIT)], path
+        assert not [item for item in shown.findings if item.kind in WRONG_UNIT], path
 
 
 def test_a_container_clock_that_contradicts_its_attribute_is_read_in_the_only_possible_unit_with_a_warning(tmp_path):
@@ -141,5 +141,21 @@ def test_a_container_clock_that_contradicts_its_attribute_is_read_in_the_only_po
     machine.write_text(MACHINE.format(column="time", unit="s").replace('"x"', '"drive/pos"'))
     recording = read_recording(path, read_machine_file(machine))
     assert recording.duration == pytest.approx(0.049)
-    (fact,) = [item.fact for item in recording.findings if isinstance(item.fact, WRONG_UNIT)]
-    assert fact == FileUnitImplausible(TwoReadings(1.6e12, "s", pytest.approx(50702.0, abs=0.5), "ms", "2020-09-13"))
+    (fact,) = [fact_of(item) for item in recording.findings if item.kind in WRONG_UNIT]
+    assert fact == (
+        "file_unit_implausible",
+        {
+            "readings": {
+                "stamp": 1.6e12,
+                "stated": "s",
+                "years": pytest.approx(50702.0, abs=0.5),
+                "meant": "ms",
+                "day": "2020-09-13",
+            }
+        },
+    )
+
+
+def test_steps_near_the_smallest_float_are_in_no_unit():
+    """Of damaged bytes; the rate of such a step is beyond every float."""
+    assert contradicted_by_steps(np.arange(9.0) * 5e-324, 1.0) == ("", 5e-324)

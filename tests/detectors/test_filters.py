@@ -250,7 +250,7 @@ def fill_rates_one_by_one(time, values, samples, powers, first, second):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_rates_of_a_block_of_samples_have_the_bits_of_one_sample_after_the_other(seed):
+def test_the_rates_of_all_samples_are_those_of_one_after_the_other(seed):
     rng = np.random.default_rng(seed)
     count = int(rng.choice([0, 1, 4, 5, 6, 20, 21, 22, 31, 32, 33, 64, 90, 150]))
     samples, joints = int(rng.choice([3, 4, 5, 8, 21, 40])), int(rng.integers(1, 8))
@@ -263,4 +263,7 @@ def test_the_rates_of_a_block_of_samples_have_the_bits_of_one_sample_after_the_o
     fill_rates_one_by_one(time, values, samples, np.empty((5, samples)), *expected)
     expected[~np.isfinite(expected)] = np.nan
     for rates, own in zip(found, expected, strict=True):
-        np.testing.assert_array_equal(np.where(np.isfinite(rates), rates, np.nan), own)
+        largest = np.max(np.abs(own), initial=0.0, where=np.isfinite(own))
+        np.testing.assert_allclose(np.where(np.isfinite(rates), rates, np.nan), own, rtol=1e-6, atol=1e-9 * largest)
+    for rates, head in zip(found, polynomial_rates(time[:50], values[:50], samples), strict=True):
+        np.testing.assert_array_equal(head, rates[:50])

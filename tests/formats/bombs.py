@@ -29,6 +29,18 @@ def with_mat_header(path: Path) -> Path:
     return path
 
 
+def mat_of_small_integers(path: Path, mib: int = 250) -> Path:
+    """Write a variable of version 7 with 250 Mi zeros of one byte each, which are 2000 MiB as float64."""
+    rows = mib * MIB
+    head = struct.pack("<4I", 6, 8, 9, 0) + struct.pack("<2I2i", 5, 8, rows, 1) + struct.pack("<2I8s", 1, 1, b"x")
+    packer = zlib.compressobj(9)
+    packed = packer.compress(struct.pack("<2I", 14, len(head) + 8 + rows) + head + struct.pack("<2I", 2, rows))
+    packed += b"".join(packer.compress(bytes(MIB)) for _ in range(mib)) + packer.flush()
+    header = b"MATLAB 5.0 MAT-file".ljust(116) + bytes(8) + b"\x00\x01IM"
+    path.write_bytes(header + struct.pack("<2I", 15, len(packed)) + packed)
+    return path
+
+
 def hdf5_never_written(path: Path) -> Path:
     """Write a dataset of 75 GiB without data."""
     import h5py
@@ -121,6 +133,17 @@ def feather_of_zeros(path: Path, compression: str = "zstd", batches: int = 20) -
     with arrow.OSFile(str(path), "wb") as file, ipc.new_file(file, batch.schema, options=options) as writer:
         for _ in range(batches):
             writer.write_batch(batch)
+    return path
+
+
+def feather_with_a_false_buffer(path: Path) -> Path:
+    """Write 1000 numbers whose compressed buffer declares a TiB."""
+    import pyarrow as arrow
+    import pyarrow.feather as feather
+
+    feather.write_feather(arrow.table({"a": np.arange(1000.0)}), str(path), compression="zstd")
+    content = path.read_bytes()
+    path.write_bytes(content.replace(struct.pack("<q", 8 * 1000), struct.pack("<q", 2**40), 1))
     return path
 
 

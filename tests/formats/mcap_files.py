@@ -6,7 +6,9 @@ import json
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from mcap_ros2.decoder import DecoderFactory
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap.write import Stream, write_mcap
@@ -36,10 +38,36 @@ def wanted(*fields, clock="log", joints=("axis",)):
     return ChannelMap(TimeSource(clock=clock), sources, joints, topics=True)
 
 
+def as_dict(message):
+    """Return a message of the ROS 2 decoder as a JSON object."""
+    if hasattr(message, "__slots__"):
+        return {name: as_dict(getattr(message, name)) for name in message.__slots__}
+    return list(message) if isinstance(message, list | tuple | np.ndarray) else message
+
+
+def rewrite(path, encoding, compression):
+    """Write the messages of a file again, in another encoding or compression."""
+    with path.open("rb") as file:
+        rows = list(make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
+    with path.open("wb") as file:
+        writer = Writer(file, compression=compression)
+        writer.start()
+        channels = {}
+        for schema, channel, message, content in rows:
+            if channel.id not in channels:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(channel.topic, encoding, number)
+            payload = message.data if encoding == "cdr" else json.dumps(as_dict(content)).encode()
+            writer.add_message(channels[channel.id], message.log_time, payload, message.publish_time, message.sequence)
+        writer.finish()
+
+
 @pytest.fixture
 def written(tmp_path):
-    def write(streams=STREAMS, name="log.mcap", **options):
-        write_mcap(tmp_path / name, streams, **{"start_ns": START, **options})
+    def write(streams=STREAMS, name="log.mcap", encoding="cdr", compression="zstd", start_ns=START):
+        write_mcap(tmp_path / name, streams, start_ns=start_ns)
+        if (encoding, compression) != ("cdr", "zstd"):
+            rewrite(tmp_path / name, encoding, CompressionType[compression.upper()])
         return tmp_path / name
 
     return write

@@ -6,7 +6,6 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.tables import LastLineCut, NotNumeric, OtherEncoding
 from cdtool.formats.column_names import column_key
 from cdtool.formats.csv import Csv
 
@@ -105,7 +104,7 @@ def test_a_byte_order_mark_before_numbers_is_skipped(log):
 def test_latin_1_is_read_with_a_finding(log):
     source = read(log("t,größe\n0,1\n".encode("latin-1")))
     assert list(source.columns) == ["t", "größe"]
-    assert source.findings[0] == Finding(OtherEncoding("Latin-1"), severity="note")
+    assert source.findings[0] == Finding("other_encoding", "", {"encoding": "Latin-1"})
 
 
 def test_empty_cells_and_nan_are_missing_values(log):
@@ -127,7 +126,7 @@ def test_only_the_wanted_columns_are_read(log, machine):
 def test_a_column_of_words_is_left_out_of_a_survey_and_named(log):
     source = read(log("t,note\n0,up\n1,down\n"))
     assert list(source.columns) == ["t"]
-    assert source.findings[0] == Finding(NotNumeric("note", 2, "up"), severity="note")
+    assert source.findings[0] == Finding("not_numeric", "", {"column": "note", "line": 2, "cell": "up", "advice": None})
 
 
 @pytest.mark.parametrize("text", ["abc", "1.5 V", "1_000", "NA", "0x10", "1 234"])
@@ -156,7 +155,7 @@ def test_a_ragged_row_is_an_error_with_its_line(log, machine, row, width):
 def test_a_half_written_last_line_is_dropped_with_a_finding(log, machine, last):
     source = read(log(f"t,i_motor,n_motor\n0,1,2\n1,2,3\n{last}"), machine().columns)
     assert values(source, "n_motor") == [2, 3]
-    assert source.findings[0] == Finding(LastLineCut(4), severity="loss")
+    assert source.findings[0] == Finding("last_line_cut", "", {"line": 4})
 
 
 def test_a_short_last_line_with_its_end_is_ragged(log):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
-from cdtool.findings.tables import CellAdvice, CommentLines, NotNumeric, UnreadCells
+from cdtool.findings import Finding, lines_of
 from cdtool.formats.csv import Csv
 from cdtool.ingest.reading import choose_format, read_recording
+from tests.findings.facts import fact_of
 
 SECONDS = '[channels]\ntime = { column = 0, unit = "s" }\nspeed = { column = 1, unit = "rad/s" }\n'
 STAMPS = ["23:59:58.5", "23:59:59.0", "23:59:59.5"]
@@ -25,7 +25,9 @@ def test_a_word_in_a_column_of_numbers_is_a_loss_to_a_survey_and_an_error_with_a
     source = Csv().columns(path)
     assert np.flatnonzero(np.isnan(source.columns["x"].values)).tolist() == [4]
     (loss,) = findings_of(source, "loss")
-    assert loss == Finding(UnreadCells((6,), cell, CellAdvice("word", f'"{cell}"')), "x", "loss")
+    assert loss == Finding(
+        "unread_cells", "x", {**lines_of((6,)), "cell": cell, "advice": {"looks_like": "word", "text": f'"{cell}"'}}
+    )
     with pytest.raises(RecordingError, match=r"line 6, column 'x': .* is not a number") as fault:
         read_recording(path, machine(SECONDS))
     assert f'missing = ["{cell}"] in [csv]' in fault.value.hint
@@ -38,7 +40,10 @@ def test_a_column_with_many_words_is_left_out_with_a_warning(log):
     source = Csv().columns(path)
     assert list(source.columns) == ["t"]
     (warning,) = findings_of(source, "warning")
-    assert warning.fact == NotNumeric("x", 2, "idle", CellAdvice("word", '"idle"'))
+    assert fact_of(warning) == (
+        "not_numeric",
+        {"column": "x", "line": 2, "cell": "idle", "advice": {"looks_like": "word", "text": '"idle"'}},
+    )
 
 
 @pytest.mark.parametrize("cell", ["#N/A", "#DIV/0!", "#WERT!", "#####", "#error"])
@@ -57,7 +62,7 @@ def test_a_commented_line_of_words_or_row_is_a_comment(log, comment):
     lines[4] = comment
     source = Csv().columns(log("t,x\n" + "\n".join(lines) + "\n"))
     assert len(source.columns["x"].values) == 8
-    assert findings_of(source, "note") == [Finding(CommentLines((6,)), severity="note")]
+    assert findings_of(source, "note") == [Finding("comment_lines", "", lines_of((6,)))]
 
 
 @pytest.mark.parametrize("bad", ["24:00:00.0", "23:59:60", "12:61:00", "24:00"])
@@ -72,7 +77,9 @@ def test_the_first_time_that_matches_no_layout_is_named(log, machine, bad, at):
     assert "time_format" in e.value.hint and "decimal mark" not in str(e.value)
     source = Csv().columns(path)
     assert np.flatnonzero(np.isnan(source.columns["t"].values)).tolist() == [at]
-    assert findings_of(source, "loss") == [Finding(UnreadCells((at + 2,), bad, CellAdvice("time")), "t", "loss")]
+    assert findings_of(source, "loss") == [
+        Finding("unread_cells", "t", {**lines_of((at + 2,)), "cell": bad, "advice": {"looks_like": "time", "text": ""}})
+    ]
 
 
 def test_dates_with_an_unknown_layout_are_named_with_time_format(log, machine):

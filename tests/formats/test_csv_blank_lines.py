@@ -7,36 +7,38 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cdtool.findings import Fact
-from cdtool.findings.tables import BlankLines, BlankRows
+from cdtool.findings import lines_of
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
+from tests.findings.facts import fact_of
 
 RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
 
 
-def facts_of(source, severity: str) -> list[Fact]:
-    return [finding.fact for finding in source.findings if finding.severity == severity]
+def facts_of(source, severity: str) -> list[tuple]:
+    return [fact_of(finding) for finding in source.findings if finding.severity == severity]
 
 
 def test_a_blank_line_in_one_column_is_a_missing_sample_with_its_time(log, machine):
     recording = read_recording(log("x\n1.5\n2.5\n\n3.5\n4.5\n"), machine(RATE))
     assert recording["speed"].time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04]
     assert np.isnan(recording["speed"].values[:, 0]).tolist() == [False, False, True, False, False]
-    assert BlankRows((4,)) in facts_of(recording, "warning")
+    assert ("blank_rows", lines_of((4,))) in facts_of(recording, "warning")
     assert facts_of(recording, "loss") == []
 
 
 def test_if_every_other_line_is_blank_it_only_separates_the_rows(log):
     source = Csv().columns(log("x\n" + "".join(f"{i}.5\n\n" for i in range(9))))
     assert source.columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
-    assert facts_of(source, "note") == [BlankLines(tuple(range(3, 18, 2)))]
+    assert facts_of(source, "note") == [("blank_lines", lines_of(tuple(range(3, 18, 2))))]
 
 
 def test_a_blank_line_in_several_columns_is_not_a_row(log):
     source = Csv().columns(log("t;x\n0;1.5\n\n1;2.5\n"))
-    assert source.columns["x"].values.tolist() == [1.5, 2.5] and facts_of(source, "note") == [BlankLines((3,))]
+    assert source.columns["x"].values.tolist() == [1.5, 2.5] and facts_of(source, "note") == [
+        ("blank_lines", lines_of((3,)))
+    ]
 
 
 def test_a_blank_line_in_a_column_of_times_is_a_missing_stamp(log):

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.findings import Finding
-from cdtool.findings.tables import OtherEncoding
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.east_asian import east_asian
 
@@ -53,13 +52,13 @@ def test_names_are_read_and_the_encoding_is_reported(log, names, encoding, shown
     source = Csv().columns(log(table(names, encoding)))
     plain = {name.replace("（", "(").replace("）", ")") for name in names.split(",")}
     assert {name.replace("（", "(").replace("）", ")") for name in source.names} == plain
-    assert source.findings[0] == Finding(OtherEncoding(shown), severity="note")
+    assert source.findings[0] == Finding("other_encoding", "", {"encoding": shown})
 
 
 @pytest.mark.parametrize("names", [*JAPANESE, *CHINESE])
 def test_utf_8_is_not_reported(log, names):
     findings = Csv().columns(log(table(names, "utf-8"))).findings
-    assert not [finding for finding in findings if isinstance(finding.fact, OtherEncoding)]
+    assert not [finding for finding in findings if finding.kind == "other_encoding"]
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "latin-1", "cp850"])

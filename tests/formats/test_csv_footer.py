@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
-from cdtool.findings.tables import FooterSkipped, HeaderLines, NulBytesAtEnd
+from cdtool.findings import Finding, lines_of
 from cdtool.formats.csv import Csv
 from cdtool.ingest.reading import read_recording
+from tests.findings.facts import fact_of
 
 FOOTERS = {
     "a sum": ["Sum,7"],
@@ -34,8 +34,8 @@ def written(lines: list[str], end: str = "\n", last: bool = True, encoding: str 
     return (end.join(["t,a", *lines]) + (end if last else "")).encode(encoding)
 
 
-def footers_of(source) -> list[FooterSkipped]:
-    return [finding.fact for finding in source.findings if isinstance(finding.fact, FooterSkipped)]
+def footers_of(source) -> list[tuple]:
+    return [fact_of(finding) for finding in source.findings if finding.kind == "footer_skipped"]
 
 
 def check(source, count: int) -> None:
@@ -51,7 +51,7 @@ def test_lines_of_words_and_numbers_below_the_rows_are_not_samples(log, footer, 
     check(source, 9)
     (fact,) = footers_of(source)
     first = next(line for line in footer if line.strip("-"))
-    assert fact.text == first
+    assert fact.numbers["text"] == first
     assert not [finding for finding in source.findings if finding.severity == "loss"]
 
 
@@ -68,13 +68,13 @@ def test_lines_of_words_and_numbers_below_the_rows_are_not_samples(log, footer, 
 def test_a_footer_is_reported_with_its_lines(log, end, count, footer, lines):
     source = Csv().columns(log(written(rows(count) + footer, end)))
     check(source, count)
-    assert footers_of(source) == [FooterSkipped(lines, "Sum,7")]
+    assert footers_of(source) == [("footer_skipped", {**lines_of(lines), "text": "Sum,7"})]
 
 
 def test_a_footer_in_a_wide_encoding_after_the_sample_is_detected(log):
     source = Csv().columns(log(written([*rows(50_000), "Sum,7"], encoding="utf-16")))
     check(source, 50_000)
-    assert footers_of(source) == [FooterSkipped((50002,), "Sum,7")]
+    assert footers_of(source) == [("footer_skipped", {**lines_of((50002,)), "text": "Sum,7"})]
 
 
 @pytest.mark.parametrize("clock", ['column = "t", unit = "ms"', 'column = "t", unit = "s"'])
@@ -88,20 +88,20 @@ def test_a_footer_is_also_left_out_with_a_machine_file(log, machine, clock):
     found = read_recording(log(lines + "Sum,190,210\n"), machine(channels))
     for channel in plain.channels:
         np.testing.assert_array_equal(found[channel].values, plain[channel].values)
-    assert footers_of(found) == [FooterSkipped((22,), "Sum,190,210")]
+    assert footers_of(found) == [("footer_skipped", {**lines_of((22,)), "text": "Sum,190,210"})]
 
 
 def test_dates_above_a_footer_are_recognised(log):
     lines = [f"2025-01-01 00:00:{i:02d},{i}" for i in range(30)]
     source = Csv().columns(log(written([*lines, "Sum,435"])))
     np.testing.assert_array_equal(source.columns["t"].values, np.arange(30.0))
-    assert footers_of(source) == [FooterSkipped((32,), "Sum,435")]
+    assert footers_of(source) == [("footer_skipped", {**lines_of((32,)), "text": "Sum,435"})]
 
 
 def test_a_footer_is_detected_without_a_header_and_with_trailing_separators(log):
     source = Csv().columns(log("".join(f"{i};{i},5;\n" for i in range(12)) + "Summe;72,0;\n"))
     np.testing.assert_array_equal(source.columns["1"].values, np.arange(12) + 0.5)
-    assert footers_of(source) == [FooterSkipped((13,), "Summe;72,0;")]
+    assert footers_of(source) == [("footer_skipped", {**lines_of((13,)), "text": "Summe;72,0;"})]
 
 
 @pytest.mark.parametrize(
@@ -130,13 +130,13 @@ def test_words_other_than_a_footer_are_an_error_with_a_machine_file(log, machine
 def test_a_row_cut_by_a_power_failure_is_not_a_footer(log):
     source = Csv().columns(log(written([*rows(9), "Sum,7"]) + bytes(300)))
     assert footers_of(source) == []
-    assert any(finding.fact == NulBytesAtEnd(300) for finding in source.findings)
+    assert any(fact_of(finding) == ("nul_bytes_at_end", {"count": 300}) for finding in source.findings)
 
 
 def test_a_repeated_header_at_the_end_is_not_a_footer(log):
     source = Csv().columns(log(written([*rows(9), "t,a"])))
     check(source, 9)
-    assert source.findings == (Finding(HeaderLines((11,)), severity="note"),)
+    assert source.findings == (Finding("header_lines", "", lines_of((11,))),)
 
 
 def test_a_table_with_words_in_its_first_column_has_no_footer(log):
@@ -167,7 +167,7 @@ def test_below_a_blank_line_a_footer_has_lines_of_any_width(log, machine):
     table = "t;x;y;z\n" + "".join(f"{i};{i}.5;0;1\n" for i in range(30))
     settings_below = "Paramètre;CoMax\nPID;KP;KI;KD\nPosition :;2420;8340\nSécurité\n"
     source = Csv().columns(log(table + "\n" + settings_below))
-    assert footers_of(source) == [FooterSkipped((33, 34, 35, 36), "Paramètre;CoMax")]
+    assert footers_of(source) == [("footer_skipped", {**lines_of((33, 34, 35, 36)), "text": "Paramètre;CoMax"})]
     assert len(source.columns["x"].values) == 30
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n'
     with pytest.raises(RecordingError, match="line 32 has 2 cells"):
@@ -179,3 +179,43 @@ def test_a_row_that_is_cut_off_below_a_blank_line_is_not_a_footer(log, machine):
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n'
     with pytest.raises(RecordingError, match="line 33 has 2 cells"):
         read_recording(log(table), machine(channels))
+
+
+@pytest.mark.parametrize(
+    ("last", "said"),
+    {
+        ",112.5,-11.0": True,
+        "45,112.5,-11.0": True,
+        "10,112.5,-11.0": True,
+        "10,112.5,": True,
+        "10,112.5,-1.0": False,
+        "10,12.0,-2.0": False,
+        ",,": False,
+    }.items(),
+)
+def test_a_last_row_with_the_sums_of_the_rows_above_is_said(log, last, said):
+    lines = [f"{i},{2.5 * i},{-0.5 * i if i < 7 else -0.25 * (i < 9)}" for i in range(10)]
+    source = Csv().columns(log("\n".join(["t,a,b", *lines, last, ""])))
+    assert [fact_of(finding) for finding in source.findings if finding.kind == "total_row"] == [
+        ("total_row", {"line": 12})
+    ] * said
+    assert len(source.columns["a"].values) == 11
+
+
+def test_a_total_above_a_line_that_is_cut_off_is_no_sample(log):
+    source = Csv().columns(log("t;x\n" + "".join(f"{i};{i}.5\n" for i in range(9)) + "Sum;40.5\n9"))
+    assert len(source.columns["x"].values) == 9
+    assert [finding.kind for finding in source.findings] == ["last_line_cut", "footer_skipped"]
+
+
+def test_a_total_is_said_in_a_table_of_many_blocks(log):
+    rows = "".join(f"{i},{i % 7}.5,{i % 3}\n" for i in range(400_000))
+    sums = sum(i % 7 + 0.5 for i in range(400_000)), sum(i % 3 for i in range(400_000))
+    source = Csv().columns(log(f"t,a,b\n{rows},{sums[0]},{sums[1]}\n"))
+    assert [fact_of(finding) for finding in source.findings] == [("total_row", {"line": 400_002})]
+
+
+def test_a_line_that_is_cut_off_below_a_footer_has_its_own_number(log):
+    source = Csv().columns(log("t;x\n" + "".join(f"{i};{i}.5\n" for i in range(9)) + "End of file\n" + "\0" * 64))
+    cut = [finding.numbers for finding in source.findings if finding.kind == "last_line_cut"]
+    assert cut == [{"line": 12}]

@@ -235,3 +235,22 @@ def test_a_compressed_log_at_a_url_is_read(tmp_path):
     local = cdtool.read(GATE / "stiff" / "03.csv", GATE / "machine.toml")
     assert remote.name == "03"
     assert remote["torque"].values.tobytes() == local["torque"].values.tobytes()
+
+
+# Lines that are not rows: tens of kilobytes of .csv.gz unpacked to 2.7 GB, or took 100 s.
+NO_ROWS = {
+    "blank": b"t,a\n0,1.5\n1,2.5\n" + b"\n" * 2_000_000,
+    "blank in one column": b"a\n1.5\n2.5\n" + b"\n" * 2_000_000 + b"3.5\n",
+    "blank at the end of one column": b"a\n1.5\n2.5\n" + b"\n" * 2_000_000,
+    "comments": b"t,a\n0,1.5\n1,2.5\n" + b"#\n" * 1_000_000 + b"2,3\n",
+    "the header again": b"t,a\n" + b"0,1.5\n" * 30_000 + b"t,a\n" * 100_000 + b"2,3\n",
+}
+
+
+@pytest.mark.parametrize("content", NO_ROWS.values(), ids=NO_ROWS)
+def test_a_file_of_lines_that_are_no_rows_is_refused(tmp_path, content):
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(gzip.compress(content))
+    for read in (survey, lambda path: list(log_pieces(path))):
+        with pytest.raises(RecordingError, match=r"lines are not rows|of blank lines|unpacks to"):
+            read(path)

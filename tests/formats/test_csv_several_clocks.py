@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 import cdtool
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import ClockUnitAssumed, OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 from cdtool.workflows.convert.converting import convert
+from tests.findings.facts import fact_of
 
 OWN = """[channels]
 time = { column = "time", unit = "s" }
@@ -51,7 +51,7 @@ CELL, DRIVE = np.arange(50) / 2000.0, np.arange(40) / 1000.0
 
 
 def clock_warnings(source) -> list[Finding]:
-    return [finding for finding in source.findings if isinstance(finding.fact, OtherClock)]
+    return [finding for finding in source.findings if finding.kind == "other_clock"]
 
 
 @pytest.mark.parametrize("header", HEADERS)
@@ -62,7 +62,7 @@ def test_each_channel_has_the_clock_before_it(log, machine, header):
     for channel in ("torque", "speed"):
         assert recording[channel].time.tolist() == DRIVE.tolist()
     assert not [finding for finding in recording.findings if finding.severity != "note"]
-    assert [type(finding.fact) for finding in recording.findings if finding.channel == "time"] == [OwnClocks]
+    assert [finding.kind for finding in recording.findings if finding.channel == "time"] == ["own_clocks"]
 
 
 def test_clocks_in_ms_without_a_unit_are_refused_rather_than_read_in_s(log, machine):
@@ -106,8 +106,8 @@ def test_one_clock_for_all_channels_is_refused_if_the_times_differ(log, machine,
             )
             continue
         (warning,) = clock_warnings(source)
-        assert warning.channel == "time2" and isinstance(warning.fact, OtherClock)
-        assert (warning.fact.first, warning.fact.columns) == ("time1", ("torque", "speed"))
+        assert warning.channel == "time2" and warning.kind == "other_clock"
+        assert (warning.numbers["first"], warning.numbers["columns"]) == ("time1", ("torque", "speed"))
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_values_without_a_time_are_a_loss(log, machine):
     recording = read_recording(log(HEADERS[0] + "\n" + rows), machine(OWN))
     assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
     lost = [finding for finding in recording.findings if finding.severity == "loss"]
-    assert lost == [Finding(ValuesWithoutTime(1), channel, "loss") for channel in ("torque", "speed")]
+    assert lost == [Finding("values_without_time", channel, {"count": 1}) for channel in ("torque", "speed")]
 
 
 @pytest.mark.parametrize("unit", ["", " [ms]"])
@@ -174,9 +174,9 @@ def test_without_a_machine_file_channels_of_other_rates_have_the_clocks_beside_t
         assert source.columns["torque [N m]"].time == pytest.approx(CELL)
         assert source.columns["speed [mm/s]"].time == pytest.approx(DRIVE)
         assert source.columns["position [mm]"].values.tolist() == [10.0 * i for i in range(40)]
-        facts = [finding.fact for finding in source.findings]
-        assumed = [] if unit else [ClockUnitAssumed(("t1", "t2"), pytest.approx(0.0005))]
-        assert facts == [OwnClocks((f"t1{unit}", f"t2{unit}")), *assumed]
+        facts = [fact_of(finding) for finding in source.findings]
+        assumed = [] if unit else [("clock_unit_assumed", {"clocks": ("t1", "t2"), "step": pytest.approx(0.0005)})]
+        assert facts == [("own_clocks", {"clocks": (f"t1{unit}", f"t2{unit}")}), *assumed]
     info = cdtool.info(path)
     assert [(item.samples, item.missing) for item in info.channels] == [(50, 0), (40, 0), (40, 0)]
     assert [item.rate_hz for item in info.channels] == pytest.approx([2000.0, 1000.0, 1000.0])
@@ -203,7 +203,8 @@ def test_a_clock_of_the_same_rate_that_ends_early_is_that_of_its_channels(log):
         assert len(source.columns["torque"].values) == 30 and len(source.columns["force"].values) == 50
 
 
-def test_a_long_table_is_read_in_pieces_with_the_times_of_the_whole(log):
+def test_a_long_table_is_read_in_pieces_with_the_times_of_the_whole(log, monkeypatch):
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 1 << 18)
     first, second = 1.7e9 + np.arange(60_000) / 2000.0, 1.7e9 + 0.25 + np.arange(20_000) / 500.0
     path = log(table("time1 [s],force,time2 [s],torque,speed", first, second))
     pieces = list(Csv().pieces(path))

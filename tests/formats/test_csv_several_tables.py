@@ -7,11 +7,12 @@ import pytest
 
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
-from cdtool.findings.tables import NumbersAboveRows
+from cdtool.findings import lines_of
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.find_dialect import find_dialect
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import PieceRun
+from tests.findings.facts import fact_of
 
 PREAMBLE = ("Measurement of gate 7", "Operator: Jones", "Sample rate,1000", "Date;2024-03-01 12:00:00", "")
 BETWEEN = ("", "\n", "Second table\n", "\n[channels]\n", "# next\n", "Result;ok\n\n")
@@ -95,8 +96,8 @@ def test_rows_below_with_another_separator_are_not_a_footer(tmp_path):
 
 def test_a_single_line_of_numbers_above_the_names_is_a_loss(tmp_path):
     source = Csv().columns(log(tmp_path, "12,500\nt,a,b\n" + rows(20, 3)))
-    lost = [finding.fact for finding in source.findings if finding.severity == "loss"]
-    assert lost == [NumbersAboveRows((1,))]
+    lost = [fact_of(finding) for finding in source.findings if finding.severity == "loss"]
+    assert lost == [("numbers_above_rows", lines_of((1,)))]
 
 
 def test_lines_skipped_by_a_pin_are_not_a_loss(tmp_path):
@@ -108,8 +109,8 @@ def test_lines_skipped_by_a_pin_are_not_a_loss(tmp_path):
 def test_rows_above_a_pinned_header_are_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(header=402))
-    lost = [finding.fact for finding in dialect.findings if finding.severity == "loss"]
-    assert lost == [NumbersAboveRows(tuple(range(2, 402)))]
+    lost = [fact_of(finding) for finding in dialect.findings if finding.severity == "loss"]
+    assert lost == [("numbers_above_rows", lines_of(tuple(range(2, 402))))]
 
 
 @pytest.mark.parametrize("tail", ["# end", "# x", "# end of the log, 12", "#"])

@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import UsageError
-from cdtool.findings.tables import NotNumeric
 from cdtool.formats.csv import Csv, write_csv
 from tests.data_folder import UR10E_LOGS, data, needs_data
+from tests.findings.facts import fact_of
 from tests.noted_times import noted
 
 
@@ -36,7 +36,7 @@ def test_any_written_number_is_read_back_exactly(tmp_path, numbers):
     column = np.array(numbers)
     write_csv(path, {"a": column, "b": column}, {})
     assert np.array_equal(read(path).columns["a"].values, column, equal_nan=True)
-    path.write_text("a;b\n" + "".join(f"{x!r};0\n".replace(".", ",") for x in numbers))
+    path.write_text("a;b\n" + "".join(f"{x!r};0.5\n".replace(".", ",") for x in numbers))
     assert np.array_equal(read(path).columns["a"].values, column, equal_nan=True)
 
 
@@ -70,5 +70,5 @@ def test_the_ur3e_files_are_read_with_any_line_ends(name):
     source = read(data("ur3e") / f"{name}.csv")
     assert len(source.names) == 175
     assert len(source.columns["target_q_0"].values) > 20
-    fact = source.findings[0].fact
-    assert isinstance(fact, NotNumeric) and fact.column == "_id"
+    fact = fact_of(source.findings[0])
+    assert fact.kind == "not_numeric" and fact.numbers["column"] == "_id"

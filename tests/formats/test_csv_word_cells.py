@@ -1,4 +1,4 @@
-"""Texts of a column of categories are read alike, whether the compiled loop or the slow path reads their line."""
+"""Texts of a column of categories are read alike, whether pandas or the slow path reads their line."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from hypothesis import strategies as st
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.columns import Categories
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.irregular_lines import IrregularLines
-from cdtool.formats.csv.word_cells import WordCells
 
 TEXTS = [
     "a",
@@ -105,22 +103,3 @@ def test_codes_are_exact_and_depend_on_the_text_alone():
     assert codes == [second.code(text) for text in reversed(texts)][::-1]
     assert all(-(2.0**53) < code <= -(2.0**52) and code == int(code) for code in codes) and len(set(codes)) == 4
     assert first.words == dict(zip(codes, texts, strict=True))
-
-
-def test_hostile_lines_take_no_exponential_time():
-    from cdtool.formats.csv.word_cells import _pattern
-
-    for line in (b'"' * 5000, b" " * 20000, b'" ' * 5000, b"," * 5000, b'"a' * 3000 + b","):
-        assert WordCells is not None and _pattern(",", 40).sub(b"", line) is not None
-
-
-@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
-@pytest.mark.parametrize("place", [0, 2])
-def test_usual_texts_do_not_make_their_lines_irregular(tmp_path, monkeypatch, separator, place):
-    monkeypatch.setattr(IrregularLines, "read", lambda *_: pytest.fail("the line is read slowly"))
-    rows = [["phase", "speed", "torque"]] + [[f"run_{i // 5}", f"{i}.5", "-1"] for i in range(20)]
-    for row in rows:
-        row.insert(place, row.pop(0))
-    path = tmp_path / "log.csv"
-    path.write_text("\n".join(separator.join(["t" if i == 0 else f"{i}.0", *row]) for i, row in enumerate(rows)) + "\n")
-    assert ids(Csv().columns(path, wanted("phase")), "phase") == [f"run_{i // 5}" for i in range(20)]

@@ -71,7 +71,7 @@ def test_texts_compounds_scalars_and_matlabs_texts_are_named_and_left_out(tmp_pa
         file["z"] = np.ones(3) * 1j
     source = survey(path)
     assert list(source.columns) == ["v"]
-    left_out = {(finding.fact.column, finding.fact.what) for finding in source.findings}
+    left_out = {(finding.numbers["column"], finding.numbers["what"]) for finding in source.findings}
     assert left_out == {
         ("word", "of texts or references"),
         ("pair", "a compound"),
@@ -106,7 +106,7 @@ def test_external_and_cyclic_links_are_not_followed(tmp_path):
         file.create_virtual_dataset("virtual", layout)
     source = survey(path)
     assert list(source.columns) == ["v"]
-    assert [finding.fact.what for finding in source.findings] == ["stored in other files"] * 2
+    assert [finding.numbers["what"] for finding in source.findings] == ["stored in other files"] * 2
 
 
 def test_a_declared_dataset_without_data_is_refused_by_its_size(tmp_path):

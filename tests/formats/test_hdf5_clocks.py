@@ -11,13 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import cdtool
-from cdtool.findings import Fact
-from cdtool.findings.clocks import AssumedClock, ClocksWithoutUnit, UnusableClock
-from cdtool.findings.containers import ColumnLeftOut, PackedValues, RoundedIntegers
 from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.hdf5 import Packing, times_since
 from cdtool.ingest.reading import read_recording, survey
 from cdtool.machine_file import read_machine_file
+from tests.findings.facts import fact_of
 
 h5py = pytest.importorskip("h5py")
 
@@ -46,8 +44,8 @@ def saved(tmp_path):
     return save
 
 
-def facts(source) -> list[tuple[str, Fact]]:
-    return [(finding.channel, finding.fact) for finding in source.findings]
+def facts(source) -> list[tuple[str, tuple]]:
+    return [(finding.channel, fact_of(finding)) for finding in source.findings]
 
 
 @pytest.mark.parametrize("kind", [np.int64, np.uint64])
@@ -58,7 +56,7 @@ def test_nanoseconds_since_1970_are_exact(saved, kind, origin):
     source = survey(saved(time=(stamps, {"unit": "ns"}), q=(np.arange(300.0), {})))
     assert np.allclose(source.columns["q"].time, (steps - steps[0]) / 1e9, rtol=4e-16, atol=0.0)
     assert source.origin == int(stamps[0]) / 1e9
-    assert facts(source) == [("time", RoundedIntegers(300))]
+    assert facts(source) == [("time", ("rounded_integers", {"count": 300}))]
 
 
 def test_stamps_before_the_first_one_keep_their_sign(saved):
@@ -77,6 +75,7 @@ def test_stamps_before_the_first_one_keep_their_sign(saved):
         ("days since 1899-12-30", 45_293.0, 2.0**-20),
         ("hours since 2024-01-01 02:00:00 +02:00", 24.0, 2.0**-12),
         ("minutes since 2024-01-01 22:00:00 -0200", 0.0, 0.5),
+        ("secs since 2023-12-31  6:59:59,75 -5:00", 129_600.25, 1),
     ],
 )
 def test_a_time_since_a_date_is_a_clock_since_1970(saved, tmp_path, unit, first, step):
@@ -107,13 +106,14 @@ def test_any_date_is_converted_like_in_the_calendar(date, minutes, gap):
     ("attributes", "why"),
     [
         ({"units": "seconds since the start"}, "the date of 'seconds since the start' cannot be read"),
+        ({"units": "hours since 2024-01-01 25:00"}, "the date of 'hours since 2024-01-01 25:00' cannot be read"),
         ({"units": "seconds since 2024-01-01", "calendar": "360_day"}, "its calendar '360_day'"),
     ],
-    ids=["date", "calendar"],
+    ids=["date", "hour", "calendar"],
 )
 def test_a_time_since_an_unreadable_date_is_reported_and_not_used_as_a_clock(saved, attributes, why):
     source = survey(saved(time=(np.arange(9.0), attributes), q=(np.arange(9.0), {})))
-    (reason,) = [finding.fact.reason for finding in source.findings if isinstance(finding.fact, UnusableClock)]
+    (reason,) = [finding.numbers["reason"] for finding in source.findings if finding.kind == "unusable_clock"]
     assert source.columns["q"].time is None and why in reason
 
 
@@ -128,7 +128,9 @@ def test_packed_numbers_are_unpacked_and_fill_values_are_missing(saved):
     attributes |= {"missing_value": np.array([-99], dtype=np.int16), "units": "N m"}
     source = survey(saved(tau=(raw, attributes), x=(np.array([1.0, -9999.0, 3.0, 4.0, 5.0]), {"_FillValue": -9999.0})))
     assert np.allclose(source.columns["tau"].values, [6.0, 7.0, np.nan, np.nan, 5.0], rtol=1e-15, equal_nan=True)
-    assert source.columns["tau"].unit == "N m" and ("tau", PackedValues(0.01, 5.0)) in facts(source)
+    assert source.columns["tau"].unit == "N m" and ("tau", ("packed_values", {"scale": 0.01, "offset": 5.0})) in facts(
+        source
+    )
     assert np.array_equal(source.columns["x"].values, [1.0, np.nan, 3.0, 4.0, 5.0], equal_nan=True)
 
 
@@ -165,7 +167,7 @@ def test_a_dataset_with_an_unknown_packing_is_left_out(saved, attributes):
     source = survey(saved(x=(np.arange(5), attributes), y=(np.arange(5.0), {})))
     assert list(source.columns) == ["y"]
     why = f"packed, but its attribute {next(iter(attributes))} is not a number"
-    assert facts(source) == [("", ColumnLeftOut("x", why))]
+    assert facts(source) == [("", ("column_left_out", {"column": "x", "what": why}))]
 
 
 def test_a_packed_clock_may_have_missing_stamps(saved):
@@ -193,14 +195,14 @@ def test_info_shows_every_column_on_the_clock_of_its_group(saved):
     info = cdtool.info(path)
     rates = {channel.name: round(channel.rate_hz) for channel in info.channels}
     assert rates == {"drive/t": 100, "drive/q": 100, "cell/time": 1000, "cell/force": 1000}
-    assert not [finding for finding in info.findings if isinstance(finding.fact, AssumedClock)]
+    assert not [finding for finding in info.findings if finding.kind == "assumed_clock"]
 
 
 def test_clocks_of_groups_without_a_unit_are_a_warning(saved):
     clocks = {"drive__t": (np.arange(9.0), {}), "cell__time": (np.arange(9.0), {})}
-    assert ("", ClocksWithoutUnit(("cell/time", "drive/t"))) in facts(survey(saved(**clocks)))
+    assert ("", ("clocks_without_unit", {"datasets": ("cell/time", "drive/t")})) in facts(survey(saved(**clocks)))
     alone = facts(survey(saved(t=clocks["drive__t"], q=clocks["drive__t"])))
-    assert not [fact for _, fact in alone if isinstance(fact, ClocksWithoutUnit)]
+    assert not [fact for _, fact in alone if fact.kind == "clocks_without_unit"]
 
 
 def test_the_epoch_is_subtracted_if_every_clock_has_one():

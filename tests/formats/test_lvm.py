@@ -11,12 +11,9 @@ from hypothesis import strategies as st
 
 import cdtool
 from cdtool.errors import RecordingError
-from cdtool.findings.clocks import DerivedTimes, StartAssumed
-from cdtool.findings.containers import ColumnLeftOut, LastSegmentIncomplete, SegmentCutOff
-from cdtool.findings.tables import LastLineCut, WordsBelowRows
 from cdtool.formats.lvm import Lvm
-from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import choose_format, read_recording, survey
+from tests.findings.facts import fact_of
 from tests.formats.lvm_files import START_S, Channel, Style, measurement
 
 FORCE = Channel("Force", [1.5 * i for i in range(40)], unit="N")
@@ -58,8 +55,6 @@ def test_each_channel_has_its_values_unit_and_times(log, style):
     source = survey(path)
     assert_read(source, FORCE, TORQUE)
     assert source.origin == START_S and not source.findings
-    assert_read(join_pieces(Lvm().pieces(path), sort=False), FORCE, TORQUE)
-    assert_read(join_pieces(Lvm().pieces(path, ["Torque"]), sort=False), TORQUE)
 
 
 def test_the_content_decides_whatever_the_suffix(log):
@@ -78,8 +73,8 @@ def test_any_encoding_of_text_is_read(log, encoding):
 def test_a_channel_of_a_lower_rate_has_its_own_times(log, columns):
     source = survey(log(measurement(Style(x_columns=columns), [FORCE, SLOW]), "gate.lvm"))
     assert_read(source, FORCE, SLOW)
-    derived = [DerivedTimes(("Temperature",))] if columns == "One" else []
-    assert [finding.fact for finding in source.findings] == derived
+    derived = [("derived_times", {"channels": ("Temperature",)})] if columns == "One" else []
+    assert [fact_of(finding) for finding in source.findings] == derived
 
 
 @pytest.mark.parametrize("columns", ["One", "No"])
@@ -134,13 +129,15 @@ def test_a_channel_without_a_date_is_taken_to_begin_with_the_others_and_reported
     undated = replace(TORQUE, date="1903/12/31", time="19:00:00")
     source = survey(log(measurement(Style(x_columns="No"), [FORCE, undated]), "gate.lvm"))
     assert_read(source, FORCE, undated)
-    assert [finding.fact for finding in source.findings] == [StartAssumed(("Torque",))]
+    assert [fact_of(finding) for finding in source.findings] == [("start_assumed", {"channels": ("Torque",)})]
 
 
 def test_a_channel_without_samples_is_left_out_with_a_note(log):
     source = survey(log(measurement(Style(), [FORCE, replace(TORQUE, values=[])]), "gate.lvm"))
     assert_read(source, FORCE)
-    assert [finding.fact for finding in source.findings] == [ColumnLeftOut("Torque", "empty")]
+    assert [fact_of(finding) for finding in source.findings] == [
+        ("column_left_out", {"column": "Torque", "what": "empty"})
+    ]
 
 
 def test_more_rows_than_stated_are_all_read_and_fewer_are_a_loss(log):
@@ -149,14 +146,16 @@ def test_more_rows_than_stated_are_all_read_and_fewer_are_a_loss(log):
     source = survey(log(text.replace("Samples\t40\t40", "Samples\t10\t10"), "gate.lvm"))
     assert len(source.columns["Force"].values) == 40 and not source.findings
     source = survey(log(text.replace("Samples\t40\t40", "Samples\t100\t100"), "gate.lvm"))
-    assert [(finding.fact, finding.severity) for finding in source.findings] == [(SegmentCutOff(24, 100, 40), "loss")]
+    assert [(fact_of(finding), finding.severity) for finding in source.findings] == [
+        (("segment_cut_off", {"line": 24, "stated": 100, "rows": 40}), "loss")
+    ]
 
 
 def test_numbers_that_no_file_can_mean_are_no_error_of_the_program(log):
     text = measurement(Style(), [FORCE, SLOW])
     stated = text.replace("Samples\t40\t10", "Samples\t4000000000000000000000\t10")
-    facts = [type(finding.fact) for finding in survey(log(stated, "gate.lvm")).findings]
-    assert SegmentCutOff in facts
+    facts = [finding.kind for finding in survey(log(stated, "gate.lvm")).findings]
+    assert "segment_cut_off" in facts
     source = survey(log(text.replace("0.000000\t0.000000", "1e999\t0.000000", 1), "gate.lvm"))
     assert len(source.columns["Force"].values) == 39
 
@@ -190,7 +189,7 @@ def test_a_machine_file_that_names_the_column_of_times_is_followed(log, machine)
         ("Decimal_Separator\t.", "Decimal_Separator\t;", "states the decimal separator ';'"),
         ("Channels\t2", "Channels\t1000000000", "has 2 names, but 1000000000 channels are stated above it"),
         ("X_Dimension\tTime\tTime", "X_Dimension\tTime\tFrequency", "x axis of channel 'Torque' is 'Frequency'"),
-        ("0.000000\t0.000000", "a\t0.000000", r"line 24 \('a'\) is below the names, but is no row"),
+        ("0.000000\t0.000000", "a\t0.000000", r"line 24 \('a'\) is below the names, but not a row"),
         ("0.010000\t", "x0.010000\t", "line 34"),
     ],
     ids=["separator", "decimal separator", "channels", "dimension", "first row", "a row"],
@@ -202,10 +201,14 @@ def test_what_contradicts_itself_is_refused_in_one_line(log, machine, old, new, 
     assert len(str(caught.value)) < 400 and "\n" not in str(caught.value)
 
 
-def test_several_segments_in_a_wide_encoding_are_refused(log):
-    path = log(measurement(Style(headings="Yes"), [FORCE], [FORCE]).encode("utf-16"), "gate.lvm")
-    with pytest.raises(RecordingError, match="several segments in UTF-16"):
-        survey(path)
+def test_several_segments_are_read_in_any_encoding(log):
+    narrow, wide = (
+        survey(log(measurement(Style(headings="Yes"), [FORCE], [FORCE]).encode(encoding), f"{encoding}.lvm"))
+        for encoding in ("utf-8", "utf-16")
+    )
+    assert wide.details["segments"] == "2" and wide.columns.keys() == narrow.columns.keys()
+    for name, column in narrow.columns.items():
+        assert wide.columns[name].values.tobytes() == column.values.tobytes()
 
 
 def test_a_head_that_is_cut_off_is_a_loss_of_its_segment_only(log):
@@ -214,18 +217,20 @@ def test_a_head_that_is_cut_off_is_a_loss_of_its_segment_only(log):
     for size in range(second + 10, text.rindex("0.000000\t0.000000"), 40):
         source = survey(log(text[:size], "gate.lvm"))
         assert source.columns["Force"].values.tolist() == FORCE.values
-        assert (LastSegmentIncomplete(), "loss") in [(found.fact, found.severity) for found in source.findings]
+        assert (("last_segment_incomplete", {}), "loss") in [
+            (fact_of(found), found.severity) for found in source.findings
+        ]
 
 
 def test_a_row_that_is_cut_off_is_dropped_and_reported(log):
     source = survey(log(measurement(Style(), [FORCE, TORQUE])[:-12], "gate.lvm"))
     assert source.columns["Force"].values.tolist() == FORCE.values[:-1]
-    assert {type(finding.fact) for finding in source.findings} == {LastLineCut, SegmentCutOff}
+    assert {finding.kind for finding in source.findings} == {"last_line_cut", "segment_cut_off"}
 
 
 def test_words_below_the_rows_are_a_note_and_between_them_an_error(log):
     text = measurement(Style(end="\n"), [FORCE, TORQUE])
-    assert [type(finding.fact) for finding in survey(log(text + "stopped\n")).findings] == [WordsBelowRows]
+    assert [finding.kind for finding in survey(log(text + "stopped\n")).findings] == ["words_below_rows"]
     with pytest.raises(RecordingError, match="'stopped' between the rows"):
         survey(log(text + "stopped\n" + "0.040000\t1.0\t2.0\n"))
 

@@ -73,7 +73,7 @@ def test_variables_other_than_vectors_and_matrices_of_numbers_are_named_and_left
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
     assert source.details == {"s.a": "1", "w": "words"}
-    left_out = {finding.fact.variable: finding.fact.what for finding in source.findings}
+    left_out = {finding.numbers["variable"]: finding.numbers["what"] for finding in source.findings}
     assert left_out == {
         "c": "a cell of texts",
         "cube": "a 2 x 3 x 4 array",
@@ -148,7 +148,7 @@ def test_a_dataset_in_other_files_is_not_followed(tmp_path):
         file.create_virtual_dataset("v", layout)
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
-    assert [finding.fact.what for finding in source.findings] == ["an array stored in other files"] * 2
+    assert [finding.numbers["what"] for finding in source.findings] == ["an array stored in other files"] * 2
 
 
 @pytest.mark.parametrize("size", [400, 520, 700, 1500, -1])

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.findings.containers import DamagedAt, Unverified
-from cdtool.findings.messages import UndecodableMessages
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.write import Stream
 from tests.command import cdtool
+from tests.findings.facts import fact_of
 from tests.formats.mcap_files import JOINTS, STREAMS, TIME, N, by_hand, wanted, written
 
 __all__ = ["by_hand", "written"]
@@ -22,8 +21,8 @@ def test_one_broken_message_is_left_out_and_counted(by_hand):
         assert source.columns["/a x"].values.tolist() == [1, 2]
         finding = source.findings[0]
         assert (finding.channel, finding.severity) == ("/a", "loss")
-        assert (finding.fact.count, finding.fact.messages) == (4, 6)
-        assert finding.fact.reason.startswith("JSONDecodeError")
+        assert (finding.numbers["count"], finding.numbers["messages"]) == (4, 6)
+        assert finding.numbers["reason"].startswith("JSONDecodeError")
 
 
 @pytest.mark.parametrize(
@@ -46,8 +45,8 @@ def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_w
     path = by_hand([(0, 0, b"\0\1\0\0" + bytes(8))], encoding, schema_encoding, schema)
     source = Mcap().columns(path)
     assert not source.columns
-    fact = source.findings[0].fact
-    assert isinstance(fact, UndecodableMessages) and (fact.count, fact.messages) == (1, 1)
+    fact = fact_of(source.findings[0])
+    assert fact.kind == "undecodable_messages" and (fact.numbers["count"], fact.numbers["messages"]) == (1, 1)
     assert source.findings[0].severity == "loss" and cdtool("info", path).status == 3
     with pytest.raises(RecordingError, match="no message of /a can be decoded"):
         Mcap().columns(path, wanted(("/a", "data")))
@@ -69,8 +68,8 @@ def test_a_cut_file_yields_the_complete_messages_before_the_cut(written, compres
             continue
         values = source.columns["/force data"].values
         assert np.array_equal(values, np.arange(len(values)))
-        fact = source.findings[0].fact
-        assert isinstance(fact, DamagedAt) and fact.read_before == len(values)
+        fact = fact_of(source.findings[0])
+        assert fact.kind == "damaged_at" and fact.numbers["read_before"] == len(values)
 
 
 def test_an_unchunked_file_yields_every_complete_message_before_the_cut(by_hand):
@@ -80,8 +79,8 @@ def test_an_unchunked_file_yields_every_complete_message_before_the_cut(by_hand)
     path.write_bytes(whole[:cut])
     source = Mcap().columns(path)
     assert source.columns["/a x"].values.tolist() == list(range(30))
-    damage, unverified = (finding.fact for finding in source.findings)
-    assert damage.read_before == 30 and isinstance(unverified, Unverified)
+    damage, unverified = (fact_of(finding) for finding in source.findings)
+    assert damage.numbers["read_before"] == 30 and unverified.kind == "unverified"
 
 
 def test_no_flipped_byte_leads_to_a_wrong_value(written):

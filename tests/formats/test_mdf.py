@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
-from cdtool.findings.containers import ColumnLeftOut
 from cdtool.formats.mdf import Mdf, _library
 from cdtool.ingest.reading import survey
+from tests.findings.facts import fact_of
 
 asammdf = pytest.importorskip("asammdf")
 
@@ -54,7 +54,7 @@ def test_texts_and_enumerations_are_named_and_left_out(saved):
     )
     source = survey(path)
     assert list(source.columns) == ["v"]
-    assert [finding.fact.what for finding in source.findings].count("of texts") == 2
+    assert [finding.numbers["what"] for finding in source.findings].count("of texts") == 2
 
 
 def test_only_plain_arithmetic_is_evaluated_in_a_formula(saved):
@@ -63,7 +63,7 @@ def test_only_plain_arithmetic_is_evaluated_in_a_formula(saved):
     source = survey(path)
     assert list(source.columns) == ["good"]
     what = "defined by the formula 'where(X1, X1, X1)', which is not evaluated"
-    assert source.findings[0].fact == ColumnLeftOut("evil", what)
+    assert fact_of(source.findings[0]) == ("column_left_out", {"column": "evil", "what": what})
 
 
 def test_equal_names_in_two_groups_are_distinguished(saved):

@@ -5,9 +5,9 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import ColumnLeftOut, CutBehindRow, RoundedColumn
 from cdtool.formats.parquet import Parquet
 from cdtool.ingest.reading import survey
+from tests.findings.facts import fact_of
 
 pa = pytest.importorskip("pyarrow")
 feather = pytest.importorskip("pyarrow.feather")
@@ -44,9 +44,9 @@ def test_numbers_of_every_kind_become_float64_and_others_are_named(saved):
     assert all(column.values.dtype == np.float64 for column in source.columns.values())
     np.testing.assert_array_equal(source.columns["n"].values, [1.0, np.nan, 3.0])
     assert source.columns["on"].values.tolist() == [1.0, 0.0, 1.0]
-    word, other = (finding.fact for finding in source.findings)
-    assert word == ColumnLeftOut("word", "string")
-    assert (other.column, other.what[:5]) == ("list", "list<")
+    word, other = (fact_of(finding) for finding in source.findings)
+    assert word == ("column_left_out", {"column": "word", "what": "string"})
+    assert (other.numbers["column"], other.numbers["what"][:5]) == ("list", "list<")
 
 
 def test_a_fields_unit_is_read_and_time_stamps_are_seconds_after_the_first(saved):
@@ -55,11 +55,11 @@ def test_a_fields_unit_is_read_and_time_stamps_are_seconds_after_the_first(saved
     source = survey(saved(pa.Table.from_arrays([stamps, pa.array([1.0, 2.0, 3.0])], schema=pa.schema(fields))))
     assert source.columns["i"].unit == "A" and source.columns["when"].unit == "s"
     assert source.columns["when"].values.tolist() == [0.0, 0.001000001, 0.002000002]
-    assert source.findings[0].fact.start.startswith("2025-03-04T05:06:07")
+    assert source.findings[0].numbers["start"].startswith("2025-03-04T05:06:07")
 
 
 def test_integers_that_float64_cannot_represent_are_reported(saved):
-    assert survey(saved({"t": [1, 2], "big": [2**53 + 1, 5]})).findings[0] == Finding(RoundedColumn(), "big")
+    assert survey(saved({"t": [1, 2], "big": [2**53 + 1, 5]})).findings[0] == Finding("rounded_column", "big")
 
 
 def test_a_file_cut_off_anywhere_is_one_line_or_a_counted_loss(saved):
@@ -83,7 +83,7 @@ def test_complete_record_batches_before_the_cut_are_read(tmp_path):
     source = survey(path)
     values = source.columns["v"].values
     assert len(values) == 50_000 and np.array_equal(values, np.arange(50_000.0))
-    assert source.findings[0] == Finding(CutBehindRow(50000), severity="loss")
+    assert source.findings[0] == Finding("cut_behind_row", "", {"row": 50000})
 
 
 def test_flipped_bytes_are_one_line_or_a_table(saved):

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
-from cdtool.findings.clocks import WrittenTimes
 from cdtool.formats import slices
 from cdtool.formats.csv import text
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces, split_by_clock
@@ -86,7 +85,7 @@ def test_midnight_between_two_blocks_is_detected(tmp_path, monkeypatch):
     path.write_text("clock,v\n" + "".join(f"{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d},1\n" for s in seconds))
     source = join_pieces(read_pieces(choose_format(path), path), sort=False)
     assert np.array_equal(source.columns["clock"].values, seconds)
-    assert any(isinstance(finding.fact, WrittenTimes) and finding.fact.wrapped == 3 for finding in source.findings)
+    assert any(finding.kind == "written_times" and finding.numbers["wrapped"] == 3 for finding in source.findings)
 
 
 @pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cell")])

@@ -7,10 +7,9 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import NoStartTime
-from cdtool.findings.containers import ColumnLeftOut, LibraryMessage, RoundedIntegers
 from cdtool.formats.tdms import Tdms, collect_warnings
 from cdtool.ingest.reading import survey
+from tests.findings.facts import fact_of
 
 nptdms = pytest.importorskip("nptdms")
 
@@ -60,8 +59,9 @@ def test_texts_and_time_stamps_are_named_and_left_out(saved):
         saved([channel("m", "word", ["a", "b"]), channel("m", "when", stamps), channel("m", "v", np.ones(3))])
     )
     assert list(source.columns) == ["v"]
-    facts = {finding.fact for finding in source.findings}
-    assert {ColumnLeftOut("word", "not numeric"), ColumnLeftOut("when", "of time stamps")} <= facts
+    facts = [fact_of(finding) for finding in source.findings]
+    assert ("column_left_out", {"column": "word", "what": "not numeric"}) in facts
+    assert ("column_left_out", {"column": "when", "what": "of time stamps"}) in facts
 
 
 def test_the_complete_part_of_a_cut_file_is_read_and_the_loss_is_reported(saved):
@@ -110,7 +110,7 @@ def test_waveforms_without_a_start_keep_their_offset_from_the_common_origin(save
     assert starts == {"i": 0.0, "F": 3600.25, "n": 0.5}
     assert source.origin == (START - np.datetime64(0, "us")) / np.timedelta64(1, "s")
     (warning,) = [finding for finding in source.findings if finding.severity == "warning"]
-    assert warning.fact == NoStartTime(("n",))
+    assert fact_of(warning) == ("no_start_time", {"channels": ("n",)})
 
 
 def test_a_start_in_1904_is_an_empty_stamp(saved):
@@ -119,7 +119,7 @@ def test_a_start_in_1904_is_an_empty_stamp(saved):
     source = survey(saved(rows))
     assert source.origin == 0.0 and not source.findings
     source = survey(saved([*rows, channel("m", "c", np.arange(5.0), wf_increment=0.01, wf_start_time=START)]))
-    assert source.findings[0].fact == NoStartTime(("a", "b"))
+    assert fact_of(source.findings[0]) == ("no_start_time", {"channels": ("a", "b")})
 
 
 def test_an_integer_increment_is_a_clock(saved):
@@ -141,7 +141,7 @@ def test_stamps_in_nanoseconds_since_1970_are_exact_next_to_waveforms(saved):
     nanoseconds = stamps - first + 123_456_789
     assert np.allclose(source.columns["F"].time, nanoseconds / 1e9, rtol=1e-15, atol=0.0)
     assert source.columns["i"].time[0] == 0.0
-    assert Finding(RoundedIntegers(200), "time") in source.findings
+    assert Finding("rounded_integers", "time", {"count": 200}) in source.findings
 
 
 def test_a_clock_with_its_own_start_is_not_shifted_and_is_reported(saved):
@@ -154,7 +154,7 @@ def test_a_clock_with_its_own_start_is_not_shifted_and_is_reported(saved):
     )
     source = survey(path)
     assert source.columns["F"].time.tolist() == [0.0, 0.001, 0.002, 0.003, 0.004]
-    assert NoStartTime(("F",)) in [finding.fact for finding in source.findings]
+    assert ("no_start_time", {"channels": ("F",)}) in [fact_of(finding) for finding in source.findings]
 
 
 def test_warnings_of_the_library_are_reported_and_not_printed(saved, capfd, caplog):
@@ -163,8 +163,8 @@ def test_warnings_of_the_library_are_reported_and_not_printed(saved, capfd, capl
     handlers = list(logging.getLogger("nptdms.reader").handlers)
     source = survey(path)
     assert capfd.readouterr() == ("", "") and not caplog.records
-    told = [finding for finding in source.findings if isinstance(finding.fact, LibraryMessage)]
-    assert [item.severity for item in told if item.fact.text.startswith("Last segment")] == ["note"]
+    told = [finding for finding in source.findings if finding.kind == "library_message"]
+    assert [item.severity for item in told if item.numbers["text"].startswith("Last segment")] == ["note"]
     assert [finding.severity for finding in source.findings].count("loss") == 1
     assert logging.getLogger("nptdms.reader").handlers == handlers
 

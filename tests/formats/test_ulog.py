@@ -8,16 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
-from cdtool.findings.containers import (
-    ColumnLeftOut,
-    CutWithinMessage,
-    LoggerDropouts,
-    MessagesDamaged,
-    RoundedColumn,
-)
 from cdtool.formats.ulog import Ulog
 from cdtool.ingest.reading import choose_format, read_as_logged, survey
 from tests.command import cdtool
+from tests.findings.facts import fact_of
 from tests.synthetic.ulog import CODES, UlogFile
 
 pytest.importorskip("pyulog")
@@ -35,7 +29,7 @@ def flight(rows: int = 50) -> UlogFile:
 
 
 def kinds(source) -> list[type]:
-    return [type(finding.fact) for finding in source.findings]
+    return [finding.kind for finding in source.findings]
 
 
 def test_a_column_is_a_topic_and_a_field_on_the_clock_of_its_topic(tmp_path):
@@ -97,10 +91,10 @@ def test_texts_and_topics_without_time_stamps_are_named(tmp_path):
     )
     source = survey(log.write(tmp_path / "log.ulg"))
     assert source.names == ("a/v",)
-    assert {finding.fact for finding in source.findings} == {
-        ColumnLeftOut("a/words", "a text"),
-        ColumnLeftOut("b", "a topic without time stamps"),
-    }
+    assert sorted(map(fact_of, source.findings), key=str) == [
+        ("column_left_out", {"column": "a/words", "what": "a text"}),
+        ("column_left_out", {"column": "b", "what": "a topic without time stamps"}),
+    ]
 
 
 def test_large_integers_are_reported_and_a_clock_since_1970_is_exact(tmp_path):
@@ -108,13 +102,16 @@ def test_large_integers_are_reported_and_a_clock_since_1970_is_exact(tmp_path):
     log = UlogFile(start).format("a", "uint64_t timestamp;uint64_t n;").subscribe(0, "a")
     source = survey(log.data(0, "QQ", ((start + 125 * i, 2**63 + i) for i in range(9))).write(tmp_path / "log.ulg"))
     assert source.columns["a/n"].time.tolist() == pytest.approx([125e-6 * i for i in range(9)], abs=1e-15)
-    assert source.origin == pytest.approx(start * 1e-6) and kinds(source) == [RoundedColumn]
+    assert source.origin == pytest.approx(start * 1e-6) and kinds(source) == ["rounded_column"]
 
 
 def test_dropouts_of_the_logger_are_a_loss(tmp_path):
     source = survey(flight().dropout(20).dropout(300).write(tmp_path / "log.ulg"))
     (finding,) = source.findings
-    assert finding.severity == "loss" and finding.fact == LoggerDropouts(2, 0.32, 0.3)
+    assert finding.severity == "loss" and fact_of(finding) == (
+        "logger_dropouts",
+        {"count": 2, "total": 0.32, "longest": 0.3},
+    )
 
 
 def test_a_machine_file_maps_topics_on_their_own_clocks(tmp_path, machine):
@@ -145,7 +142,7 @@ def test_a_file_that_ends_within_a_message_is_a_loss_and_one_that_ends_after_it_
     for cut in (1, last - 3, last - 1):
         path.write_bytes(whole[:-cut])
         source = survey(path)
-        assert [finding.fact for finding in source.findings] == [CutWithinMessage(last - cut)]
+        assert [fact_of(finding) for finding in source.findings] == [("cut_within_message", {"size": last - cut})]
         assert len(source.columns["sensor_accel[1]/x"].values) == 199
     path.write_bytes(whole[:-last])
     assert survey(path).findings == ()
@@ -177,7 +174,7 @@ def test_damaged_bytes_are_reported_or_change_numbers_only(tmp_path, capfd):
         except RecordingError as fault:
             assert "\n" not in str(fault)
         else:
-            reported += MessagesDamaged in kinds(source)
+            reported += "messages_damaged" in kinds(source)
     assert reported
     assert capfd.readouterr().out == ""
 
@@ -192,7 +189,15 @@ def test_messages_after_a_damaged_one_are_read_from_the_next_mark(tmp_path):
     path = tmp_path / "log.ulg"
     path.write_bytes(wrong)
     source = survey(path)
-    assert MessagesDamaged in kinds(source) and 6.0 in source.columns["sensor_accel/x"].values
+    assert "messages_damaged" in kinds(source) and 6.0 in source.columns["sensor_accel/x"].values
+
+
+def test_a_message_that_is_longer_than_its_file_is_read_once(tmp_path):
+    """pyulog goes back by the 150 bytes that the message declares: it left the file, or read its end for ever."""
+    path = UlogFile().format("a", "uint64_t timestamp;float v;").write(tmp_path / "log.ulg")
+    path.write_bytes(path.read_bytes() + bytes(200) + b"\x96\x00\x00" + bytes(20))
+    with pytest.raises(RecordingError, match="contains no message with numbers"):
+        survey(path)
 
 
 def test_definitions_that_multiply_without_end_are_refused(tmp_path):

@@ -13,12 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
-from cdtool.findings.containers import ErrorCells, FormulasWithoutValue, NumbersAmongTexts, SheetLeftOut
 from cdtool.formats.csv import Csv
 from cdtool.formats.xlsx import Xlsx
 from cdtool.ingest.reading import choose_format, read_as_logged, survey
 from cdtool.workflows.information import info
 from tests.command import cdtool
+from tests.findings.facts import fact_of
 
 openpyxl = pytest.importorskip("openpyxl")
 
@@ -104,9 +104,9 @@ def test_a_table_opened_with_the_wrong_decimal_mark_is_a_warning(tmp_path):
     """1,234 became 1234, and 1,5 stayed a text."""
     rows = [[0.01 * i, 1234 if i % 5 == 0 else f"1,{i}"] for i in range(20)]
     source = survey(save(tmp_path / "log.xlsx", Run=[["t", "F"], *rows]))
-    (finding,) = [finding for finding in source.findings if isinstance(finding.fact, NumbersAmongTexts)]
+    (finding,) = [finding for finding in source.findings if finding.kind == "numbers_among_texts"]
     assert (finding.channel, finding.severity) == ("F", "warning")
-    assert finding.fact == NumbersAmongTexts(16, "1,1", 3, 4)
+    assert fact_of(finding) == ("numbers_among_texts", {"count": 16, "text": "1,1", "row": 3, "integers": 4})
 
 
 @pytest.mark.parametrize("epoch", ["1900", "1904"])
@@ -163,8 +163,8 @@ def test_cells_with_errors_are_missing_and_counted(tmp_path):
     rows[4][1], rows[6][1] = "#N/A", "#DIV/0!"
     source = survey(save(tmp_path / "log.xlsx", Run=[["t", "F"], *rows]))
     assert np.isnan(source.columns["F"].values[[4, 6]]).all()
-    (finding,) = [finding for finding in source.findings if isinstance(finding.fact, ErrorCells)]
-    assert finding.channel == "F" and finding.fact == ErrorCells(2, "#N/A", 6)
+    (finding,) = [finding for finding in source.findings if finding.kind == "error_cells"]
+    assert finding.channel == "F" and fact_of(finding) == ("error_cells", {"count": 2, "error": "#N/A", "row": 6})
 
 
 def test_formulas_that_were_never_calculated_are_a_loss(tmp_path):
@@ -172,7 +172,7 @@ def test_formulas_that_were_never_calculated_are_a_loss(tmp_path):
     rows[4][1] = rows[5][1] = "=A2*2"
     path = save(tmp_path / "log.xlsx", Run=[["t", "F"], *rows])
     (finding,) = [finding for finding in survey(path).findings if finding.severity == "loss"]
-    assert (finding.channel, finding.fact) == ("F", FormulasWithoutValue(2, 6))
+    assert (finding.channel, fact_of(finding)) == ("F", ("formulas_without_value", {"count": 2, "row": 6}))
 
     def calculated(content: bytes) -> bytes:
         assert content.count(b"<v></v>") + content.count(b"<v />") + content.count(b"<v/>") == 2
@@ -198,7 +198,7 @@ def test_columns_of_several_sheets_have_the_name_and_the_clock_of_their_sheet(tm
     assert list(source.columns) == ["Run 1!t [s]", "Run 1!torque [Nm]", "cell!2!t_ms", "cell!2!F [N]"]
     np.testing.assert_allclose(source.columns["cell!2!F [N]"].time, 0.001 * np.arange(100), atol=1e-12)
     np.testing.assert_array_equal(source.columns["Run 1!torque [Nm]"].time, [row[0] for row in ramp()])
-    assert [finding.fact.sheet for finding in source.findings if isinstance(finding.fact, SheetLeftOut)] == ["Notes"]
+    assert [finding.numbers["sheet"] for finding in source.findings if finding.kind == "sheet_left_out"] == ["Notes"]
 
 
 def test_sheets_with_dates_start_on_one_clock(tmp_path):

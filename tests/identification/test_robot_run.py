@@ -7,7 +7,6 @@ import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.channels import DerivedSpeed
 from cdtool.identification.robot_run import RobotRun, central_derivative, robot_run
 from cdtool.recording import FloatArray, Recording, Series
 
@@ -44,7 +43,7 @@ def test_all_joints_come_to_the_slowest_channels_clock() -> None:
 @pytest.mark.parametrize("is_in_the_log", [True, False])
 def test_a_speed_from_a_causal_derivative_is_replaced_by_one_without_delay(is_in_the_log: bool) -> None:
     if is_in_the_log:
-        log = recording((Finding(DerivedSpeed(50.0), "speed", "note"),))
+        log = recording((Finding("derived_speed", "speed", {"low_pass": 50.0}),))
         delayed = log["speed"].with_values(np.roll(log["speed"].values, 3, axis=0), "rad/s")
         log = Recording(log.name, log.source, log.joints, {**log.channels, "speed": delayed}, findings=log.findings)
     else:

@@ -16,7 +16,7 @@ def test_excel_days_are_distinguished_from_seconds_at_any_rate(tmp_path, rate_hz
     path = tmp_path / "log.csv"
     path.write_text("time,torque\n" + "".join(f"{day:.12f},{i % 7}\n" for i, day in enumerate(days)))
     shown = info(path)
-    assert any(getattr(finding.fact, "evidence", "") == "excel" for finding in shown.findings)
+    assert any(finding.numbers.get("evidence", "") == "excel" for finding in shown.findings)
     assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(rate_hz, rel=1e-3)] * 2
 
 
@@ -35,4 +35,4 @@ def test_uneven_steps_are_those_of_a_clock_only_if_its_name_says_so(tmp_path, na
     steps = np.random.default_rng(1).choice([0.005, 0.016, 0.031, 0.047], 2000)
     path = tmp_path / "log.csv"
     path.write_text(f"{name},torque\n" + "".join(f"{time:.3f},{i % 7}\n" for i, time in enumerate(np.cumsum(steps))))
-    assert any(getattr(finding.fact, "evidence", "") == "steps" for finding in info(path).findings) is is_one
+    assert any(finding.numbers.get("evidence", "") == "steps" for finding in info(path).findings) is is_one

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from cdtool.channels import ChannelSource
 from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.findings.channels import AbsentTruth, AxesHeld, SaturatedValues, UnitContradicted
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.force_axes import join_axes
 from cdtool.ingest.reading import read_as_logged
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import FloatArray, Recording
 from cdtool.workflows.convert.converting import convert
+from tests.findings.facts import fact_of
 
 AXIS = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 10.0\n'
 COLUMNS = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "v", unit = "m/s" }\n'
@@ -61,14 +62,14 @@ def test_each_axis_has_its_scale(tmp_path):
 
 def test_a_saturated_axis_is_named(tmp_path):
     recording = read(tmp_path, VECTOR.replace("}", ", saturation = [-30.0, 1000.0] }"), table())
-    (found,) = [item for item in recording.findings if isinstance(item.fact, SaturatedValues)]
-    assert (found.channel, found.fact.count) == ("force fy", 5)
+    (found,) = [item for item in recording.findings if item.kind == "saturated_values"]
+    assert (found.channel, found.numbers["count"]) == ("force fy", 5)
 
 
 def test_an_axis_in_another_unit_is_named(tmp_path):
     recording = read(tmp_path, VECTOR, table("t,v,fx [N],fy [kN],fz [N]").replace("t,v,", "t,v,"))
-    (found,) = [item.fact for item in recording.findings if isinstance(item.fact, UnitContradicted)]
-    assert (found.header, found.stated) == ("fy [kN]", "N")
+    (found,) = [fact_of(item) for item in recording.findings if item.kind == "unit_contradicted"]
+    assert (found.numbers["header"], found.numbers["stated"]) == ("fy [kN]", "N")
 
 
 @pytest.mark.parametrize(
@@ -87,7 +88,7 @@ def test_the_number_of_joints_does_not_matter(tmp_path, machine):
 def test_a_log_without_one_axis_has_no_force(tmp_path):
     recording = read(tmp_path, VECTOR, table("t,v,fx,fy,other"))
     assert "force" not in recording
-    assert [item.channel for item in recording.findings if isinstance(item.fact, AbsentTruth)] == ["force"]
+    assert [item.channel for item in recording.findings if item.kind in ("absent_truth", "absent_file")] == ["force"]
 
 
 @pytest.mark.parametrize(
@@ -148,6 +149,21 @@ def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, als
         assert read_as_logged(tmp_path / name, again).recording["force"].values.tolist() == found.tolist()
 
 
+def test_an_infinite_value_of_an_axis_of_a_container_with_clocks_names_the_axis(tmp_path):
+    axes = np.random.default_rng(0).normal(size=(200, 3))
+    axes[7, 1] = np.inf
+    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{TOPIC}\n", encoding="utf-8")
+    log = write_log(tmp_path, np.where(np.isinf(axes), 1.0, axes), np.arange(200) * 5e-3)
+    convert(log, tmp_path / "new.h5", machine=read_machine_file(tmp_path / "machine.toml"))
+    with h5py.File(tmp_path / "new.h5", "r+") as file:
+        file["force y"][7] = np.inf
+    again = read_machine_file(tmp_path / "new.h5.machine.toml")
+    (found,) = (
+        item for item in read_as_logged(tmp_path / "new.h5", again).recording.findings if item.severity == "loss"
+    )
+    assert (found.kind, found.channel) == ("infinite_values", "force force y")
+
+
 def test_each_axis_may_have_a_topic_and_a_clock_of_its_own(tmp_path):
     time = np.arange(200) * 5e-3
     speed = Stream("/joints", "sensor_msgs/msg/JointState", time, {"velocity": np.ones((200, 1))}, ("axis",))
@@ -163,8 +179,8 @@ def test_each_axis_may_have_a_topic_and_a_clock_of_its_own(tmp_path):
     series = recording["force"]
     assert series.values[1:, 0] == pytest.approx(100.0 * series.time[1:])
     assert series.values[1:, 1] == pytest.approx(100.0 * (series.time[1:] - 0.003))
-    (note,) = [item.fact for item in recording.findings if isinstance(item.fact, AxesHeld)]
-    assert note.age == pytest.approx(0.003, abs=1e-6)
+    (note,) = [fact_of(item) for item in recording.findings if item.kind == "axes_held"]
+    assert note.numbers["age"] == pytest.approx(0.003, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +218,7 @@ def test_axes_with_clocks_of_their_own_are_held_and_never_from_the_future():
     assert np.all(held <= slow[1:]) and np.all(held > slow[1:] - 0.0011)
     assert np.isnan(column.values[0, 0])
     (note,) = findings
-    assert isinstance(note.fact, AxesHeld) and note.fact.slowest == "b" and note.fact.age == pytest.approx(6e-4)
+    assert note.kind == "axes_held" and note.numbers["slowest"] == "b" and note.numbers["age"] == pytest.approx(6e-4)
 
 
 def test_an_axis_that_pauses_is_missing_and_not_held():

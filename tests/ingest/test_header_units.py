@@ -7,11 +7,10 @@ import pytest
 
 from cdtool.channels import ChannelSource
 from cdtool.columns import Column
-from cdtool.findings.channels import UnitContradicted
-from cdtool.findings.clocks import ClockUnitContradicted
 from cdtool.formats.column_names import split_unit
 from cdtool.ingest.header_units import channel_unit_findings
 from cdtool.ingest.reading import read_recording
+from tests.findings.facts import fact_of
 
 LOAD = """
 [machine]
@@ -24,8 +23,8 @@ ROTARY = LOAD.format(kind="rotary_axis", inertia="load_inertia = 1.0")
 
 
 def unit_findings(recording, channel):
-    kinds = UnitContradicted, ClockUnitContradicted
-    return [item for item in recording.findings if item.channel == channel and isinstance(item.fact, kinds)]
+    kinds = "unit_contradicted", "clock_unit_contradicted"
+    return [item for item in recording.findings if item.channel == channel and item.kind in kinds]
 
 
 def findings_of_log(log, machine, machine_table, channel, header, stated):
@@ -70,8 +69,19 @@ def test_a_header_that_contradicts_the_machine_file_is_a_loss(
 ):
     (finding,) = findings_of_log(log, machine, kind, channel, header, stated)
     in_file = stated.split('"')[1]
-    fact = UnitContradicted(f"x [{header}]", header, 0, in_file, pytest.approx(ratio, rel=1e-3), advice, scale)
-    assert finding.fact == fact and finding.severity == "loss"
+    fact = (
+        "unit_contradicted",
+        {
+            "header": f"x [{header}]",
+            "header_unit": header,
+            "more": 0,
+            "stated": in_file,
+            "ratio": pytest.approx(ratio, rel=1e-3),
+            "advice": advice,
+            "scale": scale,
+        },
+    )
+    assert fact_of(finding) == fact and finding.severity == "loss"
 
 
 @pytest.mark.parametrize(
@@ -120,7 +130,18 @@ def test_a_header_with_a_matching_or_unknown_unit_is_not_reported(log, machine, 
 def test_a_text_that_is_not_a_unit_is_reported(log, machine, channel, header, severity):
     unit = {"force": "N", "torque": "N", "contact_pressure": "kPa"}[channel]
     (finding,) = findings_of_log(log, machine, LINEAR, channel, header, f'unit = "{unit}"')
-    assert finding.fact == UnitContradicted(f"x [{header}]", header, 0, unit, 0.0, "no unit")
+    assert fact_of(finding) == (
+        "unit_contradicted",
+        {
+            "header": f"x [{header}]",
+            "header_unit": header,
+            "more": 0,
+            "stated": unit,
+            "ratio": 0.0,
+            "advice": "no unit",
+            "scale": "",
+        },
+    )
     assert finding.severity == severity
 
 
@@ -144,7 +165,7 @@ def test_a_text_that_is_not_a_unit_is_reported(log, machine, channel, header, se
 def test_the_name_of_a_force_may_state_its_unit(column, fits):
     force = ChannelSource("force", (column,), unit="N", stated="N")
     found = channel_unit_findings(force, [Column(column, np.empty(0), unit=split_unit(column)[1])])
-    assert not found if fits else found[0].fact.header == column
+    assert not found if fits else found[0].numbers["header"] == column
 
 
 @pytest.mark.parametrize(
@@ -170,7 +191,7 @@ def test_the_unit_1_is_only_compared_if_the_machine_file_states_a_share():
     torque = ChannelSource("torque", ("x",), unit="N m", stated="N m")
     assert channel_unit_findings(torque, [plain]) == []
     duty = ChannelSource("torque", ("x",), factor=(0.01,), unit="1", stated="%")
-    assert channel_unit_findings(duty, [plain])[0].fact.ratio == pytest.approx(100.0)
+    assert channel_unit_findings(duty, [plain])[0].numbers["ratio"] == pytest.approx(100.0)
 
 
 def test_a_channel_of_linear_and_rotary_joints_is_in_the_si_unit_of_each():
@@ -178,16 +199,16 @@ def test_a_channel_of_linear_and_rotary_joints_is_in_the_si_unit_of_each():
     columns = [Column("a", np.empty(0), unit="rad"), Column("b", np.empty(0), unit="m")]
     assert channel_unit_findings(both, columns) == []
     columns[0] = Column("a", np.empty(0), unit="deg")
-    fact = channel_unit_findings(both, columns)[0].fact
-    assert (fact.header, fact.stated) == ("a [deg]", "SI")
+    fact = fact_of(channel_unit_findings(both, columns)[0])
+    assert (fact.numbers["header"], fact.numbers["stated"]) == ("a [deg]", "SI")
 
 
 def test_a_row_of_units_is_compared_with_the_machine_file(log, machine):
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nposition = { column = "pos", unit = "m" }\n'
     rows = "".join(f"{0.01 * k:.2f};{k}\n" for k in range(30))
     recording = read_recording(log(f"t;pos\ns;mm\n{rows}"), machine(channels, LINEAR))
-    fact = unit_findings(recording, "position")[0].fact
-    assert (fact.header, fact.stated) == ("pos [mm]", "m")
+    fact = fact_of(unit_findings(recording, "position")[0])
+    assert (fact.numbers["header"], fact.numbers["stated"]) == ("pos [mm]", "m")
 
 
 def test_joints_with_the_same_wrong_unit_are_one_warning(log, machine):
@@ -201,8 +222,12 @@ speed = { columns = ["c", "d"], unit = "rad/s" }
     recording = read_recording(
         log(f"t [s];a [deg];b [deg];c [rad/s];d [rpm]\n{rows}"), machine(channels, ROTARY + 'joints = ["a", "b"]\n')
     )
-    assert [(item.fact.header, item.fact.more) for item in unit_findings(recording, "position")] == [("a [deg]", 1)]
-    assert [(item.fact.header, item.fact.more) for item in unit_findings(recording, "speed")] == [("d [rpm]", 0)]
+    assert [(item.numbers["header"], item.numbers["more"]) for item in unit_findings(recording, "position")] == [
+        ("a [deg]", 1)
+    ]
+    assert [(item.numbers["header"], item.numbers["more"]) for item in unit_findings(recording, "speed")] == [
+        ("d [rpm]", 0)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -220,8 +245,17 @@ def test_the_unit_of_the_clock_is_compared_with_the_machine_file(log, machine, h
     channels = f'[channels]\ntime = {{ column = "t", {time} }}\nposition = {{ column = "x", unit = "m" }}\n'
     rows = "".join(f"{k};{k}\n" for k in range(30))
     findings = unit_findings(read_recording(log(f"t [{header}];x [m]\n{rows}"), machine(channels, LINEAR)), "time")
-    fact = ClockUnitContradicted(f"t [{header}]", header, "s", rate, None if ratio is None else pytest.approx(ratio))
-    assert [item.fact for item in findings] == ([] if ratio is None else [fact])
+    fact = (
+        "clock_unit_contradicted",
+        {
+            "header": f"t [{header}]",
+            "header_unit": header,
+            "stated": "s",
+            "rate": rate,
+            "ratio": None if ratio is None else pytest.approx(ratio),
+        },
+    )
+    assert [fact_of(item) for item in findings] == ([] if ratio is None else [fact])
 
 
 def test_the_unit_of_a_column_with_its_own_clock_is_compared(tmp_path, machine):
@@ -233,5 +267,5 @@ def test_the_unit_of_a_column_with_its_own_clock_is_compared(tmp_path, machine):
             file[f"drive/{name}"].attrs["unit"] = unit
     channels = '[channels]\ntime = { column = "time", unit = "s" }\nposition = { column = "drive/pos", unit = "m" }\n'
     recording = read_recording(path, machine(channels, LINEAR))
-    fact = unit_findings(recording, "position")[0].fact
-    assert (fact.header, fact.stated) == ("drive/pos [mm]", "m")
+    fact = fact_of(unit_findings(recording, "position")[0])
+    assert (fact.numbers["header"], fact.numbers["stated"]) == ("drive/pos [mm]", "m")

@@ -8,7 +8,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RoundedIntegers
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
@@ -19,7 +18,7 @@ EPOCH = 1_700_000_000_123_456_789
 
 
 def rounding_findings(source) -> list[Finding]:
-    return [finding for finding in source.findings if isinstance(finding.fact, RoundedIntegers)]
+    return [finding for finding in source.findings if finding.kind == "rounded_integers"]
 
 
 def stamp_text(ns: int, unit: str, mark: str = ".") -> str:
@@ -97,13 +96,13 @@ def test_any_stamps_are_exact_to_the_nanosecond(log, machine, first, steps, unit
 def test_without_a_machine_file_rounded_stamps_are_counted(log):
     text = "stamp,x\n" + "".join(f"{EPOCH + i},{i}\n" for i in range(30))
     for source in (Csv().columns(log(text)), join_pieces(Csv().pieces(log(text)), sort=False)):
-        assert rounding_findings(source) == [Finding(RoundedIntegers(30), "stamp")]
+        assert rounding_findings(source) == [Finding("rounded_integers", "stamp", {"count": 30})]
 
 
 def test_rounded_numbers_of_other_columns_are_counted_with_a_machine_file(log, machine):
     rows = "".join(f"{i},1,{2**53 + 2 * i - 4}\n" for i in range(8))
     recording = read_recording(log("t,i_motor,n_motor\n" + rows), machine())
-    assert rounding_findings(recording)[0] == Finding(RoundedIntegers(5), "n_motor")
+    assert rounding_findings(recording)[0] == Finding("rounded_integers", "n_motor", {"count": 5})
 
 
 @pytest.mark.parametrize(

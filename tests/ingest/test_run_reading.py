@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from cdtool.errors import ConfigurationError, RecordingError, UsageError
-from cdtool.findings.runs import ReturningIds, SamplesOutsideRuns
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.reading import read_as_logged
 from cdtool.ingest.run_reading import read_runs, split_run
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import RunCut
+from tests.findings.facts import fact_of
 
 MACHINE = """[machine]
 type = "rotary_axis"
@@ -100,7 +100,9 @@ def test_an_id_that_comes_back_is_reported_and_a_label_that_comes_back_is_not(tm
     log = log_of(tmp_path / "log.csv", ["push", "free", "push"])
     found = read_runs(log, machine, RunCut("column", "run_id"))
     assert [logged.recording.name for logged in found.runs] == ["log#push", "log#free", "log#push/2"]
-    assert [item.fact for item in found.findings if item.severity == "warning"] == [ReturningIds(("push/2",), "run_id")]
+    assert [fact_of(item) for item in found.findings if item.severity == "warning"] == [
+        ("returning_ids", {"names": ("push/2",), "column": "run_id"})
+    ]
     labelled = read_runs(log, machine, RunCut("label", "run_id"))
     assert [logged.recording.name for logged in labelled.runs] == ["log#push", "log#free", "log#push/2"]
     assert not [item for item in labelled.findings if item.severity == "warning"]
@@ -109,12 +111,12 @@ def test_an_id_that_comes_back_is_reported_and_a_label_that_comes_back_is_not(tm
 def test_rows_without_an_id_are_counted_and_a_label_of_none_ends_a_run(tmp_path, machine):
     log = log_of(tmp_path / "log.csv", ["", "a", "", "a", "b"])
     by_id, by_label = (read_runs(log, machine, RunCut(by, "run_id")) for by in ("column", "label"))
-    assert [item.fact for item in by_id.findings if item.severity == "warning"] == [
-        SamplesOutsideRuns(ROWS, 5 * ROWS, "run_id")
+    assert [fact_of(item) for item in by_id.findings if item.severity == "warning"] == [
+        ("samples_outside_runs", {"count": ROWS, "total": 5 * ROWS, "column": "run_id"})
     ]
     assert [logged.recording.name for logged in by_label.runs] == ["log#a", "log#a/2", "log#b"]
-    assert [item.fact for item in by_label.findings if item.severity == "warning"] == [
-        SamplesOutsideRuns(2 * ROWS, 5 * ROWS, "run_id")
+    assert [fact_of(item) for item in by_label.findings if item.severity == "warning"] == [
+        ("samples_outside_runs", {"count": 2 * ROWS, "total": 5 * ROWS, "column": "run_id"})
     ]
 
 
@@ -165,8 +167,8 @@ def test_a_line_number_in_a_finding_is_that_of_the_file(tmp_path, machine):
     lines = [f"{row},1" for row in table(0)] + [f"{row},2" for row in second]
     log = tmp_path / "log.csv"
     log.write_text("\n".join(["t,w,tau,cell,run_id", *lines, ""]))
-    repeated = [item.fact for item in read_runs(log, machine, RunCut("clock-reset")).runs[1].recording.findings]
-    assert [fact.first for fact in repeated if fact.kind == "repeated_stamps"] == [(1 + ROWS + 21,)]
+    repeated = [fact_of(item) for item in read_runs(log, machine, RunCut("clock-reset")).runs[1].recording.findings]
+    assert [fact.numbers["first"] for fact in repeated if fact.kind == "repeated_stamps"] == [(1 + ROWS + 21,)]
 
 
 @pytest.mark.parametrize(
@@ -254,7 +256,7 @@ def test_the_id_of_a_topic_holds_from_its_message_to_the_next_one(tmp_path, mach
     assert [round(item.recording.origin, 6) for item in found.runs] == [0.2, 1.0, 2.0]
     assert [sorted(item.recording.channels) for item in found.runs] == [["force", "speed"], ["speed"], ["speed"]]
     assert "absent_truth" in [item.kind for item in found.runs[1].recording.findings]
-    outside = [(item.channel, item.fact.count) for item in found.findings if item.kind == "samples_outside_runs"]
+    outside = [(item.channel, item.numbers["count"]) for item in found.findings if item.kind == "samples_outside_runs"]
     assert outside == [("speed", 20), ("force", 20)]
 
 
@@ -301,7 +303,7 @@ def test_texts_of_parquet_and_hdf5_are_ids(tmp_path, machine):
         found = read_runs(path, machine, RunCut("column", "run_id"))
         assert [Path(logged.recording.source).name for logged in found.runs] == [f"{path.name}#A", f"{path.name}#B"]
         assert_equal_runs(found, tmp_path, machine, [0, 2])
-        assert [item.fact.count for item in found.findings if item.kind == "samples_outside_runs"] == [ROWS]
+        assert [item.numbers["count"] for item in found.findings if item.kind == "samples_outside_runs"] == [ROWS]
 
 
 def test_columns_with_clocks_of_their_own_are_cut_where_each_clock_starts_again(tmp_path):

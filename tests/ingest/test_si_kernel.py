@@ -1,4 +1,4 @@
-"""The conversion to SI in one pass has the bits and counts of the same conversion array by array."""
+"""The conversion to SI masks what no sensor delivers, and counts it; channels of a clock share its times."""
 
 from __future__ import annotations
 

@@ -2,10 +2,10 @@
 
     python -m tests.language.checker [FILE|FOLDER ...]
 
-Without arguments, it checks all Python and Markdown files under version control. It exits with 1 if it finds a phrase,
-and prints each as file:line: "phrase": what to write in its place. A line that needs the phrase gives its reason in
-itself: `# language: reason` in Python, `<!-- language: reason -->` in Markdown. After the closing quotes of a docstring
-that counts for the whole docstring.
+Without arguments, it checks all Python and Markdown files and the sentences of findings under version control. It exits
+with 1 if it finds a phrase, and prints each as file:line: "phrase": what to write in its place. A line that needs the
+phrase gives its reason in itself: `# language: reason` in Python, `<!-- language: reason -->` in Markdown. After the
+closing quotes of a docstring that counts for the whole docstring.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from tests.language.phrases import Phrase, read_phrases
 from tests.language.texts import markdown_prose, python_prose
 
 ROOT = Path(__file__).parents[2]
+_PROSE = ("*.py", "*.md", "*kinds.toml")
 
 _EXEMPT = re.compile(r"(?:#|<!--) language: (?!-->)\S+")
 
@@ -39,7 +40,7 @@ class Hit:
 
 
 def hits_in(text: str, suffix: str, name: str, phrases: Iterable[Phrase]) -> Iterator[Hit]:
-    """Yield every hit in the text of a file `name` that ends in `suffix`, ".py" or ".md"."""
+    """Yield every hit in the text of a file `name` that ends in `suffix`; all but ".py" is read as Markdown."""
     prose = python_prose(text) if suffix == ".py" else markdown_prose(text)
     joined = prose.joined()
     lower_case = joined.lower()
@@ -63,8 +64,8 @@ def _last_line(lines: list[str], line: int) -> int:
 
 
 def versioned_files(root: Path = ROOT) -> list[str]:
-    """Return the Python and Markdown files under version control, relative to `root`."""
-    command = ("git", "-C", str(root), "ls-files", "--cached", "--others", "--exclude-standard", "*.py", "*.md")
+    """Return the files with prose under version control, relative to `root`."""
+    command = ("git", "-C", str(root), "ls-files", "--cached", "--others", "--exclude-standard", *_PROSE)
     listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     return [name for name in listed if (root / name).is_file()]
 
@@ -80,8 +81,8 @@ def check(names: Iterable[str], root: Path = ROOT) -> list[Hit]:
 
 
 def files_of(path: Path) -> list[Path]:
-    """Return the file itself, or the Python and Markdown files below a folder in order of their names."""
-    return sorted(file for file in path.rglob("*") if file.suffix in (".py", ".md")) if path.is_dir() else [path]
+    """Return the file itself, or the files with prose below a folder in order of their names."""
+    return sorted({file for kind in _PROSE for file in path.rglob(kind)}) if path.is_dir() else [path]
 
 
 def main(arguments: list[str], root: Path = ROOT) -> int:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.findings.channels import LinkAccelerations
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import FloatArray, Recording, Series
+from tests.findings.facts import fact_of
 from tests.synthetic.machines import ARM, arm_of
 from tests.synthetic.motions import moving_recording
 
@@ -148,7 +148,9 @@ def test_a_log_of_motors_and_sensors_is_referred_to_the_links(arm):
     for name in ("torque", "position", "speed"):
         np.testing.assert_allclose(referred[name].values, log[name].values, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(referred["acceleration"].values, true, atol=1e-9)
-    assert [finding.fact for finding in referred.findings if finding.channel == "acceleration"] == [LinkAccelerations()]
+    assert [fact_of(finding) for finding in referred.findings if finding.channel == "acceleration"] == [
+        ("link_accelerations", {})
+    ]
 
 
 def test_accelerations_of_the_links_themselves_stay_as_they_are(arm):
@@ -199,6 +201,12 @@ def test_sensors_whose_place_is_not_given_are_refused():
 def test_parameters_that_cannot_be_are_refused_by_name(key, value, message):
     values = {name: item for name, item in {**ARM, key: value}.items() if item is not None}
     with pytest.raises(ConfigurationError, match=message):
+        arm_of(values)
+
+
+def test_a_forearm_without_inertia_is_refused():
+    values = ARM | {"centre_of_mass": [0.1, 0.0], "link_inertia": 0.0, "motor_inertia": 0.0}
+    with pytest.raises(ConfigurationError, match=r"machine.link_inertia: joint 'forearm' moves no inertia"):
         arm_of(values)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS
-from cdtool.messages.fields import FieldMissingError, parse_field
+from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS
+from cdtool.messages.fields import FieldMissingError, parse_field, stamp_parts
 
 
 def batch_of(payloads):
@@ -18,6 +19,14 @@ def batch_of(payloads):
     length = np.array([len(payload) for payload in payloads], dtype=np.int64)
     start = np.cumsum(length + len(gap)) - length
     return Batch(data, start, length, np.zeros(len(payloads), dtype=np.uint64))
+
+
+def plain(message):
+    """Return a message of a ROS decoder, an object with slots, as dictionaries."""
+    if isinstance(message, list):
+        return [plain(item) for item in message]
+    names = getattr(type(message), "__slots__", None) if type(message).__module__ != "builtins" else None
+    return message if names is None else {name: plain(getattr(message, name)) for name in names}
 
 
 def fields_of(*texts):
@@ -66,3 +75,9 @@ def assert_follows_field_language(decoded, messages, wanted, joints=()):
         assert (field_values.fault is None) == (first is None), (field.text, field_values.fault, first)
         if first is not None:
             assert (field_values.fault.problem, field_values.fault.advice) == (first.problem, first.advice)
+
+
+def header_stamp(message: Any) -> int | None:
+    """Return the header's time stamp [ns]; None if the message has no header stamp."""
+    parts = stamp_parts(message)
+    return None if parts is None else int(parts[0]) * 10**9 + int(parts[1])

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from cdtool.messages.columns import decoder_for
-from cdtool.messages.columns.json_shape import JsonShape
-from cdtool.messages.fields import header_stamp, numeric_fields
-from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, same
+from cdtool.formats.mcap import Mcap
+from cdtool.messages.encodings import decoder_for
+from cdtool.messages.fields import numeric_fields
+from tests.formats.mcap_files import by_hand  # noqa: F401
+from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, header_stamp, same
 
 WANTED = ("a", "b.c", "q[:]", "q[1]", "q[x]", "b.q[:]", "l[0].c", "l[1].q[0]", "l[x].c", "name[0]", "b", "b[0]", "a.c")
 JOINTS = ("x", "y")
@@ -102,7 +103,7 @@ def test_a_text_is_refused_exactly_if_python_refuses_it(text):
     st.sampled_from([b'{"a": 1.5, "b": {"c": -2e-3, "s": "up"}, "q": [1, 2.25]}', b'{"a":true,"q":[null,3]}']),
     st.data(),
 )
-def test_every_byte_that_differs_from_the_shape_is_noticed(payload, data):
+def test_every_byte_that_differs_from_the_other_messages_is_noticed(payload, data):
     at = data.draw(st.integers(0, len(payload) - 1))
     changed = bytearray(payload)
     changed[at] = data.draw(st.integers(0, 255))
@@ -127,19 +128,7 @@ def test_numbers_equal_pythons_floats_to_the_bit():
     assert same(values, expected)
 
 
-def test_messages_of_one_shape_are_not_decoded_by_python(monkeypatch):
-    payloads = [
-        b'{"t": "%d", "q": [%d, -1.5e%d], "on": %s}' % (i, i, i, b"true" if i % 2 else b"false") for i in range(50)
-    ]
-    batch, decoder, wanted = batch_of(payloads), new_decoder(), fields_of("q[:]", "on")
-    decoder.decode(batch, wanted)
-    monkeypatch.setattr(json, "loads", lambda *_: pytest.fail("a message was decoded by Python"))
-    table, on = (field_values.values for field_values in decoder.decode(batch, wanted).fields)
-    assert table.tolist() == [[i, float(f"-1.5e{i}")] for i in range(50)]
-    assert on.tolist() == [i % 2 for i in range(50)]
-
-
-def test_more_shapes_than_are_stored_decode_to_the_same_values():
+def test_messages_of_many_shapes_decode_to_the_same_values():
     payloads = [json.dumps({"q": list(range(i % 90)), f"k{i % 7}": {"c": i}, "a": i}).encode() for i in range(300)]
     decoder = new_decoder()
     for _ in range(2):
@@ -171,7 +160,15 @@ def test_a_damaged_message_has_a_reason():
     assert new_decoder().decode(batch_of([b"[1]"]), []).reason == "ValueError: the JSON is not an object"
 
 
-def test_decoders_do_not_share_shapes():
-    first, second = new_decoder(), new_decoder()
-    first.decode(batch_of([b'{"a":1}']), fields_of("a"))
-    assert first._shapes and isinstance(first._shapes[0], JsonShape) and not second._shapes
+def test_more_fields_than_any_recorder_writes_are_refused_with_the_reason(by_hand):  # noqa: F811
+    rows = [(k, k, b'{"field%d": 1.0}' % k) for k in range(5000)]
+    source = Mcap().columns(by_hand(rows, "json", "jsonschema", b"{}", "Thing"))
+    assert [str(finding) for finding in source.findings if finding.severity == "loss"] == [
+        "/a: 5000 of 5000 messages cannot be decoded: its messages have more than 4096 different fields"
+    ]
+
+
+def test_a_message_larger_than_any_recorder_writes_is_damaged():
+    payload = b'{"a": [' + b"1," * (8 << 20) + b"1]}"
+    decoded = new_decoder().decode(batch_of([payload, b'{"a": [2]}']), fields_of("a[0]"))
+    assert decoded.status.tolist() == [1, 0] and "more than 16 MiB" in decoded.reason

@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cdtool.messages.columns import UndecodableError, decoder_for
+from cdtool.messages.decoded_batch import UndecodableError
+from cdtool.messages.encodings import decoder_for
+from cdtool.messages.fields import element_names
 from tests.messages.batches import batch_of, fields_of, same
 from tests.messages.protobuf_messages import CASES, contents
 
@@ -126,9 +129,9 @@ def test_an_omitted_number_is_zero_without_presence_tracking_and_otherwise_nan()
 @pytest.mark.parametrize(
     ("payload", "reason"),
     [
-        (b"\x08", "end within a field"),
+        (b"\x18", "end within a field"),
         (b"\x09\0\0\0", "end within a field"),
-        (b"\x0a" + b"\xff" * 11, "end within a field"),
+        (b"\xb2\x04" + b"\xff" * 11, "end within a field"),
         (b"\xd2\x05\x05\x09\0", "end within a field"),
         (b"\x08\x01", "written as another type"),
         (b"\x0d\0\0\0\0", "written as another type"),
@@ -164,7 +167,8 @@ def test_elements_are_found_by_their_names_even_if_these_change():
     payloads = [kind(name=rows[i][0], many_int32=rows[i][1]).SerializeToString() for i in (0, 1)]
     whole = decoder.decode(batch_of(payloads), fields_of("many_int32[:]"), ("y", "x")).fields[0]
     assert whole.values.tolist() == [[2, 1]] * 2
-    assert decoder.names(batch_of(payloads), fields_of("many_int32[:]")[0]) == ["x", "y"]
+    contents = decoder.contents(batch_of(payloads))
+    assert [element_names(content) for content in contents] == [["x", "y"], ["y", "x"]]
 
 
 @pytest.mark.parametrize("data", [b"\xff", b"\x0a\xff\x01", b"", b"\x08\x01", b"\x0a\x02\x22\x05"])
@@ -179,3 +183,9 @@ def test_a_float_that_signals_as_it_is_converted_is_read_without_a_warning():
     payload[1] = 1  # infinity with its last bit changed
     values = decoder.decode(batch_of([bytes(payload)]), fields_of("one_float")).fields[0].values
     assert np.isnan(values).all()
+
+
+def test_without_the_package_the_reason_names_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "google.protobuf", None)
+    with pytest.raises(UndecodableError, match=r"protobuf is not installed: pip install '\.\[protobuf\]'"):
+        decoder_for("protobuf", "protobuf", "pkg.Outer", b"")

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cdtool.messages.columns import decoder_for
-from cdtool.messages.layouts.ros1msg import parse_ros1msg
+from cdtool.messages.encodings import decoder_for
+from cdtool.messages.layout import Message, Number
+from cdtool.messages.ros_definitions import parse_definitions
 from tests.messages.batches import assert_follows_field_language, batch_of, fields_of
 from tests.messages.ros_messages import definitions
 
@@ -62,12 +63,9 @@ def test_random_messages_decode_to_the_same_bits(data):
     text, values = data.draw(definitions(ros2=False))
     messages = data.draw(st.lists(values, min_size=1, max_size=4))
     payloads = [encode(text, message) for message in messages]
-    for singly in (False, True):
-        decoder = decoder_of(text)
-        if singly:
-            decoder.locator.locate = decoder.locator.locate_singly
-        wanted = fields_of(*decoder.fields(None))
-        assert_follows_field_language(decoder.decode(batch_of(payloads), wanted), messages, wanted)
+    decoder = decoder_of(text)
+    wanted = fields_of(*decoder.fields(None))
+    assert_follows_field_language(decoder.decode(batch_of(payloads), wanted), messages, wanted)
 
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -95,8 +93,8 @@ def test_time_and_duration_are_two_numbers_and_the_header_has_a_stamp():
 
 
 def test_byte_is_signed_and_char_is_not():
-    members = parse_ros1msg(NAME, b"byte a\nchar b\nHeader[] c\n====\nMSG: std_msgs/Header\nint8 x").root.members
-    assert [member.kind.name for member in members] == ["int8", "uint8", "std_msgs/Header"]
+    members = parse_definitions(NAME, b"byte a\nchar b\nHeader[] c\n====\nMSG: std_msgs/Header\nint8 x", 1).root.members
+    assert [member.kind for member in members] == [Number("i1"), Number("u1"), Message("std_msgs/Header")]
 
 
 def test_messages_without_members_take_no_bytes_in_any_number():

@@ -40,7 +40,7 @@ def test_the_repr_of_everything_that_a_function_returns_is_one_short_line(return
             kinds.add(type(inner))
             if not is_plain_row(inner):
                 faults.add(faults_of(inner))
-    assert len(kinds) > 100
+    assert len(kinds) > 80
     assert not {fault for fault in faults if fault}
 
 

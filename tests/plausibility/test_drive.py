@@ -94,8 +94,8 @@ def test_a_reversed_force_is_found_where_starts_show_its_sign(axes, directions):
     values = machine(strokes(*directions))
     for sign, answer in ((1.0, "agrees"), (-1.0, "contradicts")):
         found = check_channels([recording(values, "m", sign)], axes["m"])
-        (friction,) = [item.fact for item in found if item.fact.check == "friction"]
-        assert (friction.answer, friction.found) == (answer, "friction")
+        (friction,) = [item for item in found if item.numbers["check"] == "friction"]
+        assert (friction.numbers["answer"], friction.numbers["found"]) == (answer, "friction")
 
 
 def test_starts_that_a_low_pass_flattens_do_not_contradict_the_inertia(tmp_path):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.findings.plausibility import ChannelCheck
+from cdtool.findings import Finding
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.plausibility import check_channels
 from cdtool.recording import Recording, Series
@@ -145,16 +145,16 @@ FOUND = {
 FOUND["ur10e_motions"] = FOUND["ur3"]
 
 
-def checks(recordings: list[Recording], machine_file: MachineFile) -> list[ChannelCheck]:
-    return [item.fact for item in check_channels(recordings, machine_file.machine)]
+def checks(recordings: list[Recording], machine_file: MachineFile) -> list[Finding]:
+    return list(check_channels(recordings, machine_file.machine))
 
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_the_right_map_contradicts_nothing_and_shows_the_friction_of_what_moves_both_ways(machine, name):
     machine_file, recordings = machine(name)
     found = checks(recordings, machine_file)
-    assert not [item for item in found if item.answer == "contradicts"]
-    shown = [item for item in found if item.check == "friction" and item.answer == "agrees"]
+    assert not [item for item in found if item.numbers["answer"] == "contradicts"]
+    shown = [item for item in found if item.numbers["check"] == "friction" and item.numbers["answer"] == "agrees"]
     assert len(shown) == (0 if "arm" in name else len(machine_file.machine.joints))
 
 
@@ -165,8 +165,8 @@ def test_a_wrong_map_is_found_or_not_checked_and_never_agrees(machine, name, wro
     machine_file, recordings = machine(name)
     of, change, _ = WRONG[wrong]
     found = checks([change(item) for item in recordings], machine_file)
-    agreed = [item for item in found if item.channel == of and item.answer == "agrees"]
-    contradicted = {item.channel for item in found if item.answer == "contradicts"}
+    agreed = [item for item in found if item.channel == of and item.numbers["answer"] == "agrees"]
+    contradicted = {item.channel for item in found if item.numbers["answer"] == "contradicts"}
     assert not agreed
     if wrong in FOUND[name.split("/")[0]]:
         assert contradicted == {of}
@@ -178,16 +178,16 @@ def test_a_mass_or_scale_that_is_wrong_by_ten_is_found_by_the_starts(machine, na
     machine_file, recordings = machine(name)
     change = channel("torque", lambda values: factor * values)
     found = checks([change(item) for item in recordings], machine_file)
-    (wrong,) = [item for item in found if item.answer == "contradicts"]
-    assert (wrong.channel, wrong.found) == ("torque", "inertia")
-    assert wrong.value / wrong.expected == pytest.approx(factor, rel=0.3)
+    (wrong,) = [item for item in found if item.numbers["answer"] == "contradicts"]
+    assert (wrong.channel, wrong.numbers["found"]) == ("torque", "inertia")
+    assert wrong.numbers["value"] / wrong.numbers["expected"] == pytest.approx(factor, rel=0.3)
 
 
 @pytest.mark.parametrize("log", ["link4", "no_torque", "ur-static"])
 def test_a_real_robot_that_is_pushed_hardly_moves_or_holds_a_pose_contradicts_nothing(log):
     machine_file = read_machine_file(ROOT / "sample_logs" / "ur10e" / "machine.toml")
     found = checks([cdtool.read(ROOT / "sample_logs" / "ur10e" / f"{log}.csv.gz", machine_file)], machine_file)
-    assert not [item for item in found if item.answer == "contradicts"]
+    assert not [item for item in found if item.numbers["answer"] == "contradicts"]
 
 
 @pytest.mark.parametrize("name", ["ur3", "ur10e_motions"])
@@ -196,4 +196,4 @@ def test_the_wrong_sign_of_one_joint_is_found_by_what_grows_with_its_speed(machi
     machine_file, recordings = machine(name)
     signs = [-1.0 if other == joint else 1.0 for other in JOINTS]
     found = checks([channel("torque", lambda values: values * signs)(item) for item in recordings], machine_file)
-    assert [item.joint for item in found if item.answer == "contradicts"] == [joint]
+    assert [item.numbers["joint"] for item in found if item.numbers["answer"] == "contradicts"] == [joint]

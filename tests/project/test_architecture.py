@@ -77,6 +77,7 @@ def words_of(*folders: Path) -> Counter[str]:
 
 def test_public_names_are_used_or_documented_outside_tests():
     code, shown = words_of(ROOT / "cdtool"), words_of(ROOT / "docs", ROOT / "benchmarks")
+    shown["emit"] = 1  # called by logging
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):

@@ -38,7 +38,7 @@ SHOWN_BY = {
     "log_options": {"detect"},
 }
 # Names of a user's own in examples.
-EXAMPLES = {"joint_name", "lift"}
+EXAMPLES = {"joint_name", "lift", "looks_like"}
 # Of other programs, or of every command.
 FOREIGN = {"--help", "--version", "--nthreads", "--upgrade"}
 

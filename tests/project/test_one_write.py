@@ -15,7 +15,6 @@ WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", 
 ELSEWHERE = {
     "cdtool/remote/staging.py": "locks a temporary folder of its own",
     "cdtool/remote/transferred.py": "writes into that folder",
-    "cdtool/kernel_cache.py": "sets the time of an index of numba that is still valid",
     "cdtool/cli/streams.py": "opens the null device",
     "cdtool/workflows/execution/in_worker.py": "opens the null device",
     "cdtool/workflows/store/journal.py": "appends to a file that the next run takes over if this one is killed",

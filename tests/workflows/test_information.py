@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.findings.channels import MissingValues
-from cdtool.findings.clocks import AssumedClock, BackwardStamps, Gap, SampleGaps
 from tests.data_folder import UR10E_LOGS, data, needs_data
+from tests.findings.facts import fact_of
 
 
 def write(path: Path, header: str, columns: list[np.ndarray]) -> Path:
@@ -27,8 +26,8 @@ def test_the_clock_is_guessed_by_name_and_steps_and_the_guess_is_shown(tmp_path,
     info = cdtool.info(write(tmp_path / "a.csv", header, [time * factor, np.sin(time)]))
     assert [channel.rate_hz for channel in info.channels] == pytest.approx([1000.0] * 2)
     assert info.channels[1].duration_s == pytest.approx(1.999)
-    (clock,) = [item for item in info.findings if isinstance(item.fact, AssumedClock)]
-    assert clock.fact.unit == unit and clock.channel == header.partition(",")[0]
+    (clock,) = [item for item in info.findings if item.kind == "assumed_clock"]
+    assert clock.numbers["unit"] == unit and clock.channel == header.partition(",")[0]
 
 
 def test_gaps_backward_time_and_missing_values_are_reported_together(tmp_path):
@@ -38,10 +37,13 @@ def test_gaps_backward_time_and_missing_values_are_reported_together(tmp_path):
     values = np.sin(time)
     values[[7, 8]] = np.nan
     info = cdtool.info(write(tmp_path / "a.csv", "t,v", [time, values]))
-    told = [(item.channel, item.fact) for item in info.findings]
-    gaps = SampleGaps(1, (Gap(pytest.approx(0.999), pytest.approx(0.401)),))
-    assert ("time", BackwardStamps(1, 2000, (502,), "line")) in told
-    assert ("t", gaps) in told and ("v", MissingValues(2, 2000)) in told
+    told = [(item.channel, fact_of(item)) for item in info.findings]
+    gaps = ("sample_gaps", {"count": 1, "first": ({"time": pytest.approx(0.999), "length": pytest.approx(0.401)},)})
+    assert (
+        "time",
+        ("backward_stamps", {"count": 1, "rows": 2000, "first": (502,), "row_name": "line", "restart": None}),
+    ) in told
+    assert ("t", gaps) in told and ("v", ("missing_values", {"count": 2, "values": 2000})) in told
 
 
 def test_without_a_clock_no_rate_is_shown(tmp_path):
@@ -88,7 +90,7 @@ position = { columns = ["ORDER", "q3"], unit = "rad" }
         machine = tmp_path / "machine.toml"
         machine.write_text(text.replace("ORDER", order.replace(",", '", "')))
         findings = cdtool.info(log, machine=machine).findings
-        told[order] = [(item.fact.joint, item.fact.between) for item in findings if item.severity == "loss"]
+        told[order] = [(item.numbers["joint"], item.numbers["between"]) for item in findings if item.severity == "loss"]
     assert told == {"q1,q2": [], "q2,q1": [("a", "b"), ("b", "a")]}
 
 

@@ -14,12 +14,10 @@ from enum import IntEnum
 from typing import NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.transient import Transient
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.median_kernel import median_of_known
+from cdtool.kernels import READ_ONLY, fields_of, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels_of
@@ -259,7 +257,7 @@ def _track(channel: str, joint: str, j: int, compared: Comparison, first: int, b
     # The assumed start of the motion shifts a whole position: only a change of its distance counts.
     reach = math.inf if channel in POSITIONS else _OFFSET
     past = slice(first, min(begin, after))
-    own, own_level = own_distances(column.raw[past], column.raw_level[past], reach, np.empty(begin - first), _ENOUGH)
+    own, own_level = (_own_distance(values[past], reach) for values in (column.raw, column.raw_level))
     return Track(column, first, after, own if channel in POSITIONS else 0.0, own, own_level)
 
 
@@ -287,12 +285,52 @@ def _began(time: FloatArray, shares: FloatArray) -> int:
 
     If a channel had drifted that far before, its departure began at the bend of its curve.
     """
-    since, known, bends = np.empty(len(shares)), np.empty(len(shares)), np.empty(_BENDS)
-    candidates = np.empty(_BENDS, dtype=np.int64)
-    first, count, tried = prepare_bend(time, shares, since, known, bends, candidates)
-    if not tried:
-        return int(first)
-    return int(max(first, steepest_bend(since[:count], known[:count], first, bends[:tried], candidates[:tried])))
+    last = len(shares) - 1
+    below = np.flatnonzero(~(shares > _BACK_TO))
+    first = min(int(below[-1]) + 1, last) if len(below) else 0
+    if time[last] - time[first] <= _SLOW:
+        return first
+    begin = int(np.searchsorted(time, time[first] - _BEFORE_BEND))
+    since, part = time[begin:] - time[begin], shares[begin:]
+    known = np.isfinite(part)
+    tried = np.unique(np.linspace(first, last + 1 - _SUCCESSION, _BENDS).astype(np.int64))
+    bend = _steepest_bend(since[known], part[known], since[tried - begin])
+    return first if bend is None else max(first, int(tried[bend]))
+
+
+def _steepest_bend(time: FloatArray, values: FloatArray, bends: FloatArray) -> int | None:
+    """Return the number of the bend [s] at which two joined lines fit best, the second one steeper upward.
+
+    Least squares of a + b t + c max(t - bend, 0) with c > 0 over `time` (n,) [s] and `values` (n,); None if no bend has
+    c > 0. If all samples are after a bend, the solution of least norm counts, as in numpy's `lstsq`.
+    """
+    if not len(time):
+        return None
+    t, y = time - time.mean(), values - values.mean()
+    after = np.maximum(time - bends[:, np.newaxis], 0.0)
+    after -= after.mean(axis=1, keepdims=True)
+    tt, ta, aa, ty, ay = t @ t, after @ t, (after * after).sum(axis=1), t @ y, after @ y
+    determinant = tt * aa - ta * ta
+    regular = determinant > _SINGULAR * tt * aa
+    with np.errstate(divide="ignore", invalid="ignore"):
+        line = ty / tt
+        least = (line - (values.mean() - line * time.mean()) * bends) / (bends * bends + 2.0)
+        more = np.where(regular, (ay * tt - ty * ta) / determinant, least)
+        slope = np.where(regular, (ty * aa - ay * ta) / determinant, line - least)
+    left = y - slope[:, np.newaxis] * t - more[:, np.newaxis] * after
+    error = np.where((tt * aa > 0.0) & (more > 0.0), (left * left).sum(axis=1), np.inf)
+    return int(error.argmin()) if error.min() < np.inf else None
+
+
+def _own_distance(values: FloatArray, reach: float) -> float:
+    """Return a run's own constant distance from the mean [spreads], up to `reach`.
+
+    With too few known values it is 0, or unknown (NaN) if it is unlimited.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < _ENOUGH:
+        return 0.0 if math.isfinite(reach) else math.nan
+    return float(np.clip(np.median(known), -reach, reach))
 
 
 def _side(value: float) -> str:
@@ -309,8 +347,8 @@ def _mean(values: FloatArray) -> float:
 
 
 @kernel(
-    f"UniTuple(int64, 3)({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), Limits, float64, float64, "
-    "float64, int64, int64, int64)",
+    f"UniTuple(int64, 3)({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(Limits)}, float64, "
+    "float64, float64, int64, int64, int64)",
     exact=True,
 )
 def find_departure(  # noqa: C901, PLR0913  a kernel: one loop, arrays and numbers one by one
@@ -371,126 +409,3 @@ def find_departure(  # noqa: C901, PLR0913  a kernel: one loop, arrays and numbe
             if outside == succession:
                 return Departure.BEFORE.value, k - succession + 1, -1
     return found if first >= 0 else Departure.NONE.value, first, farthest
-
-
-@kernel(f"UniTuple(float64, 2)({READ_ONLY}, {READ_ONLY}, float64, float64[::1], int64)", exact=True)
-def own_distances(
-    raw: FloatArray, raw_level: FloatArray, reach: float, scratch: FloatArray, least: int
-) -> tuple[float, float]:
-    """Return a run's own constant distances from the mean [spreads], of samples and level (n,), each up to `reach`.
-
-    With fewer than `least` known values it is 0, or unknown (NaN) if it is unlimited. `scratch` (n,) is overwritten.
-    """
-    own = _limited(median_of_known(raw, scratch, least), reach)
-    return own, _limited(median_of_known(raw_level, scratch, least), reach)
-
-
-@kernel("float64(float64, float64)", exact=True, inline=True)
-def _limited(middle: float, reach: float) -> float:
-    if math.isnan(middle):
-        return 0.0 if math.isfinite(reach) else math.nan
-    return float(min(max(middle, -reach), reach))
-
-
-@kernel(
-    f"UniTuple(int64, 3)({READ_ONLY}, {READ_ONLY}, float64[::1], float64[::1], float64[::1], int64[::1])", exact=True
-)
-def prepare_bend(
-    time: FloatArray,
-    shares: FloatArray,
-    since: FloatArray,
-    known: FloatArray,
-    bends: FloatArray,
-    candidates: npt.NDArray[np.int64],
-) -> tuple[int, int, int]:
-    """Return the first sample above `_BACK_TO` up to the last one, and what it takes to find the bend from there on.
-
-    Fill the known shares with their times, from `_BEFORE_BEND` before that sample, and the samples tried as bends with
-    theirs; return the numbers of both, 0 if the departure was not slow.
-    """
-    last = len(shares) - 1
-    first = last
-    while first > 0 and shares[first - 1] > _BACK_TO:
-        first -= 1
-    if not shares[last] > _BACK_TO:
-        first = last
-    if time[last] - time[first] <= _SLOW:
-        return first, 0, 0
-    begin = first
-    while begin > 0 and time[begin - 1] >= time[first] - _BEFORE_BEND:
-        begin -= 1
-    count = 0
-    for k in range(begin, last + 1):
-        if math.isfinite(shares[k]):
-            since[count], known[count] = time[k] - time[begin], shares[k]
-            count += 1
-    tried = fill_evenly(first, last + 1 - _SUCCESSION, candidates)
-    for i in range(tried):
-        bends[i] = time[candidates[i]] - time[begin]
-    return first, count, tried
-
-
-@kernel("int64(int64, int64, int64[::1])", exact=True)
-def fill_evenly(first: int, last: int, numbers: npt.NDArray[np.int64]) -> int:
-    """Fill at most n whole numbers, evenly from one number to another as by numpy's `linspace`; return how many.
-
-    In increasing order, and each only once.
-    """
-    count, n = 0, len(numbers)
-    step = (last - first) / (n - 1)
-    for i in range(n):
-        k = i if step > 0.0 else n - 1 - i
-        number = last if k == n - 1 else int(k * step + first)
-        if count == 0 or number > numbers[count - 1]:
-            numbers[count] = number
-            count += 1
-    return count
-
-
-@kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64, {READ_ONLY}, int64[::1])")
-def steepest_bend(
-    time: FloatArray, values: FloatArray, found: int, bends: FloatArray, candidates: npt.NDArray[np.int64]
-) -> int:
-    """Return the candidate at whose time in `bends` [s] two joined lines fit best, the second one steeper upward.
-
-    Least squares of a + b t + c max(t - bend, 0) with c > 0 over `time` (n,) [s] and `values` (n,); `found` if no
-    candidate has c > 0. If all samples are after a bend, the solution of least norm counts, as in numpy's `lstsq`.
-    """
-    n = len(time)
-    mean_time = np.sum(time) / max(n, 1)
-    mean_value = np.sum(values) / max(n, 1)
-    best = np.inf
-    for i in range(len(bends)):
-        mean_after = 0.0
-        for k in range(n):
-            mean_after += max(time[k] - bends[i], 0.0)
-        mean_after /= max(n, 1)
-        tt = ta = aa = ty = ay = 0.0
-        for k in range(n):
-            t, y = time[k] - mean_time, values[k] - mean_value
-            after = max(time[k] - bends[i], 0.0) - mean_after
-            tt += t * t
-            ta += t * after
-            aa += after * after
-            ty += t * y
-            ay += after * y
-        determinant = tt * aa - ta * ta
-        if determinant > _SINGULAR * tt * aa:
-            slope, more = (ty * aa - ay * ta) / determinant, (ay * tt - ty * ta) / determinant
-        elif tt > 0.0 and aa > 0.0:
-            line = ty / tt
-            level = mean_value - line * mean_time
-            more = (line - level * bends[i]) / (bends[i] * bends[i] + 2.0)
-            slope = line - more
-        else:
-            continue
-        if not more > 0.0:
-            continue
-        error = 0.0
-        for k in range(n):
-            after = max(time[k] - bends[i], 0.0) - mean_after
-            left = values[k] - mean_value - slope * (time[k] - mean_time) - more * after
-            error += left * left
-        if error < best:
-            best, found = error, candidates[i]
-    return found

@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.median_kernel import median_of
 from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
+
+IndexArray = npt.NDArray[np.int64]
 
 # Commands to the machine. The reference torque is not one: it is a controller output and responds to a contact.
 COMMANDS = ("reference_position", "reference_speed")
@@ -124,149 +126,84 @@ def which_moved_first(
 def _movement(channel: str, joint: str, time: FloatArray, value: FloatArray, begin: float, before: float) -> Movement:
     start, direction = -1, 0
     if len(time) >= _SUCCESSION:
-        start, direction = find_movement(time, value, value.mean(), begin, before, np.empty((5, len(time) + 1)))
+        start, direction = _found(time, value, begin, before)
     if direction:
         return Movement(channel, joint, float(time[start]), "up" if direction > 0 else "down")
     return Movement(channel, joint, math.nan, reason="too few samples" if start < 0 else "no departure found")
 
 
-@kernel(
-    f"UniTuple(int64, 2)({READ_ONLY}, {READ_ONLY}, float64, float64, float64, float64[:, ::1])",
-    exact=True,
-)
-def find_movement(
-    time: FloatArray, value: FloatArray, mean: float, begin: float, length: float, sums: FloatArray
-) -> tuple[int, int]:
+def _found(time: FloatArray, value: FloatArray, begin: float, length: float) -> tuple[int, int]:
     """Return the sample at which a channel moved after `begin` [s], and its direction, 1 or -1; 0 if it did not.
 
-    Then the sample is 0, or -1 if there are too few. `mean` is that of the values (n,), and `length` [s] that of a
-    line. `sums` (5, n + 1) is overwritten.
+    Then the sample is 0, or -1 if there are too few. `length` [s] is that of a line.
     """
-    fill_sums(time, value, mean, sums)
-    first = past = 0
-    for k in range(len(time)):
-        first += time[k] < begin - length
-        past += time[k] <= begin
+    lines = _Lines(time, value, length)
+    first, past = int(np.searchsorted(time, begin - length)), int(np.searchsorted(time, begin, side="right"))
     if len(time) - past < _SUCCESSION:
         return -1, 0
-    usual = (
-        _usual(time, value, mean, sums, first, past, _AHEAD[0], length),
-        _usual(time, value, mean, sums, first, past, _AHEAD[1], length),
-        _usual(time, value, mean, sums, first, past, _AHEAD[2], length),
-    )
-    off, line = sums[4], line_of(time, sums, first, past, length)
-    is_known = math.isfinite(usual[0]) and math.isfinite(usual[1]) and math.isfinite(usual[2])
-    size = 0.0
-    for k in range(len(time)):
-        size = max(size, abs(value[k]))
-        off[k] = value[k] - mean - line[1] - line[2] * (time[k] - time[0] - line[0])
-        is_known = is_known and (k < past or math.isfinite(off[k]))
-    if not is_known:
+    usual = [_usual(lines, first, past, ahead) for ahead in _AHEAD]
+    off = lines.off(np.arange(past, len(time)), np.array([first]), np.array([past]))
+    if not np.isfinite(usual).all() or not np.isfinite(off).all():
         return -1, 0
-    least = max(_ROUNDING * _step(value, past), _SMALLEST * size)
-    outside = 0
-    for k in range(past, len(time)):
-        outside = outside + 1 if abs(off[k]) > _MOVED * max(_interpolated(time[k] - begin, usual), least) else 0
-        if outside == _SUCCESSION:
-            at = k - _SUCCESSION + 1
-            sign = 1 if off[at] > 0.0 else -1
-            while at > past and sign * off[at - 1] > _BACK_TO * max(_interpolated(time[at - 1] - begin, usual), least):
-                at -= 1
-            return at, sign
-    return 0, 0
+    least = max(_ROUNDING * _step(value[:past]), _SMALLEST * float(np.max(np.abs(value))))
+    limit = np.maximum(np.interp(time[past:] - begin, _AHEAD, usual), least)
+    lasts = sliding_window_view(np.abs(off) > _MOVED * limit, _SUCCESSION).all(axis=1)
+    if not lasts.any():
+        return 0, 0
+    at = int(lasts.argmax())
+    sign = 1 if off[at] > 0.0 else -1
+    near = np.flatnonzero(~(sign * off[:at] > _BACK_TO * limit[:at]))
+    return past + (int(near[-1]) + 1 if len(near) else 0), sign
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[:, ::1])", exact=True)
-def fill_sums(time: FloatArray, value: FloatArray, mean: float, sums: FloatArray) -> None:
-    """Fill the sums up to each sample of time, value, time squared, and time by value.
+class _Lines:
+    """Least-squares lines of a `length` [s] through parts of a channel.
 
-    From the first sample and about the mean, so that they keep their digits at any time and offset.
+    By the sums up to each sample of time, value, time squared, and time by value, from the first sample and about the
+    mean, so that they keep their digits at any time and offset.
     """
-    sums[:4, 0] = 0.0
-    for k in range(len(time)):
-        t, v = time[k] - time[0], value[k] - mean
-        terms = (t, v, t * t, t * v)
-        for i in range(4):
-            sums[i, k + 1] = sums[i, k] + terms[i] if k > 0 else terms[i]
+
+    def __init__(self, time: FloatArray, value: FloatArray, length: float) -> None:
+        self.time, self.length = time, length
+        self._t, self._v = time - time[0], value - value.mean()
+        terms = np.stack((self._t, self._v, self._t * self._t, self._t * self._v))
+        self._sums = np.concatenate((np.zeros((4, 1)), np.cumsum(terms, axis=1)), axis=1)
+
+    def off(self, rows: IndexArray, first: IndexArray, after: IndexArray) -> FloatArray:
+        """Return how far samples are from the lines through those from `first` until `after`.
+
+        NaN where these are too few, or cover less than half of the length.
+        """
+        count = after - first
+        long = self.time[after - 1] - self.time[np.minimum(first, len(self.time) - 1)] >= 0.5 * self.length
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean_t, mean_v, squares, products = (self._sums[:, after] - self._sums[:, first]) / count
+            slope = (products - mean_t * mean_v) / (squares - mean_t * mean_t)
+        off = self._v[rows] - mean_v - slope * (self._t[rows] - mean_t)
+        return np.where((count >= _ENOUGH) & long, off, np.nan)
 
 
-@kernel(f"UniTuple(float64, 3)({READ_ONLY}, float64[:, ::1], int64, int64, float64)", exact=True, inline=True)
-def line_of(time: FloatArray, sums: FloatArray, first: int, after: int, length: float) -> tuple[float, float, float]:
-    """Return the least-squares line through the samples from `first` until `after`: mean time and value, and slope.
-
-    NaN if they are too few, or cover less than half of the `length` [s].
-    """
-    count = float(after - first)
-    if count < _ENOUGH or not time[after - 1] - time[first] >= 0.5 * length:
-        return math.nan, math.nan, math.nan
-    mean_t = (sums[0, after] - sums[0, first]) / count
-    mean_v = (sums[1, after] - sums[1, first]) / count
-    variance = (sums[2, after] - sums[2, first]) / count - mean_t * mean_t
-    covariance = (sums[3, after] - sums[3, first]) / count - mean_t * mean_v
-    return mean_t, mean_v, covariance / variance
-
-
-@kernel(
-    f"float64({READ_ONLY}, {READ_ONLY}, float64, float64[:, ::1], int64, int64, float64, float64)",
-    exact=True,
-)
-def _usual(  # noqa: PLR0913  a kernel: arrays and numbers one by one
-    time: FloatArray,
-    value: FloatArray,
-    mean: float,
-    sums: FloatArray,
-    first: int,
-    after: int,
-    ahead: float,
-    length: float,
-) -> float:
+def _usual(lines: _Lines, first: int, after: int, ahead: float) -> float:
     """Return the usual deviation of the samples from `first` until `after` from lines that end `ahead` [s] before each.
 
     A standard deviation. A log that begins shortly before the event has nothing to extrapolate: then it is that from
     the line through these samples; NaN if they are too few for that, too.
     """
-    sizes = sums[4]
-    known = begins = ends = 0
-    for k in range(first, after):
-        end = time[k] - ahead
-        while begins < len(time) and time[begins] < end - length:
-            begins += 1
-        while ends < len(time) and time[ends] <= end:
-            ends += 1
-        line = line_of(time, sums, begins, ends, length)
-        sizes[known] = abs(value[k] - mean - line[1] - line[2] * (time[k] - time[0] - line[0]))
-        known += math.isfinite(sizes[known])
-    if known >= _ENOUGH:
-        return float(_MAD * median_of(sizes, known))
-    known = 0
-    line = line_of(time, sums, first, after, length)
-    for k in range(first, after):
-        sizes[known] = abs(value[k] - mean - line[1] - line[2] * (time[k] - time[0] - line[0]))
-        known += math.isfinite(sizes[known])
-    return float(_MAD * median_of(sizes, known)) if known >= _ENOUGH else math.nan
+    rows = np.arange(first, after)
+    ends = lines.time[rows] - ahead
+    begins = np.searchsorted(lines.time, ends - lines.length)
+    for off in (
+        lines.off(rows, begins, np.searchsorted(lines.time, ends, side="right")),
+        lines.off(rows, np.array([first]), np.array([after])),
+    ):
+        known = np.abs(off[np.isfinite(off)])
+        if len(known) >= _ENOUGH:
+            return _MAD * float(np.median(known))
+    return math.nan
 
 
-@kernel("float64(float64, UniTuple(float64, 3))", exact=True, inline=True)
-def _interpolated(since: float, usual: tuple[float, float, float]) -> float:
-    """Return the usual deviation this long after the end of a line [s], between those after `_AHEAD`."""
-    if since <= _AHEAD[0]:
-        return usual[0]
-    if since >= _AHEAD[2]:
-        return usual[2]
-    i = 0 if since < _AHEAD[1] else 1
-    slope = (usual[i + 1] - usual[i]) / (_AHEAD[i + 1] - _AHEAD[i])
-    return float(slope * (since - _AHEAD[i]) + usual[i])
-
-
-@kernel(f"float64({READ_ONLY}, int64)", exact=True)
-def _step(value: FloatArray, count: int) -> float:
-    """Return the smallest step between the first samples, that of a quantised channel; 0 if they do not change."""
-    size = 0.0
-    for k in range(count):
-        size = max(size, abs(value[k]))
-    smallest = math.inf
-    for k in range(1, count):
-        step = abs(value[k] - value[k - 1])
-        if step > _SMALLEST * size:
-            smallest = min(smallest, step)
-    return smallest if smallest < math.inf else 0.0
+def _step(value: FloatArray) -> float:
+    """Return the smallest step between samples, that of a quantised channel; 0 if they do not change."""
+    steps = np.abs(np.diff(value))
+    steps = steps[steps > _SMALLEST * np.max(np.abs(value), initial=0.0)]
+    return float(np.min(steps)) if len(steps) else 0.0

@@ -8,9 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.median_kernel import median_of
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.normal_motion import Comparison, NormalMotion
 
@@ -86,23 +84,7 @@ def _distance(normal: NormalMotion, recording: Recording, until: float) -> float
     begin, joint = until - _BEFORE, normal.motion.joint
     compared = normal.compare(recording, "speed", begin, until)
     part = slice(int(compared.time.searchsorted(begin)), int(compared.time.searchsorted(until)))
-    level, mean, spread = (
-        np.ascontiguousarray(item[part, joint]) for item in (compared.level, compared.level_mean, compared.level_spread)
-    )
-    distance = median_distance(level, mean, spread, np.empty(len(level)), _LEAST_SAMPLES)
-    return math.inf if math.isnan(distance) else float(distance)
-
-
-@kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64[::1], int64)", exact=True)
-def median_distance(value: FloatArray, mean: FloatArray, spread: FloatArray, scratch: FloatArray, least: int) -> float:
-    """Return the median distance of the values from the mean [spreads], NaN if fewer than `least` are known.
-
-    `scratch` (n,) is overwritten.
-    """
-    count = 0
-    for k in range(len(value)):
-        off = abs(value[k] - mean[k]) / spread[k]
-        if math.isfinite(off):
-            scratch[count] = off
-            count += 1
-    return float(median_of(scratch, count)) if count >= least else math.nan
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.abs(compared.level - compared.level_mean)[part, joint] / compared.level_spread[part, joint]
+    known = off[np.isfinite(off)]
+    return float(np.median(known)) if len(known) >= _LEAST_SAMPLES else math.inf

@@ -10,7 +10,6 @@ import math
 
 import numpy as np
 
-from cdtool.findings.channels import DerivedSpeed
 from cdtool.recording import Contact, Recording
 
 # The speed at the contact is that of a straight line through the samples of this time before it [s], or through the
@@ -59,7 +58,7 @@ def speed_before(recording: Recording, contact: Contact) -> float | None:
     series = recording["speed"]
     onset = contact.start - (contact.uncertainty if math.isfinite(contact.uncertainty) else 0.0)
     speeds = [_at(series.time, column, onset) for column in series.values.T]
-    if "position" in recording and any(isinstance(item.fact, DerivedSpeed) for item in recording.findings):
+    if "position" in recording and any(item.kind == "derived_speed" for item in recording.findings):
         position = recording["position"]
         slopes = [_slope_of_held(position.time, column, onset) for column in position.values.T]
         speeds = [one if slope is None else slope for one, slope in zip(speeds, slopes, strict=True)]

@@ -18,7 +18,6 @@ from cdtool.evaluation.synchronisation.combination import clock_line
 from cdtool.evaluation.synchronisation.delay import LEAST_POINTS, EventDelay, SmoothSignal, delay_of
 from cdtool.evaluation.synchronisation.latency import ChannelLatency, RestsOn, TimedEvent, latency_from
 from cdtool.evaluation.synchronisation.smoothing import POINTS_PER_WIDTH, REACH, Grid, local_derivative
-from cdtool.findings.channels import DerivedSpeed, IntegratedPosition
 from cdtool.plain_text import counted
 from cdtool.recording import Contact, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
@@ -136,10 +135,10 @@ def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -
 
 
 def _is_measured(recording: Recording, channel: str) -> bool:
-    derived = {"speed": DerivedSpeed, "position": IntegratedPosition}.get(channel)
+    derived = {"speed": "derived_speed", "position": "integrated_position"}.get(channel)
     if channel not in recording or len(recording[channel]) < 3:
         return False
-    return derived is None or not any(isinstance(item.fact, derived) for item in recording.findings)
+    return derived is None or not any(item.kind == derived for item in recording.findings)
 
 
 def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _Part:

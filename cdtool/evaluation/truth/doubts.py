@@ -11,14 +11,6 @@ from cdtool.evaluation.truth.force_vector import rest_of_axes
 from cdtool.evaluation.truth.missing_samples import cell_samples, longest_step
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.findings import Finding
-from cdtool.findings.truth import (
-    FollowsTorque,
-    ForceBeginsLate,
-    ForceLeft,
-    ForceMagnitudeUsed,
-    NotTared,
-    RestLevelShifted,
-)
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 # Above this magnitude of the correlation the force follows the torque.
@@ -67,10 +59,10 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
     found += [item for item in [_not_back(recording["force"], contacts, rule)] if item]
     found += [item for item in [_begins_late(recording, contacts, rule)] if item]
     if levels := rest_of_axes(recording["force"]):
-        found.append(Finding(ForceMagnitudeUsed(tuple(levels)), "force", "note"))
+        found.append(Finding("force_magnitude_used", "force", {"rest": tuple(levels)}))
     joint, r = follows_torque(recording, contacts)
     if abs(r) > _FOLLOWS:
-        found.append(Finding(FollowsTorque(joint if len(recording.joints) > 1 else "", r), "force"))
+        found.append(Finding("follows_torque", "force", {"joint": joint if len(recording.joints) > 1 else "", "r": r}))
     return found
 
 
@@ -79,7 +71,7 @@ def _not_tared(contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
     first = next((item for item in contacts if item.found_by == "load cell" and not item.in_progress), None)
     if first is None or abs(first.rest) <= max(rule.above or 0.0, _NOT_TARED * first.peak_force):
         return None
-    return Finding(NotTared(first.rest, first.start), "force")
+    return Finding("not_tared", "force", {"rest": first.rest, "onset": first.start})
 
 
 def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
@@ -90,7 +82,7 @@ def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
     begins, onset = float(force.time[0]), contacts[0].start
     if begins - recording.start <= longest_step(force.time) or onset - begins > rule.separation:
         return None
-    return Finding(ForceBeginsLate(begins, onset), "force")
+    return Finding("force_begins_late", "force", {"begin": begins, "onset": onset})
 
 
 def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
@@ -107,7 +99,7 @@ def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Fi
         return None  # below the level at which a contact ends: the log was cut off while the axis rebounds
     if abs(left) > _NEXT_TO_NOTHING * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:
         return None
-    return Finding(ForceLeft(left, contact.start), "force")
+    return Finding("force_left", "force", {"force": left, "onset": contact.start})
 
 
 def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[str, float]:
@@ -172,4 +164,6 @@ def _has_drifted(contact: Contact, rule: OnsetRule) -> bool:
 
 
 def _drifted(contact: Contact) -> Finding:
-    return Finding(RestLevelShifted(contact.shift, contact.start, contact.drift), "force")
+    return Finding(
+        "rest_level_shifted", "force", {"shift": contact.shift, "onset": contact.start, "drift": contact.drift}
+    )

@@ -21,7 +21,7 @@ from cdtool.evaluation.truth.load_cell import BEFORE_ONSET, BURST, ROUNDING, Con
 from cdtool.evaluation.truth.missing_samples import CellClock, CellSamples
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import RunningRest
-from cdtool.evaluation.truth.rest_level_kernels import INTERVAL
+from cdtool.evaluation.truth.rest_lines import INTERVAL
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
 

@@ -21,7 +21,6 @@ from typing import Literal, get_args
 from cdtool.errors import ConfigurationError, RecordingError, nearest
 from cdtool.evaluation.truth.named_rows import NamedRow, read_cells, read_named_rows
 from cdtool.findings import Finding
-from cdtool.findings.truth import KindsExcluded, LabelsWithoutZone
 from cdtool.recording import MEASURED, Contact, Recording
 
 _OPTIONAL = ("kind", "uncertainty_s")
@@ -170,7 +169,7 @@ def read_labels(
         raise ConfigurationError(f"{path}: labels_zone is {zone}, but the labels are no dates", "remove labels_zone")
     if clock == "source" and form == "row":
         raise ConfigurationError(f"{path}: labels_clock is source, but the labels count rows", "remove labels_clock")
-    findings = [Finding(LabelsWithoutZone())] if False in zoned and not zone else []
+    findings = [Finding("labels_without_zone")] if False in zoned and not zone else []
     # The finest digit of the file counts for all labels: many programs drop zeros at the end, and write 2 for 2.000.
     digits = [contact.resolution for items in rows.values() for contact, _ in items.values()]
     finest = min((digit for digit in digits if not math.isnan(digit)), default=math.nan)
@@ -180,7 +179,7 @@ def read_labels(
         found[name] = [(replace(item, resolution=min(item.resolution, finest)), where) for item, where in ordered]
     excluded = _excluded(path, found, not_contacts)
     if excluded:
-        findings.append(Finding(KindsExcluded(excluded, tuple(dict.fromkeys(not_contacts))), severity="note"))
+        findings.append(Finding("kinds_excluded", "", {"count": excluded, "kinds": tuple(dict.fromkeys(not_contacts))}))
     return Labels(
         str(path),
         {name: tuple(contact for contact, _ in items) for name, items in found.items()},

@@ -16,7 +16,7 @@ import numpy as np
 from cdtool.evaluation.truth.missing_samples import CellSamples, cell_samples, time_to_shoulder
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import RestLine, RunningRest
-from cdtool.evaluation.truth.rest_level_kernels import INTERVAL, IntArray
+from cdtool.evaluation.truth.rest_lines import INTERVAL, IntArray
 from cdtool.recording import Contact, FloatArray, Series
 
 # Standard deviation of the error of rounding to steps of 1: uniform between -1/2 and 1/2.

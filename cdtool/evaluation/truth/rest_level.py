@@ -14,15 +14,14 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from cdtool.evaluation.truth.rest_level_kernels import (
+from cdtool.evaluation.truth.rest_lines import (
     EXTENDED,
     GAP,
-    INTERVAL,
-    SCRATCH,
     WINDOW,
-    estimate,
-    estimate_again,
-    fit_before,
+    intervals_of,
+    line_of_start,
+    lines_before,
+    medians_of,
     noise_about,
 )
 from cdtool.recording import FloatArray
@@ -61,23 +60,40 @@ class RunningRest:
 
     def __init__(self, time: FloatArray, force: FloatArray) -> None:
         self.time, self.force = time, force
-        most = min(len(time), math.floor((time[-1] - time[0]) / INTERVAL) + 1)
-        first, self._lines = np.empty(most, dtype=np.intp), np.empty((most, 5))
-        ends, centre, median = np.empty((3, most))
-        self._start, self.levels = np.empty(5), np.empty(len(time))
-        count = estimate(time, force, first, ends, centre, median, self._start, self._lines, self.levels)
-        self._first, self._ends, self._centre, self._median = (
-            first[:count],
-            ends[:count],
-            centre[:count],
-            median[:count],
-        )
-        self._rest = np.ones(count, dtype=bool)
+        self._first = intervals_of(time)
+        self._ends = time[np.append(self._first[1:], len(time)) - 1]
+        self._centre = 0.5 * (time[self._first] + self._ends)
+        self._median = medians_of(force, self._first)
+        self._start = line_of_start(time, force)
+        self._rest = np.ones(len(self._first), dtype=bool)
+        self._lines, self.levels = np.empty((len(self._first), 5)), np.empty(len(time))
+        self._estimate(0, len(self._first), extended=math.inf)
+
+    def _estimate(self, begin: int, stop: int, extended: float = EXTENDED) -> None:
+        """Fill the lines of intervals `begin` to `stop` - 1, and the levels of all samples from there on."""
+        self._lines[begin:stop] = self._lines_before(self.time[self._first[begin:stop]], GAP, extended)
+        since = slice(self._first[begin], len(self.time))
+        size = np.diff(self._first[begin:], append=len(self.time))
+        level, drift, at, _, _ = np.repeat(self._lines[begin:], size, axis=0).T
+        self.levels[since] = level + drift * (self.time[since] - at)
+
+    def _lines_before(self, time: FloatArray, gap: float, extended: float = EXTENDED) -> FloatArray:
+        """Return the lines (k, 5) for times (k,) [s]; `extended` [s] after its last interval a line is constant."""
+        rest = self._rest
+        known = self._ends[rest], self._centre[rest], self._median[rest]
+        lines, last = lines_before(*known, self._start, time - gap)
+        level, drift, at, error, drift_error = lines.T
+        old = time - last > extended
+        last = np.where(old, last, at)
+        lines[old, 3] = np.hypot(error, drift_error * (last - at))[old]
+        lines[old, 0] = (level + drift * (last - at))[old]
+        lines[old, 1], lines[old, 2] = 0.0, last[old]
+        return lines
 
     @cached_property
     def noise(self) -> float:
         """Return the standard deviation of the readings about the level [N], before anything was excluded."""
-        return float(noise_about(self.force, self._first, self.levels))
+        return noise_about(self.force, self._first, self.levels)
 
     @property
     def start(self) -> float:
@@ -86,13 +102,7 @@ class RunningRest:
 
     def line(self, before: float, gap: float = GAP) -> RestLine:
         """The rest level for a time [s], from intervals without a contact that ended `gap` [s] before it."""
-        found, scratch = np.empty(5), np.empty(SCRATCH)
-        intervals = self._ends, self._centre, self._median, self._rest
-        last = fit_before(*intervals, self._start, before - gap, scratch, found)
-        line = RestLine(*found.tolist())
-        if before - last <= EXTENDED:
-            return line
-        return RestLine(line.value(last), 0.0, last, line.error_at(last), line.drift_error)
+        return RestLine(*self._lines_before(np.array([before]), gap)[0].tolist())
 
     def exclude(self, start: float, end: float, level: float | None = None) -> None:
         """Take the samples from `start` to `end` [s] out of what is at rest, and estimate again from there on.
@@ -109,8 +119,7 @@ class RunningRest:
         until = later[WINDOW] if len(later) > WINDOW else len(self._first) - 1
         begins = self.time[self._first]
         stop = min(int(np.searchsorted(begins, self._ends[until] + GAP, side="right")) + 1, len(begins))
-        intervals = self._first, self._ends, self._centre, self._median, self._rest
-        estimate_again(self.time, *intervals, self._start, first, stop, self._lines, self.levels)
+        self._estimate(first, stop)
 
     def settled(self, begin: int, below: float, within: float) -> tuple[int, float] | None:
         """Where and at which level the cell comes to rest after sample `begin`: sample and level [N].

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Generator, Mapping
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap, TablePins, TimeSource
-from cdtool.columns import Column
+from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
 from cdtool.formats.csv.gzipped import open_text
 from cdtool.formats.groups import PREFIX
-from cdtool.formats.pieces import Pieces
+from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 
@@ -57,12 +57,18 @@ class Csv:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line."""
-        dialect = _dialect(path, TablePins() if wanted is None else wanted.pins)
-        return _read_all(path, dialect) if wanted is None else _read_wanted(path, dialect, wanted)
+        if wanted is None:
+            return self.columns_by(path, TablePins())
+        return _read_wanted(path, _dialect(path, wanted.pins), wanted)
 
     def columns_by(self, path: Path, pins: TablePins) -> Source:
         """Return all numeric columns of a table with pins; raises RecordingError with the line."""
-        return _read_all(path, _dialect(path, pins))
+        from cdtool.formats.csv.several_clocks import Clocks
+        from cdtool.formats.csv.table import read_table
+
+        dialect = _dialect(path, pins)
+        table = read_table(path, dialect, dialect.names)
+        return join_pieces(_by_clock(path, dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
@@ -73,10 +79,9 @@ class Csv:
         clocks = Clocks.by_names(dialect)
         # The last column is always read: it shows whether the file's end is complete.
         read = dialect.names if keys is None else {*keys, dialect.names[-1]}
-        if len(clocks.groups) < 2:
-            table = yield from table_pieces(path, dialect, clocks, read)
-            return _source(path, dialect, table)
-        return (yield from _pieces_of_clocks(path, dialect, clocks, keys, read))
+        if len(clocks.groups) > 1:
+            read = {*read, *(dialect.names[i] for i in clocks.columns)}
+        return (yield from _by_clock(path, dialect, clocks, keys, table_pieces(path, dialect, read)))
 
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
@@ -90,48 +95,37 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
     return find_dialect(path, sample, pins, content)
 
 
-def _read_all(path: Path, dialect: Dialect) -> Source:
-    from cdtool.formats.csv.several_clocks import Clocks, clock_findings, have_other_rates, survey_by_own_clock
-    from cdtool.formats.csv.table import read_table
-
-    table = read_table(path, dialect, dialect.names)
-    clocks = Clocks.by_names(dialect)
-    if have_other_rates(dialect, clocks, table.values):
-        columns, origin, findings = survey_by_own_clock(path, dialect, clocks, table.values)
-        table.values, table.findings = {}, [*table.findings, *findings]
-        return replace(
-            _source(path, dialect, table), columns=columns, origin=origin or written_origin(path), first_row=0
-        )
-    table.findings += clock_findings(dialect, clocks, table.values)
-    return _source(path, dialect, table)
+def _as_piece(table: TextTable) -> Generator[Piece, None, TextTable]:
+    """Yield the columns of a table, and return it."""
+    yield Piece("", None, table.values, len(next(iter(table.values.values()))))
+    return table
 
 
-def _pieces_of_clocks(
-    path: Path, dialect: Dialect, clocks: Clocks, keys: Collection[str] | None, read: Collection[str]
+def _by_clock(
+    path: Path,
+    dialect: Dialect,
+    clocks: Clocks,
+    keys: Collection[str] | None,
+    pieces: Generator[Piece, None, TextTable],
+    stated: bool = False,
 ) -> Pieces:
-    """Yield the columns of a table with several clocks, by clock if their rates differ."""
-    from cdtool.findings.clocks import OtherClock
-    from cdtool.formats.csv.several_clocks import pieces_by_own_clock, unit_from_header
-    from cdtool.formats.csv.table import table_pieces
+    """Yield the columns of a table, by clock if it has several clocks whose rates differ, or if that is `stated`."""
+    from cdtool.formats.csv.several_clocks import pieces_by_own_clock
 
-    names = dialect.names
-    table_of_all = table_pieces(path, dialect, clocks, {*read, *(names[column] for column in clocks.columns)})
-    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, table_of_all, keys)
-    if findings is None:
+    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys, stated)
+    table.findings += findings
+    if origin is None:
         return _source(path, dialect, table)
-    empty = np.empty(0)
-    columns = {
-        key: Column(key, empty, empty, unit_from_header(dialect, key))
-        for key in table.values
-        if names.index(key) not in clocks.columns and (keys is None or key in keys)
-    }
-    table.findings = [*(found for found in table.findings if not isinstance(found.fact, OtherClock)), *findings]
-    table.values = {}
-    return replace(_source(path, dialect, table), columns=columns, origin=origin or written_origin(path), first_row=0)
+    times = {dialect.names[column] for column in clocks.columns}
+    kept = {key for key in table.values if key not in times and (keys is None or key in keys)}
+    table.values = {key: values for key, values in table.values.items() if key in kept}
+    source = _source(path, dialect, table)
+    columns = {key: replace(column, time=np.empty(0)) for key, column in source.columns.items()}
+    return replace(source, columns=columns, origin=origin or written_origin(path), first_row=0)
 
 
 def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
-    from cdtool.formats.csv.several_clocks import HINT, Clocks, columns_by_own_clock, describe_other_clock
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clocks
     from cdtool.formats.csv.table import read_table
 
     names, time = dialect.names, wanted.time
@@ -142,20 +136,21 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
         return _source(path, dialect, read_table(path, dialect, wanted_keys(path, wanted, names), clock, wanted))
     keys = wanted_keys(path, wanted if clock is not None else replace(wanted, time=TimeSource()), names)
     table = read_table(path, dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
-    other = describe_other_clock(dialect, clocks, clock, keys, table.values) if clock is not None else ""
+    other = [] if clock is None else other_clocks(dialect, clocks, clock, keys, table.values)
     if other and not own:
-        raise RecordingError(f"{path}: {other}", HINT)
+        beside = f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}'"
+        differs = other[0].words_for("difference[what]")
+        raise RecordingError(f"{path}: {beside}, but the machine file names '{clock}': {differs}", HINT)
     if clock is not None and not other:
         table.values = {key: values for key, values in table.values.items() if key in keys}
         return _source(path, dialect, table)
     if clock is not None:  # back to the file's values, which can be compared with the other clocks
         table.values[clock] = table.values[clock] + table.origin
     channels = [key for key in keys if key != clock]
-    columns, origin, findings = columns_by_own_clock(path, dialect, clocks, channels, table.values)
-    columns |= {key: replace(columns[key], words=words) for key, words in table.words.items()}
-    table.values, table.findings = {}, [*table.findings, *findings]
-    origin = origin or written_origin(path)
-    return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
+    for key in channels:
+        if dialect.names.index(key) not in clocks.of:
+            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
+    return join_pieces(_by_clock(path, dialect, clocks, channels, _as_piece(table), stated=True), sort=False)
 
 
 def _source(path: Path, dialect: Dialect, table: TextTable) -> Source:

@@ -1,71 +1,46 @@
 """Shorten the sample of a table to the lines that determine its dialect.
 
-Most tables have a head, and then rows of one shape: a number or nothing in each cell, and one separator. The head and
-some rows determine the dialect: the first rows, the first row with each kind of decimal mark (1.5, 1,5, 1.234), and
-one row with a number for each column that also has empty cells. Any other sample is not shortened.
+Most tables have a head, and then rows of one shape: a number in each cell, one separator, one decimal mark. The head
+and the first rows determine their dialect. Any other sample is not shortened.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdtool.channels import TablePins
-from cdtool.formats.csv.alike_rows_kernel import (
-    COMMA,
-    COMMA_OR_THOUSANDS,
-    FIRST_BYTE,
-    FIRST_LINE,
-    FIRST_ROW,
-    LAST_BYTE,
-    NUMBERS,
-    POINT,
-    POINT_OR_THOUSANDS,
-    ROW_BYTE,
-    ROWS,
-    WIDTH,
-    find_alike_rows,
-)
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.row_kernel import Integers
-from cdtool.formats.csv.text import AFTER, SAMPLE_BYTES, Text
+from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 
 # Samples with fewer rows, or with more lines above the rows, are not shortened.
 _FEWEST_ROWS, _MOST_ABOVE = 100, 40
-_MOST_COLUMNS = 512
 # The shortened sample has at least this many rows, and twice as many as lines above: its lower two thirds, from which
 # the separator is found, then contain rows only, as in the whole sample.
-_FIRST_ROWS = 12
-# As in find_dialect: decimal points are searched for in the first rows only, commas in all rows.
-_SEARCHED_ROWS = 200
-# As in find_dialect: the kind of a column is determined from about this many rows, evenly spread.
-_SPREAD_ROWS = 400
+_FIRST_ROWS = 6
+# The bytes of numbers; a sign is at the start of a number or of its exponent.
+_PLAIN = b"0123456789.+-eEnaNA\r\n"
+# A number whose mark cannot separate thousands.
+_DECIMAL = re.compile(rb"[+-]?(?:0[.,][0-9]+|[0-9]+[.,](?:[0-9]{1,2}|[0-9]{4,})|[0-9]{4,}[.,][0-9]+)(?![0-9.,])")
 
 
 @dataclass(frozen=True)
 class ShorterSample:
-    """A `stream` with fewer rows but the same dialect.
-
-    The whole sample has `rows` alike rows from line `first` (from 1); `left_out` of them are not in `stream`. `above`
-    are the bytes of the lines above them. Samples with equal `above` and equal `shape` have the same dialect.
-    """
+    """A `stream` with fewer rows but the same dialect: `left_out` of the rows, which start in line `first` (from 1)."""
 
     stream: bytes
     first: int
-    rows: int
     left_out: int
-    above: bytes
-    shape: tuple[object, ...]
     separator: str
     width: int
-    has_empty_cells: bool
 
     def whole(self, dialect: Dialect) -> Dialect | None:
         """Return the dialect of the whole sample, given that of `stream`; None if the two may differ."""
         if (dialect.separator, dialect.width) != (self.separator, self.width) or dialect.first_line > self.first:
             return None
-        if self.has_empty_cells and dialect.first_line < self.first:
+        if not {*dialect.kinds} <= {*"NM"}:
             return None
         if dialect.marks.doubt is not None or (dialect.header is None and dialect.separator == ","):
             return None
@@ -75,41 +50,44 @@ class ShorterSample:
 def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample | None:
     """Return the shortened sample; None if its rows are not alike or are few."""
     pinned_line = max(pins.skip_lines, int(pins.header or 0), int(pins.units or 0))
-    if text.recoded or text.line_end != b"\n" or pinned_line > _MOST_ABOVE or _begins_rows(pins.comment or ""):
+    if text.line_end != b"\n" or pinned_line > _MOST_ABOVE or _begins_rows(pins.comment or ""):
         return None
-    end = stream.rfind(b"\n") + 1 if text.size > SAMPLE_BYTES or stream.endswith(b"\n") else len(stream)
-    separator = _separator(stream, end)
+    if text.size > SAMPLE_BYTES or stream.endswith(b"\n"):
+        stream = stream[: stream.rfind(b"\n") + 1]
+    else:
+        stream += b"\n"
+    separator = _separator(stream)
     if separator is None:
         return None
-    found, marks = np.zeros(4, dtype=np.int64), np.full((4, 2), -1, dtype=np.int64)
-    columns = np.zeros((_MOST_COLUMNS, 5), dtype=np.int64)
-    starts = np.zeros(2 * _MOST_ABOVE + _FIRST_ROWS + 1, dtype=np.int64)
-    data = np.frombuffer(b"".join((memoryview(stream)[:end], b"\n" * AFTER)), dtype=np.uint8)
-    stop = end if stream[end - 1 : end] == b"\n" else end + 1
-    alike = find_alike_rows(data, stop, separator[0], _MOST_ABOVE, len(starts), found, marks, columns, starts)
-    rows, width, first, begin = found[[ROWS, WIDTH, FIRST_LINE, FIRST_BYTE]].tolist()
-    if not alike or rows < _FEWEST_ROWS or width < 2:
+    others = {*stream.translate(None, _PLAIN + separator + b",")}
+    begin = stream.find(b"\n", max(map(stream.rfind, others), default=-1)) + 1 if others else 0
+    above, rows = stream.count(b"\n", 0, begin), stream[begin:]
+    count, width = _FIRST_ROWS + 2 * above, rows.partition(b"\n")[0].count(separator) + 1
+    lines = _alike(rows, separator, width)
+    if lines < max(_FEWEST_ROWS, count) or above > _MOST_ABOVE:
         return None
-    columns = columns[:width]
-    kinds = _kinds(columns, rows)
-    seen = _searched_marks(marks)
-    if kinds is None or seen is None:
+    *first, _ = stream.split(b"\n", above + count)
+    if not _is_clear(b"\n".join(first[above:]), rows, separator):
         return None
-    count = _FIRST_ROWS + 2 * first
-    more = {int(marks[mark, ROW_BYTE]) for mark in seen if marks[mark, FIRST_ROW] >= count}
-    more |= {int(each[LAST_BYTE]) for each in columns if 0 < each[NUMBERS] < rows} - set(starts[:count].tolist())
-    lines = [stream[at : stream.find(b"\n", at, end) + 1 or end] for at in sorted(more)]
-    return ShorterSample(
-        stream=stream[: int(starts[count])] + b"".join(lines),
-        first=first + 1,
-        rows=rows,
-        left_out=rows - count - len(lines),
-        above=stream[:begin],
-        shape=(separator, kinds, tuple(seen)),
-        separator=separator.decode(),
-        width=width,
-        has_empty_cells=bool((columns[:, NUMBERS] < rows).any()),
-    )
+    return ShorterSample(b"\n".join([*first, b""]), above + 1, lines - count, separator.decode(), width)
+
+
+def _alike(rows: bytes, separator: bytes, width: int) -> int:
+    """Return the number of rows if each cell of all rows is a number; 0 if there may be other rows.
+
+    After the last cell there may be another separator, in all rows or in none.
+    """
+    data = np.frombuffer(b"\n" + rows, dtype=np.uint8)
+    before_signs = bytes(data[np.flatnonzero(data == ord("-")) - 1])
+    places = np.flatnonzero((data == separator[0]) | (data == ord("\n")))
+    is_end = data[places[1:]] == ord("\n")
+    lines = int(np.count_nonzero(is_end))
+    if len(is_end) != lines * width or not is_end[width - 1 :: width].all():
+        return 0
+    filled = np.diff(places).reshape(lines, width) > 1
+    filled[:, -1] = np.diff(places)[width - 1 :: width] > 1 + rows.endswith(b"\r\n")
+    alike = filled[:, :-1].all() and filled[:, -1].all() == filled[:, -1].any()
+    return lines if alike and not before_signs.translate(None, b"\neE" + separator) else 0
 
 
 def _begins_rows(comment: str) -> bool:
@@ -117,34 +95,17 @@ def _begins_rows(comment: str) -> bool:
     return bool(comment) and comment[0] in "+-.,;|\t nN0123456789"
 
 
-def _separator(stream: bytes, end: int) -> bytes | None:
-    """Return the separator in a line in the middle of the sample; None if the line has no separator or several."""
-    middle = stream.rfind(b"\n", 0, end // 2) + 1
-    line = stream[middle : stream.find(b"\n", middle, end)]
+def _separator(stream: bytes) -> bytes | None:
+    """Return the separator in a line in the middle; None if the line has no separator, or several."""
+    middle = stream.rfind(b"\n", 0, len(stream) // 2) + 1
+    line = stream[middle : stream.find(b"\n", middle)]
     strong = [letter for letter in (b"\t", b";", b"|") if letter in line]
     if len(strong) > 1:
         return None
     return strong[0] if strong else b"," if b"," in line else None
 
 
-def _kinds(columns: Integers, rows: int) -> str | None:
-    """Return one letter per column: N numbers, M nothing; None if the spread rows may miss the numbers of a column."""
-    apart = rows // _SPREAD_ROWS + 2  # the largest distance between two of the spread rows
-    letters = []
-    for count, _, longest, last, _ in columns.tolist():
-        if 0 < count < rows and (longest < apart or last - longest < (rows + _MOST_ABOVE) / 3):
-            return None
-        letters.append("N" if count else "M")
-    return "".join(letters)
-
-
-def _searched_marks(marks: Integers) -> list[int] | None:
-    """Return the kinds of decimal marks in the searched rows; None if these depend on the lines above."""
-    first = marks[:, FIRST_ROW]
-    points, commas = first[[POINT, POINT_OR_THOUSANDS]], first[[COMMA, COMMA_OR_THOUSANDS]]
-    if points.max() >= 0 and commas.max() >= 0:
-        return None
-    if ((points >= _SEARCHED_ROWS - _MOST_ABOVE) & (points < _SEARCHED_ROWS)).any():
-        return None
-    kinds = (POINT, COMMA, POINT_OR_THOUSANDS, COMMA_OR_THOUSANDS)
-    return [kind for kind in kinds if first[kind] >= 0 and (first[kind] < _SEARCHED_ROWS or commas.max() >= 0)]
+def _is_clear(first: bytes, rows: bytes, separator: bytes) -> bool:
+    """Return whether the rows have one decimal mark or none, and the first of them show that it is one."""
+    marks = [mark for mark in (b".", b",") if mark in rows and mark != separator]
+    return not marks or (len(marks) == 1 and any(map(_DECIMAL.match, first.replace(separator, b"\n").split())))

@@ -12,17 +12,12 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.head import Head
 from cdtool.formats.csv.lines import Line, begins_comment
 from cdtool.formats.csv.marks import Marks, find_marks
-from cdtool.formats.csv.row_kernel import Integers
-from cdtool.formats.csv.text import Bytes
 
 _EXPONENT = r"[eE][+-]?[0-9]+"
 _PADDED = re.compile(rf"0[0-9]+(?:{_EXPONENT})?|[0-9]+{_EXPONENT}")
@@ -150,56 +145,32 @@ def resolve_marks(dialect: Dialect) -> Marks:
 
 
 def _marked_cells(dialect: Dialect) -> Iterator[tuple[str, int, int]]:
-    """Yield cells with a mark between digits in columns of numbers, with line and column, in the file's order."""
+    """Yield the cells of columns of numbers with line and column, in the file's order, of blocks that have a mark."""
     line, end = dialect.first_line, dialect.text.line_end
-    marks = b".'" if dialect.separator == "," else b".,'"
-    for block, size in dialect.text.blocks(dialect.offset):
-        counted = 0
-        if any(block.find(letter, 0, size) >= 0 for letter in marks):
-            for at in _marks_in_numbers(np.frombuffer(block, np.uint8, size), marks, dialect.separator).tolist():
-                if at < counted:  # in the same line
-                    continue
-                first, last = block.rfind(end, 0, at) + 1, block.find(end, at)
-                line += block.count(end, counted, first)
-                counted = last
-                for column, cell in enumerate(_cells(dialect, bytes(block[first:last]))):
-                    # A last line without a line end may be cut off: `1.0` may have been `1.000`.
-                    if dialect.kinds[column] in "NM" and (last < size or _GROUPED.fullmatch(cell)):
-                        yield cell, line, column
-        line += block.count(end, counted, size)
-
-
-def _marks_in_numbers(data: Bytes, marks: bytes, separator: str) -> Integers:
-    """Return the bytes of marks within numbers that fill a cell: not in the seconds of a time, nor in a date."""
-    borders = separator.encode() + b'" \t\r\n'
-    other = np.flatnonzero((data < ord("0")) | (data > ord("9")))
-    letters = data[other]
-    mark = _is_one_of(marks)[letters]
-    begun = np.append(True, _is_one_of(borders + b"+-")[letters][:-1])
-    digits = np.diff(other, append=len(data)) - 1
-    ended = np.append(_is_one_of(borders + b"eE")[letters][1:], True)
-    grouped = np.append(mark[1:], False) & (digits == 3)
-    places: Integers = other[mark & begun & (digits > 0) & (ended | grouped)]
-    return places
-
-
-def _is_one_of(letters: bytes) -> npt.NDArray[np.bool_]:
-    """Return a table (256,) that states for each byte whether it is one of `letters`."""
-    table = np.zeros(256, dtype=bool)
-    table[list(letters)] = True
-    return table
+    for block in dialect.text.blocks(dialect.offset):
+        rows = block.split(end)
+        if any(mark in block for mark in (b".", b"'", b",") if mark != dialect.separator.encode()):
+            for number, raw in enumerate(rows, line):
+                # A last line without a line end may be cut off: `1.0` may have been `1.000`.
+                cut = number == line + len(rows) - 1
+                for column, cell in enumerate(_cells(dialect, raw)):
+                    if dialect.kinds[column] in "NM" and (not cut or _GROUPED.fullmatch(cell)):
+                        yield cell, number, column
+        line += len(rows) - 1
 
 
 def _cells(dialect: Dialect, raw: bytes) -> list[str]:
-    """Return the cells of a row; empty for any other line."""
+    """Return the cells of a row; empty for any other line, such as one of a footer."""
     text = dialect.text.decode(raw)
     cells = [] if begins_comment(text, dialect.comment) else split_line(text, dialect.separator)
-    return cells if len(cells) == dialect.width else []
+    if len(cells) != dialect.width or (dialect.kinds[0] in "NT" and kind(cells[0]) == "X"):
+        return []
+    return cells
 
 
 def _first_rows(dialect: Dialect) -> Iterator[list[str]]:
-    for block, size in dialect.text.blocks(dialect.offset):
-        for raw in bytes(block[:size]).split(dialect.text.line_end, _ROWS_HELD)[:_ROWS_HELD]:
+    for block in dialect.text.blocks(dialect.offset):
+        for raw in block.split(dialect.text.line_end, _ROWS_HELD)[:_ROWS_HELD]:
             if cells := _cells(dialect, raw):
                 yield cells
         return

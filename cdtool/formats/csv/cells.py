@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import math
 import re
+from functools import lru_cache
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "pipe", ",": "comma", " ": "blanks"}
 MISSING = ("", "nan", "NaN", "NAN")
 # What programs write for a value that does not exist: JSON and SQL, Python, pandas.
 NULLS = ("null", "NULL", "None", "<NA>")
 MINUS_SIGN = "\u2212"
-# Non-breaking spaces, which French and Swiss tables use as thousands separators.
-NARROW_BLANKS = ("\u00a0", "\u202f")
 
 _TAIL = r"(?:[eE][+-]?[0-9]+)?"
 _WORDS = re.compile(r"[+-]?(?:nan|inf|infinity|true|false)", re.IGNORECASE)
@@ -46,11 +45,21 @@ def split_line(line: str, separator: str) -> list[str]:
     return [cell.strip(" \t\r\n") for cell in cells]
 
 
+def has_open_quote(line: str, separator: str) -> bool:
+    """Return whether a cell starts with a quote that is not closed; a quote within a cell is a letter."""
+    try:
+        next(csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True))
+    except csv.Error:
+        return True
+    return False
+
+
 def _words(line: str) -> list[str]:
     """Return a line split at blanks and tabs; non-breaking spaces do not split, as they are parts of numbers."""
     return [word for word in line.strip(" \t\r\n").replace("\t", " ").split(" ") if word]
 
 
+@lru_cache(maxsize=1 << 12)  # the cells of a sample are classified several times
 def kind(cell: str) -> str:
     """Return the kind of a cell: N number in any notation or NaN, T time stamp, M missing (empty), X words."""
     if _QUICK.fullmatch(cell):

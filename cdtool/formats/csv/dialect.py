@@ -11,6 +11,9 @@ from cdtool.formats.csv.marks import Marks, SampleCell
 from cdtool.formats.csv.stamps import StampLayouts
 from cdtool.formats.csv.text import Text
 
+# So many cells a block may have: 16 MiB of float64. Rows that end early have more cells than their bytes show.
+MOST_CELLS = 1 << 21
+
 
 @dataclass(frozen=True, kw_only=True)
 class Dialect:
@@ -54,6 +57,10 @@ class Dialect:
     def names(self) -> tuple[str, ...]:
         """Return the names of the columns; without a header their numbers from 0."""
         return self.header or tuple(str(i) for i in range(self.width - self.trailing))
+
+    def may_end_after(self, cells: int) -> bool:
+        """Return whether a row may end after so many cells, though it has more columns."""
+        return self.short_rows and (cells == self.short_width if self.short_width else 1 < cells < self.width)
 
     @property
     def details(self) -> dict[str, str]:

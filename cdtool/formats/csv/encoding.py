@@ -9,7 +9,7 @@ from pathlib import Path
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.east_asian import east_asian
 from cdtool.formats.csv.gzipped import is_gzipped, measure
-from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text
+from cdtool.formats.csv.text import UNIT_BYTES, Text, recoded
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
 _MARKS = (
@@ -51,16 +51,8 @@ def looks_like_text(sample: bytes) -> bool:
     first_line = text.lstrip(b"\r\n").partition(b"\n")[0].partition(b"\r")[0]
     if not text or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"[")):
         return False
-    return not text.translate(None, _ALLOWED) or _has_few_controls(text)
-
-
-def _has_few_controls(text: bytes) -> bool:
-    count = len(_CONTROL.findall(text))
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(text)
-    except UnicodeDecodeError:
-        return False
-    return b"\0" not in text and count <= max(_FEW, _SHARE * len(text))
+    controls = len(text.translate(None, _ALLOWED))
+    return not controls or (b"\0" not in text and controls <= max(_FEW, _SHARE * len(text)))
 
 
 def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | None = None) -> tuple[Text, bytes]:
@@ -77,14 +69,13 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
             f"{path}: line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
         )
-    size, padding, end = _without_padding(path, content, UNIT_BYTES.get(encoding, 1))
-    stream = sample[mark : max(size, mark)]
+    stream = sample[mark:]
     if encoding in UNIT_BYTES:
-        try:
-            stream = codecs.getincrementaldecoder(encoding)().decode(stream).encode()
-        except UnicodeError as fault:
-            raise RecordingError(f"{path}: damaged: not valid {encoding.upper()}", "save it again as UTF-8") from fault
-    elif pinned:
+        content, mark = recoded(path, encoding, mark, content), 0
+        stream = content[: 2 * len(sample)]  # at most 3 bytes of UTF-8 are 2 of UTF-16
+    total, size = _without_padding(path, content)
+    stream = stream[: max(size - mark, 0)]
+    if pinned and encoding not in UNIT_BYTES:
         _check_pinned(path, stream, encoding)
     head = stream[:HEAD_BYTES]
     control = _CONTROL.search(head) if head.translate(None, _ALLOWED) else None
@@ -99,7 +90,7 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     line_end = b"\n" if b"\n" in inner or b"\r" not in inner else b"\r"
     if b"\r" not in inner and b"\n" not in stream and b"\r" in stream:
         line_end = b"\r"
-    return Text(path, encoding, mark, size, padding, line_end, content, end), stream
+    return Text(path, encoding, mark, size, total - size, line_end, content), stream
 
 
 def _by_mark(sample: bytes) -> tuple[str | None, int]:
@@ -144,30 +135,12 @@ def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
         ) from fault
 
 
-def _without_padding(path: Path, known: bytes | None, unit: int) -> tuple[int, int, tuple[int, bytes] | None]:
-    """Return the byte where the text ends, the number of NUL bytes after it, and the end that has been read.
-
-    `known` are the bytes of the file. The last bytes of a compressed file, and where they start, are kept: they are
-    read several times, each of which would decompress the whole file.
-    """
-    if known is not None and not known.endswith(b"\0"):
-        return len(known), 0, None
-    kept = None
-    if known is None and is_gzipped(path):
-        total, end, last = measure(path, SAMPLE_BYTES)
-        kept = (total - len(last), last)
-    else:
-        total, end = _measure(path, known)
-    if unit > 1:  # the upper bytes of the last character are NUL too
-        mark = total % unit
-        end = min(total, end + (mark - end) % unit)
-    return end, total - end, kept
-
-
-def _measure(path: Path, known: bytes | None) -> tuple[int, int]:
-    """Return the size of a file, and its size without the NUL bytes at its end."""
+def _without_padding(path: Path, known: bytes | None) -> tuple[int, int]:
+    """Return the size of a text, and its size without the NUL bytes at its end; `known` are its bytes."""
     if known is not None:
         return len(known), len(known.rstrip(b"\0"))
+    if is_gzipped(path):
+        return measure(path)
     total = end = path.stat().st_size
     with path.open("rb") as file:
         while end > 0:

@@ -14,34 +14,22 @@ from typing import Any
 
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
-from cdtool.findings.tables import (
-    DoubtfulPoint,
-    FooterSkipped,
-    NamedSeparator,
-    NamesFromComment,
-    NumbersAboveRows,
-    OtherEncoding,
-    PinnedLinesSkipped,
-    WordsAboveRows,
-)
+from cdtool.findings import Finding, lines_of
 from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.ambiguous_marks import (
     refuse_commas_that_may_be_decimal,
     refuse_one_column_of_decimals,
     resolve_marks,
 )
-from cdtool.formats.csv.blank_lines import are_missing_samples, strip_blank_end
 from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
-from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
 from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv.head_words import column_kinds
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.marks import Marks, SampleCell, find_marks
-from cdtool.formats.csv.row_kernel import count_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
-from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
+from cdtool.formats.csv.text import Text
 
 _SCORED = 150
 # A strong separator that occurs equally often in this share of the lines is preferred, even with fewer numbers.
@@ -54,15 +42,9 @@ _SHOWN_ENCODINGS = {
     "gb18030": "GB18030",
 }
 _LOOKED = 200
-_MOST = 12
 # Rows end early if so many lines, with the names and the first row, show it.
 _ENDING_EARLY = 6
-# Dialects of previous tables, for files with an equal head and rows of the same shape.
-_KNOWN: dict[tuple[object, ...], Dialect] = {}
-_MOST_KNOWN = 64
 _TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
-_LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
-_MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
 
 @dataclass(frozen=True)
@@ -95,7 +77,8 @@ def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal:
             )
         return split
     in_times = _is_part_of_times(lines)
-    splits = [_split(scored, separator) for separator in SEPARATORS if not (in_times and separator == ";")]
+    used = [mark for mark in SEPARATORS if mark == " " or any(mark in text for text in scored)]
+    splits = [_split(scored, separator) for separator in used if not (in_times and separator == ";")]
     possible = [split for split in splits if split.width > 1 and split.numeric > 0.0]
     if not possible:
         return _split(scored, ",")
@@ -229,7 +212,8 @@ def split_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
     lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
     kinds = column_kinds([cells for _, cells in _sample_evenly(lower)], split.width)
     head = HeadFinder(path, split.separator, split.width, kinds, pins).find(lines.table, lines.comments)
-    data = [(line, cells) for line, cells in wide if line.number >= head.first.number]
+    end = next((line.number for line, cells in reversed(wide) if kind(cells[0]) != "X" or kinds[0] not in "NT"), 0)
+    data = [(line, cells) for line, cells in wide if head.first.number <= line.number <= end]  # without a footer
     kinds = column_kinds([cells for _, cells in _sample_evenly(data)], split.width)
     return CellGrid(split.separator, split.width, rows, data, head, kinds, short)
 
@@ -242,7 +226,7 @@ def _full_width(rows: Sequence[tuple[Line, list[str]]], width: int) -> int:
     if len(rows) < _ENDING_EARLY or {len(cells) for _, cells in rows[2:]} != {width}:
         return width
     names, first = rows[0][1], rows[1][1]
-    if not len(names) == len(first) > width or not any(names[width:]):
+    if not len(names) == len(first) > width or not any(names[width:]) or len(names) * len(rows) > MOST_CELLS:
         return width
     named = all(kind(cell) in "XM" for cell in names)
     return len(names) if named and all(kind(cell) in "NTM" for cell in first) else width
@@ -263,45 +247,31 @@ def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
 def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | None = None) -> Dialect:
     """Return the dialect of a text file from its first bytes; `content` are all its bytes if they have been read.
 
-    The text of the dialect ends with the last row: a footer is excluded and reported as a warning. Raises
-    RecordingError if the file is not a table, or is ambiguous.
+    Raises RecordingError if the file is not a table, or is ambiguous.
     """
     text, stream = detect_text(path, sample, pins.encoding, content)
     dialect = _dialect(path, text, stream, pins)
-    footer = find_footer(dialect)
-    findings: list[Finding] = []
-    if footer is not None:
-        dialect = _dialect(path, *footer.removed_from(text, stream), pins)
-        findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset, count_lines)))
-    marks = dialect.marks if dialect.marks.sure else resolve_marks(dialect)
-    if marks.doubt:
-        findings.append(Finding(DoubtfulPoint(marks.doubt.text, marks.doubt.line)))
-    if not findings and marks is dialect.marks and not dialect.blank_is_missing:
+    if dialect.marks.sure:
         return dialect
-    text = strip_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
-    return replace(dialect, text=text, marks=marks, findings=(*dialect.findings, *findings))
+    marks = resolve_marks(dialect)
+    doubt = (
+        []
+        if marks.doubt is None
+        else [Finding("doubtful_point", "", {"text": marks.doubt.text, "line": marks.doubt.line})]
+    )
+    return replace(dialect, marks=marks, findings=(*dialect.findings, *doubt))
 
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     """Return the dialect, footer and ambiguous marks not considered, from a shortened sample if that is sufficient."""
     refuse_long_line(text, stream)
-    shorter = shorter_sample(text, stream, pins)
-    if shorter is None:
-        return _by_lines(path, text, stream, pins)
-    known = (text.encoding, pins, shorter.above, shorter.shape)
-    dialect = _KNOWN.get(known)
-    if dialect is None:
+    if (shorter := shorter_sample(text, stream, pins)) is not None:
         try:
-            dialect = shorter.whole(_by_lines(path, text, shorter.stream, pins))
+            if (dialect := shorter.whole(_by_lines(path, text, shorter.stream, pins))) is not None:
+                return dialect
         except RecordingError:  # the number of a line in the message may be wrong: read the whole sample
-            dialect = None
-        if dialect is None:
-            return _by_lines(path, text, stream, pins)
-        if len(_KNOWN) >= _MOST_KNOWN:
-            _KNOWN.clear()
-        kept = replace(text, content=None)
-        _KNOWN[known] = dialect = replace(dialect, text=kept, sampled=dialect.sampled - shorter.rows)
-    return replace(dialect, text=text, sampled=dialect.sampled + shorter.rows)
+            pass
+    return _by_lines(path, text, stream, pins)
 
 
 def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
@@ -334,13 +304,26 @@ def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect
         width=grid.width,
         kinds=grid.kinds,
         trailing=trailing,
-        blank_is_missing=are_missing_samples(lines.every, head.first.number, grid.width),
+        blank_is_missing=_are_missing_samples(lines.every, head.first.number, grid.width),
         stamped=_stamped_columns(grid, pins),
         short_rows=grid.short > 0,
         short_width=grid.short,
         words={i: _first_words(grid.data, i) for i in grid.not_numbers},
         findings=tuple(_findings(text, lines, head)),
     )
+
+
+def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
+    """Return whether blank lines are missing samples of the table whose rows start in line number `first`.
+
+    They are if the table has one column and fewer than half of the `lines` of its rows are blank: each is a missing
+    sample, so that later rows have their times. If every other line is blank, the blank lines only separate the rows.
+    """
+    if width != 1:
+        return False
+    rows = [line.number for line in lines if not line.blank and line.number >= first]
+    blank = [line.number for line in lines if line.blank and first < line.number < rows[-1]]
+    return not blank or 2 * len(blank) < rows[-1] - first
 
 
 def _refuse_other_readings(path: Path, lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
@@ -413,19 +396,19 @@ def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) ->
 def _findings(text: Text, lines: SampleLines, head: Head) -> list[Finding]:
     findings = []
     if lines.skipped:
-        findings.append(Finding(PinnedLinesSkipped(tuple(lines.skipped)), severity="note"))
+        findings.append(Finding("pinned_lines_skipped", "", lines_of(lines.skipped)))
     encoding = _SHOWN_ENCODINGS.get(text.encoding)
     if encoding:
-        findings.append(Finding(OtherEncoding(encoding), severity="note"))
+        findings.append(Finding("other_encoding", "", {"encoding": encoding}))
     if lines.separator:
         line = lines.separator
-        findings.append(Finding(NamedSeparator(line.number, line.text.strip()[:12]), severity="note"))
+        findings.append(Finding("named_separator", "", {"line": line.number, "text": line.text.strip()[:12]}))
     if head.numbers:
-        findings.append(Finding(NumbersAboveRows(tuple(head.numbers)), severity="loss"))
+        findings.append(Finding("numbers_above_rows", "", lines_of(head.numbers)))
     if words := [line for line in head.preamble if line not in head.numbers]:
-        findings.append(Finding(WordsAboveRows(tuple(words)), severity="note"))
+        findings.append(Finding("words_above_rows", "", lines_of(words)))
     if head.from_comment:
-        findings.append(Finding(NamesFromComment(head.header_line), severity="note"))
+        findings.append(Finding("names_from_comment", "", {"line": head.header_line}))
     return findings
 
 
@@ -433,95 +416,3 @@ def _unique(cells: Sequence[str]) -> list[str]:
     # A repeated name is ambiguous: the column's number is appended, and the column is requested by that number.
     counts = Counter(cells)
     return [str(i) if not cell else f"{cell}#{i}" if counts[cell] > 1 else cell for i, cell in enumerate(cells)]
-
-
-@dataclass(frozen=True)
-class Footer:
-    """A footer: `lines` are its lines, counted from its first line (0); `first` is that line, `content` the bytes."""
-
-    lines: tuple[int, ...]
-    first: str
-    content: bytes
-
-    def finding(self, first_line: int) -> Finding:
-        """Return the warning on a footer that starts in that line of the file."""
-        return Finding(FooterSkipped(tuple(first_line + line for line in self.lines), self.first))
-
-    def removed_from(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
-        """Return the text, and the sample of its stream, without the footer."""
-        size = len(self.content.decode().encode(text.encoding) if text.recoded else self.content)
-        return replace(text, size=text.size - size), stream.removesuffix(self.content)
-
-
-def find_footer(dialect: Dialect) -> Footer | None:
-    """Return the footer of a table whose first column has numbers or times; None if the table has no footer.
-
-    The lines of a footer may be as wide as rows but are not samples: `Sum;7.5`, `Mean;0.3`, `End of file;`. Such a line
-    starts with a word where each row starts with a number or a time. A word that also occurs in rows above, that is
-    repeated, or that marks a missing value does not start a footer: the column has words, or a row is damaged. Below a
-    blank line its lines may have any number of cells: `PID axis;KP;KI`.
-    """
-    if dialect.kinds[0] not in "NT" or dialect.text.padding:  # a file that ends with a power failure has no footer
-        return None
-    whole, end = _end_of_rows(dialect)
-    if _ends_with_row(dialect, end):
-        return None
-    raw = end.split(dialect.text.line_end)[not whole :]
-    words: list[tuple[int, list[str]]] = []
-    for i in range(len(raw) - 1, -1, -1):  # usually the last line is a row, which ends the loop
-        cells = _cells(dialect, raw[i])
-        if cells and not _is_words(dialect, cells):
-            break
-        if cells:
-            words.insert(0, (i, cells))
-    first = words[0][0] if words else 0
-    apart = first > 0 and not raw[first - 1].strip()
-    if not apart and not all(len(cells) in (1, dialect.width) for _, cells in words):
-        return None
-    labels = [cells[0].lower() for _, cells in words if len(cells) == dialect.width or (apart and len(cells) > 1)]
-    if not 0 < len(labels) == len(set(labels)) <= _MOST or not set(labels).isdisjoint(_missing_words(dialect)):
-        return None
-    above = [cells for line in raw[:first] if len(cells := _cells(dialect, line)) == dialect.width]
-    if not above or any(kind(cells[0]) == "X" for cells in above):
-        return None
-    first_text = dialect.text.decode(raw[first]).strip()
-    return Footer(tuple(i - first for i, _ in words), first_text, dialect.text.line_end.join(raw[first:]))
-
-
-def _cells(dialect: Dialect, line: bytes) -> list[str]:
-    """Return a line's cells; empty for a blank line, a ruler, a comment or a repeated header."""
-    text = dialect.text.decode(line).strip()
-    if not text or is_ruler(text) or (dialect.comment and text.startswith(dialect.comment)):
-        return []
-    if text in {line.strip() for line in dialect.header_text}:
-        return []
-    return split_line(text, dialect.separator)
-
-
-def _is_words(dialect: Dialect, cells: list[str]) -> bool:
-    """Return whether a line starts with a label, and has no more cells than the rows."""
-    return len(cells) <= dialect.width and _LABEL.fullmatch(cells[0]) is not None and kind(cells[0]) == "X"
-
-
-def _missing_words(dialect: Dialect) -> set[str]:
-    return {*_MISSING_WORDS, *(text.lower() for text in dialect.missing)}
-
-
-def _ends_with_row(dialect: Dialect, end: bytes) -> bool:
-    """Return whether the last line that is not blank is a row: the usual case, in which no other line is read."""
-    stop = len(end.rstrip(b" \t\r\n"))
-    cells = _cells(dialect, end[end.rfind(dialect.text.line_end, 0, stop) + 1 : stop])
-    return bool(cells) and not _is_words(dialect, cells)
-
-
-def _end_of_rows(dialect: Dialect) -> tuple[bool, bytes]:
-    """Return the last bytes of the stream's rows, and whether these are all rows."""
-    text = dialect.text
-    most = SAMPLE_BYTES if text.recoded else TAIL_BYTES
-    start = text.mark if text.recoded else text.mark + dialect.offset
-    whole = text.size - start <= most
-    end = text.between(start if whole else text.size - most, text.size)
-    if text.recoded:
-        end = end.decode(text.encoding, errors="replace").encode()
-        end = end[dialect.offset :] if whole else end
-    return whole, end

@@ -8,30 +8,46 @@ from __future__ import annotations
 
 import gzip
 import zlib
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from gzip import BadGzipFile
 from importlib import import_module
-from io import RawIOBase
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, TypeVar, cast
+from typing import IO, Any, cast
 
 from cdtool.errors import RecordingError
 from cdtool.formats.container_checks import check_size
 
-if TYPE_CHECKING:
-    from _typeshed import WriteableBuffer
-
 MAGIC = b"\x1f\x8b"
 _PIECE = 1 << 20
-T = TypeVar("T")
 
 
-def open_text(path: Path) -> RawIOBase:
-    """Return an open text file without a buffer of its own, decompressed if necessary; raises OSError."""
-    file = path.open("rb", buffering=0)
-    head = file.read(len(MAGIC))
-    file.seek(0)
-    return _Decompressed(path, file) if head == MAGIC else cast(RawIOBase, file)
+@contextmanager
+def open_text(path: Path) -> Iterator[IO[bytes]]:
+    """Open a text file without a buffer of its own, decompressed if necessary; raises OSError, RecordingError."""
+    with path.open("rb", buffering=0) as file:
+        head = file.read(len(MAGIC))
+        file.seek(0)
+        if head != MAGIC:
+            yield cast(IO[bytes], file)
+            return
+        unpack, error = _unpacking()
+        hint = "copy it again from its source; gzip -dc writes what can still be read"
+        try:
+            with unpack(fileobj=file, mode="rb") as unpacked:
+                yield unpacked
+        except EOFError as fault:
+            raise RecordingError(f"{path}: truncated: its gzip data have no end", hint) from fault
+        except (BadGzipFile, zlib.error, error) as fault:
+            raise RecordingError(f"{path}: damaged: its gzip data: {fault}", hint) from fault
+
+
+def _unpacking() -> tuple[Any, type[Exception]]:
+    """Return the class that decompresses, and its error."""
+    try:
+        return import_module("isal.igzip").IGzipFile, import_module("isal.isal_zlib").error
+    except ImportError:  # a platform without a wheel
+        return gzip.GzipFile, zlib.error
 
 
 def is_gzipped(path: Path) -> bool:
@@ -40,65 +56,16 @@ def is_gzipped(path: Path) -> bool:
         return file.read(len(MAGIC)) == MAGIC
 
 
-def measure(path: Path, most: int) -> tuple[int, int, bytes]:
-    """Return the decompressed size of a file, its size without NUL bytes at the end, and its last `most` bytes or more.
+def measure(path: Path) -> tuple[int, int]:
+    """Return the decompressed size of a file, and its size without NUL bytes at the end.
 
     Raises RecordingError if the file is damaged, or decompresses to far more than a log of its size can contain.
     """
     total = end = 0
-    last, before = b"", b""
     with open_text(path) as file:
         while piece := file.read(_PIECE):
+            content = len(piece.rstrip(b"\0"))
+            end = total + content if content else end
             total += len(piece)
             check_size(path, total // 8)
-            content = len(piece.rstrip(b"\0"))
-            end = total - len(piece) + content if content else end
-            before, last = (last, piece) if len(last) >= most else (b"", before + last + piece)
-    return total, end, before + last
-
-
-class _Decompressed(RawIOBase):
-    """The decompressed content of an open file, as a raw file that reads and seeks; RecordingError if damaged."""
-
-    def __init__(self, path: Path, file: IO[bytes]) -> None:
-        self._path, self._file = path, file
-        reader: Any
-        try:
-            reader, error = import_module("isal.igzip").IGzipFile, import_module("isal.isal_zlib").error
-        except ImportError:  # a platform without a wheel
-            reader, error = gzip.GzipFile, zlib.error
-        self._reader, self._error = reader(fileobj=file, mode="rb"), error
-
-    def readable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: WriteableBuffer, /) -> int:
-        """Read bytes until the buffer is full or the content ends, and return how many."""
-        return self._checked(lambda: int(self._reader.readinto(buffer)))
-
-    def readall(self) -> bytes:
-        """Return all bytes that are left."""
-        return self._checked(lambda: bytes(self._reader.read()))
-
-    def seek(self, offset: int, whence: int = 0, /) -> int:
-        """Go to a byte of the content, from its beginning; backward, the file is decompressed again from there."""
-        return self._checked(lambda: int(self._reader.seek(offset, whence)))
-
-    def close(self) -> None:
-        """Close the file."""
-        self._reader.close()
-        self._file.close()
-        super().close()
-
-    def _checked(self, read: Callable[[], T]) -> T:
-        damages = (BadGzipFile, zlib.error, self._error)
-        hint = "copy it again from its source; gzip -dc writes what can still be read"
-        try:
-            return read()
-        except EOFError as fault:
-            raise RecordingError(f"{self._path}: truncated: its gzip data have no end", hint) from fault
-        except damages as fault:
-            raise RecordingError(f"{self._path}: damaged: its gzip data: {fault}", hint) from fault
+    return total, end

@@ -57,7 +57,7 @@ def is_ruler(text: str) -> bool:
 def sample_lines(text: Text, stream: bytes) -> list[Line]:
     """Return the complete lines of the sample; lines that a quoted name in the header spans are joined into one."""
     raw = stream.split(text.line_end)
-    whole = text.mark + len(stream) < SAMPLE_BYTES and not text.recoded
+    whole = text.mark + len(stream) < SAMPLE_BYTES
     if not whole and text.size > SAMPLE_BYTES and len(raw) > 1:
         raw.pop()  # incomplete in the sample, not in the file
     lines: list[Line] = []

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.errors import RecordingError
-from cdtool.formats.csv.cells import MINUS_SIGN, NARROW_BLANKS
+from cdtool.formats.csv.cells import MINUS_SIGN
 
 _DIGITS = re.compile(r"[0-9.,'\u00a0\u202f ]*")
 _GROUPS = re.compile(r"[1-9][0-9]{0,2}(?P<mark>[.,'\u00a0\u202f ])[0-9]{3}(?:(?P=mark)[0-9]{3})*")
@@ -152,11 +152,3 @@ def _decimal(path: Path, evidence: _Evidence) -> str:
             'pin decimal = "," or thousands = "," in [csv] of the machine file',
         )
     return "."
-
-
-def thousands_byte(mark: str) -> int:
-    """Return the byte of the thousands separator in the stream; -1 if there is no such separator.
-
-    A non-breaking space has several bytes, or one that is not ASCII; it is replaced by an apostrophe before reading.
-    """
-    return -1 if not mark else ord("'") if mark in NARROW_BLANKS else ord(mark)

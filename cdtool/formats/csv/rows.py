@@ -1,236 +1,273 @@
-"""Read the rows of a text table, all at once or block by block, with a compiled loop.
+"""Read the rows of a text table block by block: pandas reads the blocks of plain rows, Python the lines of the others.
 
-The loop reads regular lines. Any other line is a row with unusual notation, a line that is skipped and reported
-(comment, blank line, repeated header, NUL bytes, incomplete last line), or an error with its line number.
+pandas fills rows that are too short with NaN, and drops the cells of rows that are too long: a block is plain only if
+each line has as many separators as a row. Any other block is halved down to a few hundred lines.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice, starmap
-from pathlib import Path
+from itertools import zip_longest
+from typing import Any
+from warnings import catch_warnings
 
 import numpy as np
+import pandas as pd
 
-from cdtool.cores import usable_cores
-from cdtool.formats.csv.blank_lines import fill_blank_lines
-from cdtool.formats.csv.cells import NARROW_BLANKS
-from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.irregular_lines import IrregularLine, IrregularLines
-from cdtool.formats.csv.marks import thousands_byte
-from cdtool.formats.csv.number_clock import read_whole_numbers
-from cdtool.formats.csv.number_kernel import powers
-from cdtool.formats.csv.row_arrays import Rows
-from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers, count_lines, read_rows
-from cdtool.formats.csv.short_rows import complete_blocks
-from cdtool.formats.csv.stamp_kernel import STEPS
-from cdtool.formats.csv.text import AFTER, Bytes
-from cdtool.formats.csv.word_cells import WordCells
+from cdtool.findings import Finding
+from cdtool.formats.container_checks import check_size
+from cdtool.formats.csv.cell_values import CellValues, RequestedColumns
+from cdtool.formats.csv.cells import MISSING, kind, split_line
+from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
+from cdtool.formats.csv.stamps import Integers
+from cdtool.formats.csv.table_lines import TableLines
+from cdtool.recording import FloatArray
 
-_THREADS = 4
+RECENT = 20
+# A block of so many bytes is read line by line: pandas would take as long to start.
+_BY_LINES = 1 << 14
+# pandas reads the nearest float64 by itself since 3.1; before that it must be asked.
+_VERSION = tuple(map(int, pd.__version__.split(".")[:2]))
+_EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _VERSION < (3, 1) else {}
+_END = re.compile(r"(?:.*(?P<mark>[.,eE]))?[+-]?(?P<digits>[0-9]*)")
 
 
-@dataclass(frozen=True)
-class _Block:
-    """The result of one block: `rows` rows of `arrays` from row `first`, the number of lines, and irregular lines.
+@dataclass
+class Rows:
+    """Rows of a table from row `first` (0: its first row); the last one is in line `last_line` (from 1).
 
-    `blank` are the blank lines; `empty` are blank lines that are rows; `unfinished`: the last line has no end.
+    Cells (n,) by the number of their column: `numbers` are NaN where a cell is empty, `whole` (integers, also stamps)
+    are MISSING_STAMP there.
     """
 
-    arrays: Rows
     first: int
-    rows: int
-    lines: int
-    blank: Integers
-    empty: Integers
-    irregular: list[IrregularLine]
-    unfinished: bool
+    count: int
+    last_line: int
+    numbers: dict[int, FloatArray]
+    whole: dict[int, Integers]
 
 
 class RowReader:
-    """Reads the rows of one file. `numeric` and `stamped` are the requested columns, by number, in order.
+    """Reads the `requested` columns of one file; with `survey` an unreadable cell is a loss, otherwise an error."""
 
-    `whole` are columns of integers with more digits than float64 can represent; they follow the stamps.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        dialect: Dialect,
-        numeric: Sequence[int],
-        stamped: Sequence[int],
-        whole: Sequence[int] = (),
-    ) -> None:
-        self.path = path
-        self.dialect = dialect
-        self.targets = np.full(dialect.width, LEFT, dtype=np.int64)
-        self.targets[list(numeric)] = np.arange(len(numeric))
-        self.targets[list(stamped)] = STAMP - np.arange(len(stamped))
-        if dialect.trailing:
-            self.targets[-1] = EMPTY
-        self.programs = np.zeros((len(stamped), STEPS), dtype=np.int64)
-        for k, column in enumerate(stamped):
-            self.programs[k] = dialect.stamped[column].layouts[0].program
-        self.whole = tuple(whole)
-        self.shape = (len(numeric), len(stamped) + len(whole))
-        self.ended = True
-        self.words: WordCells | None = None  # the columns of categories
-
-    def read(self, irregular: IrregularLines) -> Rows:
-        """Return all rows in one pair of arrays, into which several threads write; raises RecordingError."""
-        if self.dialect.text.content is not None:
-            return _joined(list(self.pieces(irregular)), self.allocate(0))
-        whole = self.allocate(self.dialect.text.count_lines(self.dialect.offset, count_lines))
-        parts = list(self.pieces(irregular, whole))
-        count = sum(part.count for part in parts)
-        not_rows = np.concatenate([whole.not_rows, *(part.not_rows for part in parts)])
-        return Rows(whole.numbers[:, :count], whole.stamps[:, :count], count, whole.first_line, not_rows)
-
-    def pieces(self, irregular: IrregularLines, whole: Rows | None = None) -> Iterator[Rows]:
-        """Yield the rows block by block, in arrays of their own or consecutively in `whole`.
-
-        Irregular lines are passed to `irregular`. Raises RecordingError with the first line that cannot be read.
-        """
-        line, end = self.dialect.first_line, 0
-        for block in self._read_ahead(whole):
-            self.ended = not block.unfinished
-            for each in block.irregular:
-                irregular.read(each, line, block.arrays)
-            irregular.blank += (block.blank + line).tolist()
-            irregular.empty += (block.empty + line).tolist()
-            dropped = irregular.end_block(range(block.first, block.first + block.rows))
-            not_rows = np.sort(np.concatenate([block.blank + line, np.array([*dropped.values()], dtype=np.int64)]))
-            begin = 0 if whole is None else end
-            end = _compact(block, sorted(dropped), begin)
-            numbers, stamps = block.arrays.numbers[:, begin:end], block.arrays.stamps[:, begin:end]
-            yield Rows(numbers, stamps, end - begin, line, not_rows)
-            line += block.lines
-
-    def allocate(self, count: int) -> Rows:
-        """Return uninitialised arrays for `count` rows."""
-        numbers, stamps = np.empty((self.shape[0], count)), np.empty((self.shape[1], count), dtype=np.int64)
-        return Rows(numbers, stamps, 0, self.dialect.first_line)
-
-    def _raw_blocks(self, whole: Rows | None) -> Iterator[tuple[bytearray, int, int, int, Rows]]:
-        """Yield per block the bytes, the size of its lines, the first row, the number of rows, and their arrays."""
-        dialect = self.dialect
-        end, first, blocks = dialect.text.line_end[0], 0, dialect.text.blocks(dialect.offset)
-        if dialect.short_rows:
-            blocks = complete_blocks(blocks, dialect)
-        for block, size in blocks:
-            count = int(count_lines(np.frombuffer(block, dtype=np.uint8, count=size), end)) + (block[size - 1] != end)
-            yield block, size, first, count, self.allocate(count) if whole is None else whole
-            first += 0 if whole is None else count
-
-    def _read_ahead(self, whole: Rows | None) -> Iterator[_Block]:
-        """Yield blocks in the file's order, read ahead by threads (the loop runs without the interpreter lock)."""
-        workers = min(_THREADS, usable_cores())
-        blocks = self._raw_blocks(whole)
-        begin = list(islice(blocks, 2))
-        if len(begin) < 2 or workers == 1:
-            yield from starmap(self._block, chain(begin, blocks))
-            return
-        _ = read_rows.compiled  # once, not in every thread
-        pending: deque[Future[_Block]] = deque()
-        with ThreadPoolExecutor(workers) as pool:
-            try:
-                for block in chain(begin, blocks):
-                    pending.append(pool.submit(self._block, *block))
-                    if len(pending) > workers:
-                        yield pending.popleft().result()
-                while pending:
-                    yield pending.popleft().result()
-            finally:
-                pool.shutdown(cancel_futures=True)
-
-    def _block(self, block: bytearray, size: int, first: int, count: int, arrays: Rows) -> _Block:
-        end = self.dialect.text.line_end
-        unfinished = block[size - 1] not in b"\r\n"
-        if block[size - 1 : size] != end:  # the line ends after the block replace the missing one
-            size += 1
-        if self.dialect.marks.thousands in NARROW_BLANKS:
-            encoding = "utf-8" if self.dialect.text.recoded else self.dialect.text.encoding
-            lines = block[:size].replace(self.dialect.marks.thousands.encode(encoding), b"'")
-            block, size = lines + end * AFTER, len(lines)
-        empty = np.empty(0, dtype=np.int64)
-        if self.dialect.blank_is_missing:
-            block, size, empty = fill_blank_lines(block, size, end)
-        if self.words is not None:
-            content = self.words.coded(bytes(memoryview(block)[:size]))
-            block, size = bytearray(content + end * AFTER), len(content)
-        data = np.frombuffer(block, dtype=np.uint8)
-        blank = np.empty(count, dtype=np.int64)
-        irregular = np.empty((count, 4), dtype=np.int64)
-        counts = np.zeros(4, dtype=np.int64)
-        read_rows(
-            data,
-            size,
-            self._marks(),
-            self.targets,
-            self.programs,
-            arrays.numbers,
-            arrays.stamps,
-            first,
-            blank,
-            irregular,
-            counts,
-            *powers(),
-        )
-        if self.whole:
-            self._read_whole(data[:size], arrays.stamps[:, first : first + int(counts[0])], blank[: counts[2]])
-        final = count - 1 if unfinished else -1
-        listed = [
-            IrregularLine(line, row, bytes(block[begin:stop]), line == final)
-            for line, row, begin, stop in irregular[: counts[3]].tolist()
+    def __init__(self, dialect: Dialect, requested: RequestedColumns, survey: bool) -> None:
+        self.dialect, self.requested = dialect, requested
+        self.values = CellValues(dialect, requested, survey)
+        self.lines = TableLines(dialect, self.values)
+        self.findings: list[Finding] = []
+        self._texts = sorted({*requested.stamps, *requested.whole})
+        encoding = dialect.text.stream_encoding
+        comment = dialect.comment.encode(encoding, "replace")
+        # pandas cannot read a repeated header as a row, unless its words are in other columns.
+        cells = {text.strip(): split_line(text, dialect.separator) for text in dialect.header_text}
+        headers = [
+            text.encode(encoding, "replace")
+            for text, words in cells.items()
+            if not any(kind(cell) == "X" for i, cell in enumerate(words) if i in requested.numeric)
         ]
-        return _Block(
-            arrays, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed, unfinished
+        self._odd = [mark for mark in (b'"', b"\0", comment, *headers) if mark]
+        self._missing = [*MISSING, *(text.encode(encoding, "replace").decode("latin-1") for text in dialect.missing)]
+
+    def pieces(self) -> Iterator[Rows]:
+        """Yield the rows block by block; after the last one `findings` are those on lines, cells and the file's end.
+
+        Raises RecordingError with the first line that cannot be read.
+        """
+        last, ended = self._read([], []), True
+        for block in self.dialect.text.blocks(self.dialect.offset):
+            ended = block.endswith((b"\n", b"\r"))
+            for rows in self._rows(block, ended):
+                check_size(self.dialect.text.path, self.lines.rows * (len(self.values.numeric) + len(self._texts)))
+                if rows.count:
+                    if last.count:
+                        yield last
+                    last = rows
+        self.findings = self._end(last, ended)
+        yield last
+
+    def _rows(self, block: bytes, ended: bool) -> Iterator[Rows]:
+        """Yield the rows of a block: the plain ones by pandas, the lines of the others one by one."""
+        half = block.rfind(self.dialect.text.line_end, 0, len(block) // 2) + 1
+        plain = self._plain(block, ended)
+        if plain is not None:
+            yield plain
+        elif len(block) > _BY_LINES and half:
+            yield from self._rows(block[:half], ended=True)
+            yield from self._rows(block[half:], ended)
+        else:
+            yield from self._by_lines(block, ended)
+
+    def _plain(self, block: bytes, ended: bool) -> Rows | None:
+        """Return the rows of a block that has only plain rows; None if it may have anything else."""
+        dialect, separator = self.dialect, self.dialect.separator.encode()
+        if dialect.text.line_end != b"\n" or self.requested.categories:
+            return None
+        if separator != b" " and b'"' in block:
+            block = without_quotes(block, separator)
+        if self.lines.may_end or any(mark in block for mark in self._odd):
+            return None
+        if separator == b" ":  # one between two cells
+            block = re.sub(rb"^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block), flags=re.MULTILINE)
+        data = np.frombuffer(block, dtype=np.uint8)
+        ends = np.flatnonzero(data == ord("\n")) if ended else [*np.flatnonzero(data == ord("\n")), len(block)]
+        widths = 1 + np.diff(np.searchsorted(np.flatnonzero(data == separator[0]), ends), prepend=0)
+        count, width = len(widths), dialect.width
+        whole = widths == width
+        if not all(dialect.may_end_after(cells) for cells in np.unique(widths[~whole])) or not (ended or whole[-1]):
+            return None
+        if dialect.trailing and sum(block.count(separator + end) for end in (b"\n", b"\r\n")) < count:
+            return None
+        try:
+            with catch_warnings(action="error", category=pd.errors.ParserWarning):
+                numbers, texts = self._parsed(block)
+        except (ValueError, pd.errors.ParserWarning):  # a cell is not a number in plain notation; a first row too long
+            return None
+        whole, unread = self._whole(texts)
+        if unread or {*map(len, numbers.values()), *map(len, texts.values())} != {count}:  # line ends are mixed
+            return None
+        if width == 1 and (not numbers or np.isnan(numbers[0]).any()):  # a blank line is no row
+            return None
+        self.lines.line += count
+        self.lines.rows += count
+        return Rows(self.lines.rows - count, count, self.lines.line - 1, numbers, whole)
+
+    def _parsed(self, block: bytes) -> tuple[dict[int, FloatArray], dict[int, list[str]]]:
+        """Return the columns of numbers and the texts of the others, as parsed by pandas.
+
+        The bytes are decoded as Latin-1, one letter each: a stamp that is not ASCII cannot be read.
+        """
+        columns = [*self.values.numeric, *self._texts]
+        dtypes: Any = np.float64  # one type is quicker than one for each column
+        if self._texts:
+            dtypes = dict.fromkeys(columns, np.float64) | dict.fromkeys(self._texts, np.object_)
+        frame = pd.read_csv(
+            io.BytesIO(block),
+            sep=self.dialect.separator,
+            header=None,
+            names=range(self.dialect.width),
+            usecols=None if len(columns) == self.dialect.width else columns,
+            index_col=False,
+            dtype=dtypes,
+            engine="c",
+            encoding="latin-1",
+            skip_blank_lines=False,
+            keep_default_na=False,
+            na_values=self._missing,
+            quoting=csv.QUOTE_NONE,
+            skipinitialspace=b" " in block,
+            decimal=self.dialect.marks.decimal,
+            low_memory=False,
+            **_EXACT,
         )
+        texts = {
+            column: [cell.strip(" \t") for cell in frame.pop(column).fillna("").tolist()] for column in self._texts
+        }
+        return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True)), texts
 
-    def _read_whole(self, data: Bytes, stamps: Integers, blank: Integers) -> None:
-        """Fill the last of `stamps` (m, n) with the columns of integers; `blank` are the lines that are not rows."""
-        for row, column in zip(stamps[-len(self.whole) :], self.whole, strict=True):
-            numbers, is_read = read_whole_numbers(data, self.dialect, column, blank)
-            row[:] = np.where(is_read, numbers, MISSING_STAMP)
+    def _by_lines(self, block: bytes, ended: bool) -> Iterator[Rows]:
+        """Yield the rows of a block of any lines."""
+        lines = self.dialect.text.decode(block).split(self.dialect.text.line_end.decode())
+        count = len(lines) - (not lines[-1])
+        most = max(1, MOST_CELLS // self.dialect.width)
+        for first in range(0, count, most):
+            rows: list[tuple[int, list[str]]] = []
+            for i in range(first, min(first + most, count)):
+                rows += self.lines.read(lines[i], unfinished=not ended and i == len(lines) - 1)
+            yield self._read([cells for _, cells in rows], [line for line, _ in rows])
 
-    def _marks(self) -> Integers:
-        dialect = self.dialect
-        comment = ord(dialect.comment[0]) if dialect.comment and ord(dialect.comment[0]) < 128 else -1
-        return np.array(
-            [
-                dialect.text.line_end[0],
-                ord(dialect.separator),
-                ord(dialect.marks.decimal),
-                thousands_byte(dialect.marks.thousands),
-                ord('"'),
-                comment,
-            ],
-            dtype=np.int64,
-        )
+    def _read(self, cells: Sequence[Sequence[str]], lines: Sequence[int]) -> Rows:
+        """Return rows of cells, which are in these lines."""
+        columns = [*zip_longest(*cells, fillvalue="")]
+        columns += [("",) * len(cells)] * (self.dialect.width - len(columns))
+        numbers, (whole, unread) = {}, self._whole(columns)
+        for column in self.values.numeric:
+            numbers[column], rows = self.values.numbers(column, columns[column])
+            unread += [(row, column) for row in rows]
+        self.values.lose((lines[row], column, columns[column][row]) for row, column in unread)
+        return Rows(self.lines.rows - len(cells), len(cells), lines[-1] if lines else 0, numbers, whole)
+
+    def _whole(
+        self, texts: Mapping[int, Sequence[str]] | Sequence[Sequence[str]]
+    ) -> tuple[dict[int, Integers], list[tuple[int, int]]]:
+        """Return the stamps and the large numbers, and row and column of the stamps that cannot be read."""
+        whole = {column: self.values.multiples(texts[column]) for column in self.requested.whole}
+        unread = []
+        for column in self.requested.stamps:
+            whole[column], rows = self.values.stamps(column, texts[column])
+            unread += [(row, column) for row in rows]
+        return whole, unread
+
+    def _end(self, rows: Rows, ended: bool) -> list[Finding]:
+        """Return all findings; the last one of the last `rows` may be removed."""
+        lines, padding = self.lines, self.dialect.text.padding
+        findings = [*self.values.findings(), *lines.findings(rows.last_line)]
+        if not ended and not lines.cut_line and not lines.ends_skipped:
+            findings += self._check_last_line(rows)
+        if lines.cut_line or padding:
+            findings.insert(0, Finding("last_line_cut", "", {"line": lines.cut_line or lines.line - (not ended)}))
+        if padding:
+            findings.append(Finding("nul_bytes_at_end", "", {"count": padding}))
+        return findings
+
+    def _check_last_line(self, rows: Rows) -> list[Finding]:
+        """Check a last row without line end: keep it, keep it with a warning, or remove it with a loss."""
+        dialect, text, last = self.dialect, self.dialect.text, self.dialect.width - 1
+        is_read = dialect.short_rows or last in (*self.values.numeric, *self.requested.stamps)
+        *others, unfinished = text.tail()
+        if not rows.count or dialect.trailing or not is_read or not unfinished.strip():
+            return []
+        above = []
+        for raw in reversed(others[1:] if len(others) > 1 else others):
+            cells = split_line(text.decode(raw), dialect.separator)
+            if len(cells) == dialect.width and kind(cells[-1]) != "X":
+                above.append(cells[-1])
+            if len(above) == RECENT:
+                break
+        line = text.decode(unfinished).rstrip()
+        cell = '"' if line.endswith('"') else split_line(line, dialect.separator)[-1]
+        complete, certain = is_complete(cell, above[: self.lines.rows - 1])
+        fact = {"line": rows.last_line, "cell": cell}
+        if complete and (certain or not text.padding):
+            return [] if certain else [Finding("last_line_kept", "", fact)]
+        rows.count -= 1
+        rows.numbers = {column: values[:-1] for column, values in rows.numbers.items()}
+        rows.whole = {column: values[:-1] for column, values in rows.whole.items()}
+        self.lines.rows -= 1
+        return [] if text.padding else [Finding("last_line_dropped", "", fact)]
 
 
-def _joined(parts: Sequence[Rows], none: Rows) -> Rows:
-    """Return the rows of a short file in one pair of arrays; `none` are no rows."""
-    if len(parts) == 1:  # the usual case, without a copy
-        return parts[0]
-    parts = [none, *parts]
-    numbers, stamps = (
-        np.concatenate(tables, axis=1) for tables in zip(*((it.numbers, it.stamps) for it in parts), strict=True)
-    )
-    not_rows = np.concatenate([part.not_rows for part in parts])
-    return Rows(numbers, stamps, sum(part.count for part in parts), none.first_line, not_rows)
+def without_quotes(block: bytes, separator: bytes) -> bytes:
+    """Return lines without quotes, if each is the first or last letter of a cell, and none of these has a separator."""
+    data = np.frombuffer(b"\n" + block + b"\n", dtype=np.uint8)
+    border, quote = np.isin(data, [*separator, *b"\r\n"]), data == ord('"')
+    places, inside = np.flatnonzero(quote), np.cumsum(quote) % 2 > 0
+    simple = len(places) % 2 == 0 and border[places[::2] - 1].all() and border[places[1::2] + 1].all()
+    return block.replace(b'"', b"") if simple and not (inside & border).any() else block
 
 
-def _compact(block: _Block, dropped: Sequence[int], to: int) -> int:
-    """Move a block's rows, without the dropped ones, to consecutive rows from row `to`; return their end."""
-    start = block.first
-    for stop in (*dropped, block.first + block.rows):
-        if to != start and stop > start:
-            for table in (block.arrays.numbers, block.arrays.stamps):
-                table[:, to : to + stop - start] = table[:, start:stop]
-        to += stop - start
-        start = stop + 1
-    return to
+def is_complete(cell: str, above: Sequence[str]) -> tuple[bool, bool]:
+    """Return whether the last cell of an unfinished line is complete, and whether that is certain.
+
+    `above` are the cells above it in the same column. A cell that is cut off has fewer digits after its last mark (the
+    decimal mark, or the e of an exponent). It is therefore certainly complete if it has as many as all cells above. If
+    their number varies, it is assumed to be complete if it has at least as many as the shortest cell above with the
+    same mark; otherwise it is incomplete.
+    """
+    if not above:
+        return True, False
+    if cell == '"':  # the closing quote is not cut off
+        return True, True
+    (mark, digits), ends = _end(cell), [_end(other) for other in above]
+    alike = {other for other_mark, other in ends if other_mark == mark}
+    complete = digits >= max(1, min(alike)) if alike else False
+    return complete, complete and {*ends} == {(mark, digits)}
+
+
+def _end(cell: str) -> tuple[str, int]:
+    """Return the last mark of a number and how many digits follow it; the length of any other text."""
+    match = _END.fullmatch(cell)
+    return (match["mark"] or "", len(match["digits"])) if match else ("", len(cell))

@@ -8,19 +8,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from cdtool.clock import EPOCH
-from cdtool.columns import Column, Piece
-from cdtool.errors import RecordingError
+from cdtool.columns import Piece
 from cdtool.findings import Finding
-from cdtool.findings.clocks import ClockDifference, ClockUnitAssumed, OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.recording import FloatArray
@@ -74,37 +71,23 @@ class Clocks:
         return next((k for k, group in enumerate(self.groups) if column in group), self.of.get(column))
 
 
-def describe_other_clock(
-    dialect: Dialect, clocks: Clocks, clock: str, keys: Sequence[str], values: Mapping[str, FloatArray]
-) -> str:
-    """Return the first requested column with another clock than the stated one, and the difference of the clocks.
+def other_clocks(
+    dialect: Dialect, clocks: Clocks, first: str, keys: Collection[str], values: Mapping[str, FloatArray]
+) -> list[Finding]:
+    """Return a warning on each clock beside which `keys` are, and whose times differ from those of the clock `first`.
 
-    The result is empty if there is no such column. `clock` is the column that the machine file states as the clock,
-    `keys` are the columns that it requests, and `values` are the values of these columns and of all clocks.
+    `values` are the values of the columns that have been read; a clock that has not been read is not compared.
     """
-    names = dialect.names
-    stated = clocks.group(names.index(clock))
-    for key in keys:
-        group = clocks.group(names.index(key))
-        if group is None or stated is None or group == stated or key == clock:
-            continue
-        other = names[clocks.groups[group][0]]
-        difference = _difference(dialect, values, clock, other)
-        if difference:
-            return f"column '{key}' is beside the clock '{other}', but the machine file names '{clock}': {difference}"
-    return ""
-
-
-def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]) -> list[Finding]:
-    """Return a warning on each clock whose times differ from those of the first clock in the same rows."""
     names, findings = dialect.names, []
-    for k, group in enumerate(clocks.groups[1:], 1):
-        columns = [names[column] for column, nearest in clocks.of.items() if nearest == k]
-        first, other = names[clocks.groups[0][0]], names[group[0]]
-        is_read = {first, other} <= values.keys()
-        difference = _difference(dialect, values, first, other) if columns and is_read else None
-        if difference:
-            findings.append(Finding(OtherClock(first, difference, tuple(columns)), other))
+    for k, group in enumerate(clocks.groups):
+        other = names[group[0]]
+        columns = tuple(
+            names[column] for column, nearest in clocks.of.items() if nearest == k and names[column] in keys
+        )
+        if columns and names.index(first) not in group and {first, other} <= values.keys():
+            difference = _difference(dialect, values, first, other)
+            fact = {"first": first, "difference": difference, "columns": columns}
+            findings += [Finding("other_clock", other, fact)] if difference else []
     return findings
 
 
@@ -121,7 +104,7 @@ def have_other_rates(dialect: Dialect, clocks: Clocks, values: Mapping[str, Floa
     if not {first, *others} <= values.keys():
         return False
     return any(
-        ((difference := _difference(dialect, values, first, other)) is not None and difference.what == "steps")
+        ((difference := _difference(dialect, values, first, other)) is not None and difference["what"] == "steps")
         or _end_apart(values[first], values[other])
         for other in others
     )
@@ -139,17 +122,20 @@ def _end_apart(a: FloatArray, b: FloatArray) -> bool:
 
 
 def pieces_by_own_clock(
-    dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None
-) -> Generator[Piece, None, tuple[Table, list[Finding] | None, float]]:
+    dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None, stated: bool
+) -> Generator[Piece, None, tuple[Table, list[Finding], float | None]]:
     """Yield the pieces of a table unchanged or, if its clocks have other rates, by clock with their times [s].
 
-    The first piece decides. The return value is that of `pieces`, the findings on the clocks (None: unchanged), and the
-    origin of the times [s].
+    The first piece decides, unless it is `stated` that each column has the clock beside it. A clock without a unit in
+    the header is in s. A shorter clock ends with empty cells: rows without a time are left out of its columns. The
+    return value is that of `pieces`, the findings on the clocks, and the origin of the times [s] (None: unchanged).
     """
     piece = next(pieces)
-    if not have_other_rates(dialect, clocks, piece.values):
+    if not stated and not have_other_rates(dialect, clocks, piece.values):
+        first = dialect.names[clocks.columns[0]] if clocks.columns else ""
+        findings = other_clocks(dialect, clocks, first, dialect.names, piece.values)
         yield piece
-        return (yield from pieces), None, 0.0
+        return (yield from pieces), findings, None
     names = dialect.names
     of_group = {
         k: [
@@ -175,7 +161,7 @@ def pieces_by_own_clock(
         try:
             piece = next(pieces)
         except StopIteration as end:
-            return end.value, _own_clock_findings(dialect, steps, lost), origin
+            return end.value, _own_clock_findings(dialect, steps, lost, stated), origin
 
 
 def _epoch_origin(clocks: Iterable[FloatArray]) -> float:
@@ -189,52 +175,17 @@ def _step(stamps: FloatArray) -> float:
     return float(np.median(np.diff(known))) if len(known) > 1 else 0.0
 
 
-def _own_clock_findings(dialect: Dialect, steps: Mapping[str, float], lost: Mapping[str, int]) -> list[Finding]:
+def _own_clock_findings(
+    dialect: Dialect, steps: Mapping[str, float], lost: Mapping[str, int], stated: bool
+) -> list[Finding]:
     """Return the findings on a table whose channels have the clocks beside them; `steps` are those of each clock."""
-    findings = [Finding(OwnClocks(tuple(steps)), "time", "note")]
+    findings = [Finding("own_clocks", "time", {"clocks": tuple(steps)})]
     assumed = {name: step for name, step in steps.items() if not np.isfinite(_factor(dialect, name, np.nan))}
-    if assumed:
-        findings.append(Finding(ClockUnitAssumed(tuple(assumed), next(iter(assumed.values()))), "time"))
-    return findings + [Finding(ValuesWithoutTime(count), key, "loss") for key, count in lost.items() if count]
-
-
-def survey_by_own_clock(
-    path: Path, dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]
-) -> tuple[dict[str, Column], float, list[Finding]]:
-    """Return all columns of a table whose clocks have other rates, as `columns_by_own_clock`."""
-    keys = [key for key in values if dialect.names.index(key) not in clocks.columns]
-    columns, origin, findings = columns_by_own_clock(path, dialect, clocks, keys, values)
-    used = {clocks.of[dialect.names.index(key)] for key in keys}
-    steps = {(name := dialect.names[clocks.groups[k][0]]): _step(values[name]) for k in sorted(used)}
-    return columns, origin, [*_own_clock_findings(dialect, steps, {}), *findings[1:]]
-
-
-def columns_by_own_clock(
-    path: Path, dialect: Dialect, clocks: Clocks, keys: Sequence[str], values: Mapping[str, FloatArray]
-) -> tuple[dict[str, Column], float, list[Finding]]:
-    """Return the requested columns with the times [s] of their adjacent clocks, their origin [s], and findings.
-
-    A clock without a unit in the header is in s. A shorter clock ends with empty cells: rows without a time are left
-    out of its columns. Raises RecordingError if no clock is adjacent to a column.
-    """
-    times: dict[int, FloatArray] = {}
-    for key in keys:
-        group = clocks.group(dialect.names.index(key))
-        if group is None:
-            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
-        name = dialect.names[clocks.groups[group][0]]
-        times.setdefault(group, values[name] * _factor(dialect, name, 1.0))
-    origin = _epoch_origin(times.values())
-    used = OwnClocks(tuple(dialect.names[clocks.groups[group][0]] for group in times))
-    columns, findings = {}, [Finding(used, "time", "note")]
-    for key in keys:
-        time = times[clocks.group(dialect.names.index(key)) or 0]
-        timed = np.isfinite(time)
-        columns[key] = Column(key, values[key][timed], time[timed] - origin, unit_from_header(dialect, key))
-        lost = int(np.count_nonzero(np.isfinite(values[key][~timed])))
-        if lost:
-            findings.append(Finding(ValuesWithoutTime(lost), key, "loss"))
-    return columns, origin, findings
+    if assumed and not stated:
+        findings.append(
+            Finding("clock_unit_assumed", "time", {"clocks": tuple(assumed), "step": next(iter(assumed.values()))})
+        )
+    return findings + [Finding("values_without_time", key, {"count": count}) for key, count in lost.items() if count]
 
 
 def unit_from_header(dialect: Dialect, name: str) -> str | None:
@@ -253,7 +204,7 @@ def _factor(dialect: Dialect, name: str, default: float) -> float:
     return unit.factor if unit is not None and unit.si == "s" else default
 
 
-def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> ClockDifference | None:
+def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> dict[str, Any] | None:
     """Return how two clocks differ in the same rows; None if they differ only in unit or start."""
     a, b = values[first], values[other]
     both = np.isfinite(a) & np.isfinite(b)
@@ -270,10 +221,10 @@ def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, 
     factors = (stated,) if np.isfinite(stated) else (1.0,) if same_name else _FACTORS
     scale = min(factors, key=lambda factor: abs(np.log(ratio / factor)))
     if abs(ratio / scale - 1.0) > _SAME_FACTOR:
-        return ClockDifference("steps", step, other_step)
+        return {"what": "steps", "first": step, "other": other_step}
     b = b / scale
     offset, length = float(b[0] - a[0]), float(a[-1] - a[0])
     if 0.5 * step < abs(offset) <= length:
-        return ClockDifference("start", float(a[0]), float(b[0]))
+        return {"what": "start", "first": float(a[0]), "other": float(b[0])}
     drift = float(np.max(np.abs((b - b[0]) - (a - a[0]))))
-    return ClockDifference("drift", 0.0, drift) if drift > 0.5 * step else None
+    return {"what": "drift", "first": 0.0, "other": drift} if drift > 0.5 * step else None

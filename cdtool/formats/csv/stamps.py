@@ -1,4 +1,4 @@
-"""Columns of dates and times of day: detect their layout from all cells in the sample.
+"""Columns of dates and times of day: detect their layout from all cells in the sample, and read them.
 
 A layout is written as for `strptime`: `%d.%m.%Y %H:%M:%S.%f`, with `%f` for any number of digits and `%z` for a zone.
 `03.04.2025` is the third of April, because dates with points start with the day; `03/04/2025` and `03-04-2025` may be
@@ -9,31 +9,38 @@ or five seconds, and `:9`, `:10` after the seconds, which may be parts of a seco
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
-from cdtool.formats.csv import stamp_kernel as steps
 from cdtool.formats.csv.cells import MISSING, STAMP_LIKE
 from cdtool.recording import FloatArray
 
+Integers = npt.NDArray[np.int64]
+MISSING_STAMP = np.int64(-(2**63))
+# What a field matches; never less than it can, so that `202412` is not January.
 _FIELDS = {
-    "%Y": steps.YEAR,
-    "%y": steps.SHORT_YEAR,
-    "%m": steps.MONTH,
-    "%d": steps.DAY,
-    "%H": steps.HOUR,
-    "%I": steps.HOUR,
-    "%M": steps.MINUTE,
-    "%S": steps.SECOND,
-    "%f": steps.FRACTION,
-    "%z": steps.ZONE,
-    "%b": steps.MONTH_NAME,
-    "%p": steps.HALF_DAY,
+    "%Y": "(?P<year>[0-9]{4})",
+    "%y": "(?P<short>[0-9]{2})",
+    "%m": "(?P<month>[0-9]{1,2}+)",
+    "%d": "(?P<day>[0-9]{1,2}+)",
+    "%H": "(?P<hour>[0-9]{1,2}+)",
+    "%I": "(?P<hour>[0-9]{1,2}+)",
+    "%M": "(?P<minute>[0-9]{2})",
+    "%S": "(?P<second>[0-9]{2})",
+    "%f": "(?P<fraction>[0-9]++)",
+    ".%f": "(?:[.,](?P<fraction>[0-9]++))?",
+    ",%f": "(?:[.,](?P<fraction>[0-9]++))?",
+    "%z": " ?(?:[Zz]|UTC|(?P<sign>[+-])(?P<zone>[0-9]{2})(?::?(?P<minutes>[0-9]{2}))?)",
+    "%b": "(?P<name>[A-Za-z]{3})",
+    "%p": " ?(?P<half>[AaPp])[Mm]",
 }
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _DATES = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
     *("%d-%b-%Y", "%d/%b/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%Y%m%d"),
@@ -44,6 +51,8 @@ _FRACTION = re.compile(r"(?P<before>.*[0-9]:[0-9]{2}:[0-9]{2}[.,:;])(?P<digits>[
 _LOOKED = 200
 NS = 1_000_000_000
 _MINUTE, _HOUR, _HALF_DAY, _DAY = 60 * NS, 3600 * NS, 43200 * NS, 86400 * NS
+# Nanoseconds in 64 bits reach from 1677 to 2262.
+_YEARS = (1680, 2260)
 
 
 @dataclass(frozen=True)
@@ -71,47 +80,65 @@ class Layout:
             return _HALF_DAY, "noon or midnight"
         return (_HOUR, "the full hour") if "%M" in self.pattern else (_MINUTE, "the full minute")
 
-    @property
-    def program(self) -> list[int]:
-        """Return the steps of the kernel's program, ended by 0; raises ValueError if the pattern is not supported."""
-        return _program(self.pattern)
-
     def read(self, text: str) -> int | None:
         """Return the nanoseconds since 1970 (for a time of day since midnight); None if the layout does not match."""
-        raw = text.strip(" \t\r").encode("utf-8", errors="replace")
-        data = np.frombuffer(raw + bytes(16), dtype=np.uint8)
-        value, end = steps.read_stamp(data, 0, _compiled(self.pattern))
-        return int(value) if end == len(raw) else None
+        match = _pattern(self.pattern).fullmatch(text.strip(" \t\r"))
+        return None if match is None else _nanoseconds(match.groupdict())
+
+    def read_all(self, cells: Sequence[str]) -> Integers:
+        """Return `read` of each cell, with MISSING_STAMP where the layout does not match."""
+        stamps = {cell: self.read(cell) for cell in set(cells)}
+        known = {cell: int(MISSING_STAMP) if stamp is None else stamp for cell, stamp in stamps.items()}
+        return np.array([known[cell] for cell in cells], dtype=np.int64)
+
+
+def _nanoseconds(found: Mapping[str, str | None]) -> int | None:
+    """Return the stamp of the fields of a layout; None for a day or a time that does not exist."""
+
+    def number(field: str, otherwise: int) -> int:
+        return int(found.get(field) or otherwise)
+
+    year, month, hour = number("year", 1970), number("month", 1), number("hour", 0)
+    if found.get("short"):
+        year = number("short", 0)
+        year += 2000 if year < 69 else 1900
+    if name := found.get("name"):
+        month = _MONTHS.index(name.lower()) + 1 if name.lower() in _MONTHS else 0
+    if half := found.get("half"):
+        hour = hour % 12 + (12 if half in "pP" else 0) if 1 <= hour <= 12 else 24
+    try:
+        moment = datetime(year, month, number("day", 1), hour, number("minute", 0), number("second", 0))
+    except ValueError:
+        return None
+    east = (3600 * number("zone", 0) + 60 * number("minutes", 0)) * (-1 if found.get("sign") == "-" else 1)
+    seconds = (moment - datetime(1970, 1, 1)) // timedelta(seconds=1) - east
+    nano = int((found.get("fraction") or "")[:9].ljust(9, "0"))
+    return seconds * NS + nano if _YEARS[0] <= year <= _YEARS[1] else None
 
 
 @cache
-def _compiled(pattern: str) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    return np.array(_program(pattern), dtype=np.int64)
-
-
-@cache
-def _program(pattern: str) -> list[int]:
-    program: list[int] = []
+def _pattern(pattern: str) -> re.Pattern[str]:
+    """Return the expression for a layout; raises ValueError if it has a field that is not supported."""
+    parts = []
     for part in re.findall(r"[.,]%f|%.|T| +|.", pattern):
-        if part in (".%f", ",%f"):
-            program.append(steps.POINT_FRACTION)
-        elif part in _FIELDS:
-            program.append(_FIELDS[part])
+        if part in _FIELDS:
+            parts.append(_FIELDS[part])
         elif (part.startswith("%") and part != "%%") or (len(part.encode()) > 1 and part.strip()):
             raise ValueError(f"'{part}' is not supported")
         elif part == "T" or not part.strip():
-            program.append(steps.DATE_GAP)
+            parts.append("(?: ++|[Tt])")
         else:
-            program.append(ord(part[-1]))
-    if len(program) >= steps.STEPS:
-        raise ValueError("too long")
-    return program + [0] * (steps.STEPS - len(program))
+            parts.append(re.escape(part[-1]))
+    try:
+        return re.compile("".join(parts))
+    except re.error:
+        raise ValueError("a field is repeated") from None
 
 
 def check_pattern(pattern: str) -> str:
     """Return the problem of a pinned layout; empty if it has none."""
     try:
-        _program(pattern)
+        _pattern(pattern)
     except ValueError as fault:
         return str(fault)
     fields = re.findall(r"%.", pattern)
@@ -160,20 +187,17 @@ def find_layout(cells: Sequence[str], pinned: str = "") -> StampLayouts:
     ]
     if not texts or not (pinned or likely):
         return StampLayouts(())
-    possible = [Layout(pinned)] if pinned else [x for x in _known() if any(x.read(text) is not None for text in likely)]
+    possible = [Layout(pinned)] if pinned else [x for x in _known() if (x.read_all(likely) != MISSING_STAMP).any()]
     # All days are needed to decide between two orders of day and month; for times of day some cells are sufficient.
     first_of_day = {text.split()[0]: text for text in texts} if len(possible) > 1 else {}
     checked = list(dict.fromkeys((*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values())))
-    matching = possible
-    for text in checked:
-        matching = [layout for layout in matching if layout.read(text) is not None]
-    if not matching:
-        read = {layout: sum(layout.read(text) is not None for text in checked) for layout in possible}
-        most = max(read.values(), default=0)
-        matching = [layout for layout in possible if read[layout] == most and 2 * most >= len(checked)]
-    different: dict[tuple[int | None, ...], Layout] = {}
+    stamps = {layout: layout.read_all(checked) for layout in possible}
+    counts = {layout: int(np.count_nonzero(read != MISSING_STAMP)) for layout, read in stamps.items()}
+    most = max(counts.values(), default=0)
+    matching = [layout for layout in possible if counts[layout] == most and 2 * most >= len(checked)]
+    different: dict[bytes, Layout] = {}
     for layout in matching:
-        different.setdefault(tuple(layout.read(text) for text in checked), layout)
+        different.setdefault(stamps[layout].tobytes(), layout)
     example = next((text for text in checked if len({item.read(text) for item in different.values()}) > 1), texts[0])
     return StampLayouts(tuple(different.values()), example, "" if pinned or not different else _fraction_doubt(texts))
 
@@ -206,25 +230,18 @@ def _known() -> tuple[Layout, ...]:
     return tuple(Layout(pattern) for pattern in patterns)
 
 
-def unwrap(
-    stamps: np.ndarray[tuple[int], np.dtype[np.int64]],
-    known: np.ndarray[tuple[int], np.dtype[np.bool_]],
-    period: int = _DAY,
-) -> int:
+def unwrap(stamps: Integers, period: int = _DAY) -> int:
     """Add `period` [ns] in place each time that stamps without a day start again; return how often they do.
 
     Stamps start again, such as at midnight, where they step back by more than half a period; smaller backward steps
     stay and are reported with the clock. A pause of a whole period or more cannot be detected from the stamps.
     """
-    rows = np.flatnonzero(known)
-    passed = np.cumsum(np.diff(stamps[rows], prepend=stamps[rows[:1]]) < -(period // 2))
-    stamps[rows] += passed * period
+    passed = np.cumsum(np.diff(stamps, prepend=stamps[:1]) < -(period // 2))
+    stamps += passed * period
     return int(passed[-1]) if len(passed) else 0
 
 
-def seconds_since(
-    stamps: np.ndarray[tuple[int], np.dtype[np.int64]], known: np.ndarray[tuple[int], np.dtype[np.bool_]], origin: int
-) -> FloatArray:
+def seconds_since(stamps: Integers, known: npt.NDArray[np.bool_], origin: int) -> FloatArray:
     """Return seconds after `origin` [ns], computed from whole nanoseconds; NaN where the stamp is missing."""
     values = np.full(len(stamps), np.nan)
     values[known] = (stamps[known] - origin) / NS

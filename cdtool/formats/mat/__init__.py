@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,17 +18,14 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import DaysOfMatlab
-from cdtool.findings.containers import VariableLeftOut
 from cdtool.formats.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
-from cdtool.formats.mat.layout import Layout, arrange_columns, as_table
-from cdtool.formats.mat.leaves import MatColumn
-from cdtool.formats.mat.variables import Numbers, Variables
+from cdtool.formats.mat.layout import Layout, arrange_columns
+from cdtool.formats.mat.variables import MatColumn, Variables
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
@@ -101,7 +99,6 @@ class _Reader:
 
     def __init__(self, path: Path, layout: Layout) -> None:
         self._path, self._layout = path, layout
-        self._table: tuple[Numbers | None, npt.NDArray[Any]] = (None, np.empty(0))
         self.findings: list[Finding] = []
         self.complex: list[str] = []
         self.origin = 0.0
@@ -110,41 +107,36 @@ class _Reader:
         """Return these columns; with `own_clocks`, each with its times [s] after `origin`."""
         found = {**self._layout.hidden, **self._layout.columns}
         self._check_sizes([found[key] for key in keys])
-        times = self._times(keys) if own_clocks else {}
-        columns = {}
-        for key in keys:
-            values = self._values(key, found[key])
-            if values is not None:
-                columns[key] = self._column(key, values, times.get(found[key].clock))
-        return columns
+        times = self._times(dict.fromkeys(found[key].clock for key in keys if found[key].clock)) if own_clocks else {}
+        values = {key: self._values(key, found[key]) for key in keys}
+        return {
+            key: self._column(key, column, times.get(found[key].clock))
+            for key, column in values.items()
+            if column is not None
+        }
+
+    def _check_sizes(self, columns: list[MatColumn]) -> None:
+        """Raise RecordingError if the columns are far larger than the file: it is a decompression bomb."""
+        whole = {id(section.numbers): section.numbers for column in columns for section in column.sections}
+        check_size(self._path, sum(math.prod(each.shape) * (1 + each.is_complex) for each in whole.values()))
 
     def _column(self, key: str, values: npt.NDArray[Any], time: FloatArray | None) -> Column:
         """Return a column; a clock that counts days is read in seconds."""
         if not is_clock_name(key.rpartition(".")[2]) or not is_datenum(values):
             return Column(key, as_float64(values), time)
         seconds, start = since_first(values)
-        self.findings.append(Finding(DaysOfMatlab(str(np.datetime64(round(start * 1000), "ms"))), key, "note"))
+        self.findings.append(Finding("days_of_matlab", key, {"start": str(np.datetime64(round(start * 1000), "ms"))}))
         self.origin = self.origin or start
         return Column(key, seconds, time, "s")
 
-    def _check_sizes(self, columns: list[MatColumn]) -> None:
-        """Raise RecordingError if the columns are far larger than the file: it is a decompression bomb."""
-        numbers = {id(s.numbers): s.numbers for column in columns for s in column.sections if s.numbers is not None}
-        declared = sum(each.shape[0] * each.shape[1] * (1 + each.is_complex) for each in numbers.values())
-        check_size(self._path, declared + sum(section.rows for column in columns for section in column.sections))
-
-    def _times(self, keys: list[str]) -> dict[str, FloatArray]:
-        """Return the times of the clocks of these columns; they start at 0 if they count from an epoch."""
-        found = self._layout.columns
-        raw: dict[str, npt.NDArray[Any]] = {}
-        for key in keys:
-            if key in found and found[key].clock and found[key].clock not in raw:
-                stamps = self._values(found[key].clock, found[found[key].clock])
-                raw[found[key].clock] = np.empty(0) if stamps is None else stamps
-        clocks = {name: self._clock(name, stamps) for name, stamps in raw.items() if len(stamps)}
+    def _times(self, names: Iterable[str]) -> dict[str, FloatArray]:
+        """Return the times of these clocks; they start at 0 if they count from an epoch."""
+        read = ((name, self._values(name, self._layout.columns[name])) for name in names)
+        stamps = {name: raw for name, raw in read if raw is not None and len(raw)}
+        clocks = {name: self._clock(name, raw) for name, raw in stamps.items()}
         origin = common_origin(clocks.values())
         self.origin = float(origin)
-        return {name: clock.times(0, len(raw[name]), origin) for name, clock in clocks.items()}
+        return {name: clock.times(0, len(stamps[name]), origin) for name, clock in clocks.items()}
 
     def _clock(self, name: str, stamps: npt.NDArray[Any]) -> EpochClock:
         if is_datenum(stamps):
@@ -153,20 +145,17 @@ class _Reader:
 
     def _values(self, key: str, column: MatColumn) -> npt.NDArray[Any] | None:
         """Return the values of a column as the file has them; None for a complex column."""
-        parts: list[npt.NDArray[Any]] = []
         for section in column.sections:
-            if section.numbers is None:
-                parts.append(np.full(section.rows, np.nan))
-                continue
             if section.numbers.is_complex:
                 self.complex.append(key)
-                self.findings.append(Finding(VariableLeftOut(section.name, "complex"), severity="note"))
+                fact = {"variable": section.variable, "what": "complex", "advice": ""}
+                self.findings.append(Finding("variable_left_out", "", fact))
                 return None
-            if self._table[0] is not section.numbers:  # the columns of a matrix follow one another
-                self._table = (None, np.empty(0))
-                whole = np.asarray(section.numbers.read())
-                self._table = section.numbers, as_table(section, whole, self.findings)
-            parts.append(section.values(self._table[1]))
+            if section.numbers.is_across:
+                rows, columns = section.numbers.shape
+                shape = {"thing": "variable", "name": section.variable, "rows": rows, "columns": columns}
+                self.findings.append(Finding("rows_as_columns", "", shape))
+        parts = [section.values() for section in column.sections]
         values = parts[0] if len(parts) == 1 else np.concatenate(parts)
         if values.dtype.kind in "iu":
             self.findings += rounding_finding(key, rounded_integers(as_float64(values)))

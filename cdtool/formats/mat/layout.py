@@ -6,33 +6,59 @@ The elements of an array of structs are runs if each has a clock of its own: `ru
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import partial
+from itertools import pairwise
 
-import numpy.typing as npt
+import numpy as np
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RowsAsColumns, VariableLeftOut, WithoutClock
 from cdtool.formats.clock_beside import is_clock_name
-from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
-from cdtool.formats.mat.runs import StructRuns, short_name
-from cdtool.formats.mat.variables import Cells, Numbers, Structs, Text, Value, Variables, left_out
+from cdtool.formats.mat.variables import MatColumn, Numbers, Section, Value, Variables, left_out
 
 _DETAIL = 80
 # A matrix in a struct with more columns than this is an image or a model.
 _WIDEST = 64
 
 
+@dataclass(frozen=True)
+class Leaf:
+    """An array of numbers with its name, its last name, and the names of the structs around it, the innermost last."""
+
+    name: str
+    last: str
+    structs: tuple[str, ...]
+    numbers: Numbers
+
+    @property
+    def rows(self) -> int:
+        """Return the number of rows that it is read as."""
+        return max(self.numbers.shape)
+
+    @property
+    def is_clock(self) -> bool:
+        """Return whether it has the name and the shape of a clock."""
+        return bool(is_clock_name(self.last)) and 1 in self.numbers.shape and not self.numbers.is_complex
+
+    def columns(self) -> Iterator[tuple[str, Section]]:
+        """Yield the names and sections of its columns."""
+        for i in range(min(self.numbers.shape)):
+            yield self.name if 1 in self.numbers.shape else f"{self.name}[{i}]", Section(self.name, self.numbers, i)
+
+
 @dataclass
 class Layout:
     """The columns of a file in its order; `hidden` ones are read only where a machine file names them.
 
-    `numbers` are the single numbers, `texts` the texts of a file by name; `own_clocks`: several clocks are logged.
+    `leaves` are the arrays of numbers, `numbers` the single numbers, `texts` the texts by name. `with_runs`: arrays of
+    structs may be runs.
     """
 
+    with_runs: bool = True
     columns: dict[str, MatColumn] = field(default_factory=dict)
     hidden: dict[str, MatColumn] = field(default_factory=dict)
+    leaves: list[Leaf] = field(default_factory=list)
     numbers: dict[str, Numbers] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
@@ -43,68 +69,21 @@ class Layout:
         return tuple(dict.fromkeys((*self.columns, *self.hidden)))
 
     @property
-    def clocks(self) -> dict[str, MatColumn]:
-        """The clocks of columns by name."""
-        return {column.clock: self.columns[column.clock] for column in self.columns.values() if column.clock}
-
-    @property
     def own_clocks(self) -> bool:
         """Whether there are several clocks, so that each column needs the one beside it."""
-        alone = [name for name, column in self.columns.items() if not column.clock and is_clock_name(name)]
-        return len(self.clocks) + bool(alone) > 1
+        alone = any(not column.clock and is_clock_name(name) for name, column in self.columns.items())
+        return len({column.clock for column in self.columns.values() if column.clock}) + alone > 1
 
-
-def arrange_columns(variables: Variables) -> Layout:
-    """Return the layout of the variables of a file."""
-    layout, walk = Layout(), _Walk(runs=True)
-    for name, value in variables.items():
-        walk.value(value, name, name, ())
-    layout.findings += walk.findings
-    layout.numbers, layout.texts = walk.numbers, walk.texts
-    layout.columns.update(walk.runs)
-    layout.hidden.update(walk.single_runs)
-    clocks = _clocks(walk.leaves)
-    for leaf in walk.leaves:
-        clock, is_alone = _clock_of(leaf, clocks)
-        into = layout.hidden if is_alone else layout.columns
-        if is_alone:
-            layout.findings.append(Finding(WithoutClock(leaf.name, leaf.rows), severity="note"))
-        into.update({name: MatColumn((section,), clock) for name, section in leaf.columns()})
-    layout.columns = {name: layout.columns[name] for name in _in_file_order(layout.columns, variables)}
-    return layout
-
-
-def as_table(section: Section, whole: npt.NDArray[Any], findings: list[Finding]) -> npt.NDArray[Any]:
-    """Return an array as a table (n, k), its rows along the longer dimension; a note is added if it is read across."""
-    table = whole.reshape(-1, 1) if 1 in whole.shape else whole
-    if table.shape[0] >= table.shape[1]:
-        return table
-    findings.append(Finding(RowsAsColumns("variable", section.name, *whole.shape), severity="note"))
-    return table.T
-
-
-class _Walk:
-    """Collects what is in values: arrays of numbers, single numbers, texts, runs, and what is left out."""
-
-    def __init__(self, runs: bool) -> None:
-        self._with_runs = runs
-        self.leaves: list[Leaf] = []
-        self.numbers: dict[str, Numbers] = {}
-        self.texts: dict[str, str] = {}
-        self.runs: dict[str, MatColumn] = {}
-        self.single_runs: dict[str, MatColumn] = {}
-        self.findings: list[Finding] = []
-
-    def value(self, value: Value, name: str, last: str, structs: tuple[str, ...]) -> None:
+    def add(self, value: Value, name: str, last: str, structs: tuple[str, ...]) -> None:
         """Add a value, or what is inside of it."""
         if isinstance(value, Numbers):
             self._array(value, name, last, structs)
-        elif isinstance(value, Text):
-            if text := " ".join(value.text.split()):
+        elif isinstance(value, str):
+            if text := " ".join(value.split()):
                 self.texts[name] = text[:_DETAIL]
-        elif isinstance(value, Structs):
+        elif isinstance(value, list):
             self._structs(value, name, structs)
-        elif isinstance(value, Cells):
+        elif isinstance(value, tuple):
             self._cells(value, name, last, structs)
         else:
             self.findings.append(left_out(name, value.what))
@@ -118,59 +97,110 @@ class _Walk:
         elif structs and min(shape) > _WIDEST:
             self.findings.append(left_out(name, f"{shape[0]} x {shape[1]} matrix, too wide for a log"))
         else:
-            self.leaves.append(Leaf(name, last, structs, value))
+            leaf = Leaf(name, last, structs, value)
+            self.leaves.append(leaf)
+            self.columns |= {key: MatColumn((section,)) for key, section in leaf.columns()}
 
-    def _cells(self, value: Cells, name: str, last: str, structs: tuple[str, ...]) -> None:
-        if not any(_has_array(element) for element in value.elements):
-            texts = bool(value.elements) and all(isinstance(element, Text) for element in value.elements)
+    def _cells(self, value: tuple[Value, ...], name: str, last: str, structs: tuple[str, ...]) -> None:
+        if not any(_has_array(element) for element in value):
+            texts = bool(value) and all(isinstance(element, str) for element in value)
             self.findings.append(left_out(name, "cell of texts" if texts else "cell"))
             return
-        for number, element in enumerate(value.elements, 1):
-            self.value(element, f"{name}{{{number}}}", last, structs)
+        for number, element in enumerate(value, 1):
+            self.add(element, f"{name}{{{number}}}", last, structs)
 
-    def _structs(self, value: Structs, name: str, structs: tuple[str, ...]) -> None:
-        if not value.elements:
+    def _structs(self, value: list[dict[str, Value]], name: str, structs: tuple[str, ...]) -> None:
+        if not value:
             self.findings.append(left_out(name, "empty array of structs"))
-        elif len(value.elements) == 1:
-            self._fields(value.elements[0], name, structs)
-        elif not (self._with_runs and self._runs(value, name)):
-            for number, element in enumerate(value.elements, 1):
+        elif len(value) == 1:
+            self._fields(value[0], name, structs)
+        elif not (self.with_runs and self._runs(value, name)):
+            for number, element in enumerate(value, 1):
                 self._fields(element, f"{name}({number})", structs)
 
     def _fields(self, element: Mapping[str, Value], name: str, structs: tuple[str, ...]) -> None:
         for key, part in element.items():
-            self.value(part, f"{name}.{key}", key, (*structs, name))
+            self.add(part, f"{name}.{key}", key, (*structs, name))
 
-    def _runs(self, value: Structs, name: str) -> bool:
-        """Add the elements of an array of structs as runs; False if they are not runs."""
-        walks = []
-        for number, element in enumerate(value.elements, 1):
-            walk = _Walk(runs=False)
-            walk._fields(element, f"{name}({number})", ())
-            walks.append(walk)
-        runs = StructRuns(name, [walk.leaves for walk in walks], [walk.numbers for walk in walks])
-        if not runs.are_runs:
+    def _runs(self, value: list[dict[str, Value]], name: str) -> bool:
+        """Add the elements of an array of structs as runs, one after the other; False if they are not runs.
+
+        They are runs if each that has arrays has the same clock and no second one. Elements with equal clocks were
+        logged side by side: they are no runs. Structs of single numbers only are the rows of a table.
+        """
+        inside = [Layout(with_runs=False) for _ in value]
+        for number, (layout, element) in enumerate(zip(inside, value, strict=True), 1):
+            layout._fields(element, f"{name}({number})", ())
+        leaves = [{_inner_name(leaf.name, name): leaf for leaf in layout.leaves} for layout in inside]
+        filled = [some for some in leaves if some]
+        clocks = [{key for key, leaf in some.items() if leaf.is_clock and "." not in key} for some in filled]
+        common = set.intersection(*clocks) if clocks else set[str]()
+        clock = next((key for key in next(iter(filled), {}) if key in common), "")
+        rows = [some[clock].rows if clock in some else int(not filled) for some in leaves]
+        if clock:
+            has_second = any(
+                leaf.is_clock and leaf.rows != count
+                for some, count in zip(leaves, rows, strict=True)
+                for leaf in some.values()
+            )
+            if len(filled) < 2 or has_second or _are_equal([some[clock] for some in filled]):
+                return False
+        elif filled or not any(layout.numbers for layout in inside):
             return False
-        self.runs |= runs.columns()
-        self.single_runs |= runs.single_columns()
-        self.findings += runs.findings()
-        for walk in walks:
-            self.texts |= walk.texts
-        left = (finding.fact for number in runs.used for finding in walks[number].findings)
-        kinds = {
-            f"{name}(:).{short_name(fact.variable, name)}": fact for fact in left if isinstance(fact, VariableLeftOut)
-        }
-        self.findings += [Finding(replace(fact, variable=key), severity="note") for key, fact in kinds.items()]
+        used = [i for i, count in enumerate(rows) if count]
+        fields = [_fields_of_run(leaves[i], inside[i].numbers, name, rows[i]) for i in used]
+        if clock:
+            other = {key: leaf.rows for i in used for key, leaf in leaves[i].items() if leaf.rows != rows[i]}
+            self._add_run_findings(name, rows, other)
+            ids = tuple(Section("", _constant(float(i + 1), rows[i])) for i in used)
+            self.columns[f"{name}(:)"] = MatColumn(ids, f"{name}(:).{clock}")
+        for key in dict.fromkeys(key for some in fields for key in some):
+            missing = (Section("", _constant(np.nan, rows[i])) for i in used)
+            sections = tuple(some.get(key, none) for some, none in zip(fields, missing, strict=True))
+            self.columns[f"{name}(:).{key}"] = MatColumn(sections, f"{name}(:).{clock}" if clock else "")
+        self.hidden |= {key: column for layout in inside for key, column in layout.columns.items()}
+        self.texts |= {key: text for layout in inside for key, text in layout.texts.items()}
+        left = [found for i in used for found in inside[i].findings if found.kind == "variable_left_out"]
+        named = {f"{name}(:).{_inner_name(found.numbers['variable'], name)}": found.numbers for found in left}
+        self.findings += [
+            Finding("variable_left_out", "", {**numbers, "variable": key}) for key, numbers in named.items()
+        ]
         return True
+
+    def _add_run_findings(self, name: str, rows: Sequence[int], other: Mapping[str, int]) -> None:
+        """Add what the runs are, and which of their fields, with `other` numbers of rows, are left out."""
+        used = sum(map(bool, rows))
+        self.findings.append(Finding("runs_of_structs", "", {"array": name, "runs": used, "rows": sum(rows)}))
+        if empty := tuple(number for number, count in enumerate(rows, 1) if not count):
+            self.findings.append(Finding("runs_without_rows", "", {"array": name, "runs": empty}))
+        for key, count in other.items():
+            self.findings.append(Finding("without_clock", "", {"variable": f"{name}(:).{key}", "rows": count}))
+
+
+def arrange_columns(variables: Variables) -> Layout:
+    """Return the layout of the variables of a file."""
+    layout = Layout()
+    for name, value in variables.items():
+        layout.add(value, name, name, ())
+    clocks = _clocks(layout.leaves)
+    for leaf in layout.leaves:
+        clock, is_alone = _clock_of(leaf, clocks)
+        names = [key for key, _ in leaf.columns()]
+        if is_alone:
+            layout.findings.append(Finding("without_clock", "", {"variable": leaf.name, "rows": leaf.rows}))
+            layout.hidden |= {key: layout.columns.pop(key) for key in names}
+        else:
+            layout.columns |= {key: replace(layout.columns[key], clock=clock) for key in names}
+    return layout
 
 
 def _has_array(value: Value) -> bool:
     """Return whether a value, or one inside of it, is an array of more than one number."""
     if isinstance(value, Numbers):
         return value.shape != (1, 1) and 0 not in value.shape
-    if isinstance(value, Structs):
-        return any(_has_array(part) for element in value.elements for part in element.values())
-    return isinstance(value, Cells) and any(_has_array(part) for part in value.elements)
+    if isinstance(value, list):
+        return any(_has_array(part) for element in value for part in element.values())
+    return isinstance(value, tuple) and any(_has_array(part) for part in value)
 
 
 def _clocks(leaves: Sequence[Leaf]) -> dict[str, dict[int, str]]:
@@ -198,11 +228,30 @@ def _clock_of(leaf: Leaf, clocks: Mapping[str, Mapping[int, str]]) -> tuple[str,
     return "", bool(around)
 
 
-def _in_file_order(columns: Mapping[str, MatColumn], variables: Variables) -> list[str]:
-    """Return the names of the columns in the order of the variables that they are from."""
-    order = {name: number for number, name in enumerate(variables)}
-    return sorted(columns, key=lambda name: order[_variable(name, order)])
+def _inner_name(name: str, array: str) -> str:
+    """Return the name of a field inside of an element of an array: `joint(1).q` of `run(3).joint(1).q`."""
+    return name[len(array) :].partition(").")[2]
 
 
-def _variable(name: str, variables: Mapping[str, int]) -> str:
-    return next(name[:end] for end in range(len(name), 0, -1) if name[:end] in variables)
+def _fields_of_run(
+    leaves: Mapping[str, Leaf], numbers: Mapping[str, Numbers], array: str, rows: int
+) -> dict[str, Section]:
+    """Return the columns of a run: arrays as long as its clock, and single numbers in each of its rows."""
+    found = {
+        _inner_name(key, array): section
+        for leaf in leaves.values()
+        if leaf.rows == rows
+        for key, section in leaf.columns()
+    }
+    return found | {_inner_name(key, array): Section(key, each.repeated(rows)) for key, each in numbers.items()}
+
+
+def _constant(number: float, rows: int) -> Numbers:
+    return Numbers((rows, 1), partial(np.full, (rows, 1), number))
+
+
+def _are_equal(clocks: Sequence[Leaf]) -> bool:
+    if len({clock.rows for clock in clocks}) > 1:
+        return False
+    values = (np.asarray(clock.numbers.read()).ravel() for clock in clocks)
+    return all(np.array_equal(first, second) for first, second in pairwise(values))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import VariableLeftOut
 
 # A file with more values, fields and cells than this is refused: no log has as many.
 MOST_VALUES = 200_000
@@ -38,26 +40,40 @@ class Numbers:
     read: Callable[[], npt.NDArray[Any]]
     is_complex: bool = False
 
+    @property
+    def is_across(self) -> bool:
+        """Return whether its rows are along the second dimension, because that is the longer one."""
+        return 1 < self.shape[0] < self.shape[1]
+
+    @cached_property
+    def table(self) -> npt.NDArray[Any]:
+        """Return a vector or matrix as a table (n, k), its rows along the longer dimension."""
+        return (self.read() if self.shape[0] >= self.shape[1] else self.read().T).reshape(max(self.shape), -1)
+
+    def repeated(self, rows: int) -> Numbers:
+        """Return a single number in each of so many rows."""
+        return Numbers((rows, 1), lambda: np.repeat(self.table, rows, axis=0), self.is_complex)
+
 
 @dataclass(frozen=True)
-class Text:
-    """A text, or the rows of an array of characters."""
+class Section:
+    """The rows of a column that a variable contains: column `index` of its table."""
 
-    text: str
+    variable: str
+    numbers: Numbers
+    index: int = 0
+
+    def values(self) -> npt.NDArray[Any]:
+        """Return its values (n,)."""
+        return self.numbers.table[:, self.index]
 
 
 @dataclass(frozen=True)
-class Structs:
-    """An array of structs: the fields of each element, in MATLAB's order. A struct is an array of one element."""
+class MatColumn:
+    """A column: its sections, one after the other, and the name of the column that is its clock; empty if unknown."""
 
-    elements: tuple[Mapping[str, Value], ...]
-
-
-@dataclass(frozen=True)
-class Cells:
-    """A cell array: its elements in MATLAB's order."""
-
-    elements: tuple[Value, ...]
+    sections: tuple[Section, ...]
+    clock: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,28 +83,26 @@ class Opaque:
     what: str
 
 
-Value = Numbers | Text | Structs | Cells | Opaque
+# Numbers, a text, an array of structs (a struct has one element), the elements of a cell array in MATLAB's order.
+Value = Numbers | str | list[dict[str, "Value"]] | tuple["Value", ...] | Opaque
 # The variables of a file by name.
 Variables = Mapping[str, Value]
 
 
 class ValueCount:
-    """Counts the values of a file; raises RecordingError if a file has more of them than any log."""
+    """Counts the values of a file; raises RecordingError if it has more of them, or deeper nested, than any log."""
 
-    def __init__(self, place: str) -> None:
-        self._place, self._count = place, 0
+    def __init__(self, path: Path) -> None:
+        self._path, self._count = path, 0
 
-    def add_all(self, count: int) -> None:
-        """Check that there may be so many more values."""
-        self.add(0, count)
-        self._count -= count
-
-    def add(self, level: int, count: int = 1) -> None:
+    def add(self, level: int, count: int) -> None:
         """Count values that are inside of `level` others."""
         self._count += count
         if self._count > MOST_VALUES or level > MOST_LEVELS:
-            what = f"more than {MOST_VALUES} values" if self._count > MOST_VALUES else f"more than {MOST_LEVELS} levels"
-            raise RecordingError(f"{self._place}: {what} of structs and cells: refused", "save fewer variables")
+            raise RecordingError(
+                f"{self._path}: more than {MOST_VALUES} values or {MOST_LEVELS} levels of structs and cells: refused",
+                "save fewer variables",
+            )
 
 
 def left_out(name: str, what: str) -> Finding:
@@ -96,7 +110,9 @@ def left_out(name: str, what: str) -> Finding:
     advice = _ADVICE.get(what, "")
     is_object = (not advice and what[:1].isalpha() and "." in what) or what[:1].isupper()
     advice = advice or ("save its properties as a struct of numbers" if is_object else "")
-    return Finding(VariableLeftOut(name, with_article(what), advice.format(name=name)), severity="note")
+    return Finding(
+        "variable_left_out", "", {"variable": name, "what": with_article(what), "advice": advice.format(name=name)}
+    )
 
 
 def with_article(kind: str) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.formats.container_checks import check_chunks
-from cdtool.formats.mat.variables import Cells, Numbers, Opaque, Structs, Text, Value, ValueCount, Variables
+from cdtool.formats.mat.variables import Numbers, Opaque, Value, ValueCount, Variables
 
 _USER_BLOCK, _MAGIC, _HDF5 = 512, b"MATLAB 7.", b"\x89HDF\r\n\x1a\n"
 _COMPLEX = ("real", "imag")
@@ -40,7 +40,7 @@ def read_variables(path: Path, h5py: Any, file: Any) -> Variables:
 class _Reader:
     def __init__(self, path: Path, h5py: Any, file: Any) -> None:
         self._path, self._h5py, self._file = path, h5py, file
-        self._count = ValueCount(str(path))
+        self._count = ValueCount(path)
 
     def member(self, group: Any, name: str, level: int) -> Value:
         """Return a member of a group; links are not followed, as they may form a cycle or point to another file."""
@@ -49,7 +49,6 @@ class _Reader:
         return self._value(group[name], level)
 
     def _value(self, node: Any, level: int) -> Value:
-        self._count.add(level)
         if isinstance(node, self._h5py.Group):
             return self._group(node, level)
         matlab_class = _class(node)
@@ -63,12 +62,12 @@ class _Reader:
         if "MATLAB_empty" in node.attrs and 0 < node.size <= _MOST_DIMENSIONS:  # its values are the dimensions
             check_chunks(self._path, node.name, node)
             shape = tuple(int(size) for size in node[()].ravel().tolist())
-            empty: dict[str, Value] = {"cell": Cells(()), "struct": Structs(()), "char": Text("")}
+            empty: dict[str, Value] = {"cell": (), "struct": [], "char": ""}
             return empty.get(matlab_class, Numbers(shape if 0 in shape else (0, 0), partial(np.empty, (0, 0))))
         if matlab_class == "char":
-            return Text(self._text(node))
+            return self._text(node)
         if node.dtype == self._h5py.ref_dtype:
-            return Cells(tuple(self._targets(node, level)))
+            return tuple(self._targets(node, level))
         is_complex = bool(node.dtype.names == _COMPLEX)
         if node.dtype.kind not in "biuf" and not is_complex:
             return Opaque(matlab_class or "text or a compound")
@@ -82,12 +81,13 @@ class _Reader:
             return Opaque(matlab_class.replace("function_handle", "function handle") or "object")
         # In the order of HDF5: on damaged bytes, HDF5 may read the variable-length texts of MATLAB_fields without end.
         names = list(group)
+        self._count.add(level + 1, len(names))
         members = {name: group.get(name) for name in names if self._is_array_field(group, name)}
         counts = {member.size for member in members.values()}
         if members and len(members) == len(names) and len(counts) == 1:
             fields = {name: list(self._targets(member, level)) for name, member in members.items()}
-            return Structs(tuple(dict(zip(fields, row, strict=True)) for row in zip(*fields.values(), strict=True)))
-        return Structs(({name: self.member(group, name, level + 1) for name in names},))
+            return [dict(zip(fields, row, strict=True)) for row in zip(*fields.values(), strict=True)]
+        return [{name: self.member(group, name, level + 1) for name in names}]
 
     def _is_array_field(self, group: Any, name: str) -> bool:
         """Return whether a member is the field of all elements of an array of structs: references without a class."""
@@ -100,7 +100,7 @@ class _Reader:
         """Yield the values that a dataset refers to, in MATLAB's order."""
         if dataset.is_virtual or dataset.external:
             return
-        self._count.add_all(dataset.size)
+        self._count.add(level + 1, dataset.size)
         check_chunks(self._path, dataset.name, dataset)
         # The last dimension of HDF5 is MATLAB's first one, so that the order of both is the same.
         for reference in np.asarray(dataset[()]).ravel():

@@ -19,7 +19,6 @@ from cdtool.evaluation.limits import LimitRule, unchecked
 from cdtool.evaluation.results import RecordingFinding, Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.kernel_warm_up import compile_package
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges
 from cdtool.recording import FloatArray
@@ -186,7 +185,6 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     beside_logs = _digest_beside_logs(gathered, learned, provenance, stored.determinants.normals) if stored else ""
     found = stored.finished(beside_logs, provenance) if stored else None
     if found is None:
-        compile_package()
         gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
         gathered.skipped += _labels_without_run(setup, gathered.scored)
         provenance["units"] |= gathered.units

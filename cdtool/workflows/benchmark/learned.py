@@ -18,8 +18,6 @@ from cdtool.detectors import DETECTORS
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
 from cdtool.findings import Finding
-from cdtool.findings.scoring import DetectorLeftOut
-from cdtool.kernel_warm_up import compile_package
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.remote.remote_path import location
@@ -151,7 +149,6 @@ class Teaching:
     @cached_property
     def _read(self) -> tuple[Runs, float]:
         """Return the runs, and the time that it took to read them [s]."""
-        compile_package()
         begin = perf_counter()
         runs = load_runs(self.setup.learn, self.setup.machine_file, self.setup.run_reading(self.workers))
         return runs, perf_counter() - begin
@@ -165,7 +162,10 @@ class Teaching:
             return used, []
         used, left_out = that_can_run(used, self._runs.operations, machine_file.machine)
         broken = DETECTORS.broken_plugins().items()
-        left_out += [RecordingFinding.of(name, Finding(DetectorLeftOut(str(fault)))) for name, fault in broken]
+        left_out += [
+            RecordingFinding.of(name, Finding("detector_left_out", "", {"reason": str(fault)}))
+            for name, fault in broken
+        ]
         return used, left_out
 
     @cached_property

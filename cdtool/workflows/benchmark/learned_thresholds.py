@@ -11,7 +11,6 @@ from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, NothingValidError, SignatureError, UsageError
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
 from cdtool.findings import Finding
-from cdtool.findings.scoring import DetectorLeftOut, DetectorUnassessable, NothingLearnedWithout
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector
 from cdtool.thresholds.base import FittedThreshold, is_per_run
@@ -77,7 +76,7 @@ def learn_thresholds(
             if of_detector.is_unusable:
                 learned.unusable[detector.name] = of_detector.reason
             else:
-                unassessable = Finding(DetectorUnassessable(of_detector.reason))
+                unassessable = Finding("detector_unassessable", "", {"reason": of_detector.reason})
                 learned.findings.append(RecordingFinding.of(detector.name, unassessable))
             continue
         skipped = [*of_detector.skipped, *of_detector.made.skipped]
@@ -191,7 +190,7 @@ class ThresholdsByLog:
                 thresholds[detector] = _learn(self.setup, detector, others).thresholds
             except (SignatureError, UsageError) as fault:
                 thresholds[detector] = ()
-                reason = Finding(NothingLearnedWithout(detector, fault.message))
+                reason = Finding("nothing_learned_without", "", {"detector": detector, "reason": fault.message})
                 findings[detector] = [RecordingFinding.of(name, reason)]
         return thresholds, findings
 
@@ -215,5 +214,7 @@ def that_can_run(
                 run_detector(operation, machine, detector)
             able.append(detector)
         except CdtoolError as fault:
-            left_out.append(RecordingFinding.of(detector.name, Finding(DetectorLeftOut(fault.message))))
+            left_out.append(
+                RecordingFinding.of(detector.name, Finding("detector_left_out", "", {"reason": fault.message}))
+            )
     return able, left_out

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from cdtool.errors import CdtoolError, ConfigurationError
 from cdtool.evaluation.results import RecordingFinding
 from cdtool.findings import Finding
-from cdtool.findings.synchronisation import MeasuredSynchronisation
 from cdtool.log_section import LogSection
 from cdtool.operations import RunCut
 from cdtool.plain_text import counted
@@ -94,8 +93,8 @@ def with_synchronisation(
     # The interval need not be symmetric about the offset: it reaches both kinds of contacts.
     most = max(max(abs(found.offset.low), abs(found.offset.high)), *(abs(found.offset_at(t)) + half for t in times))
     (shown,) = latency_findings([found])
-    fact = MeasuredSynchronisation(most, shown.fact.sentence())
-    finding = RecordingFinding.of(str(setup.path), Finding(fact, "force", "note"))
+    fact = {"synchronisation": most, "shown": shown.sentence}
+    finding = RecordingFinding.of(str(setup.path), Finding("measured_synchronisation", "force", fact))
     return replace(setup, synchronisation=most), [finding]
 
 

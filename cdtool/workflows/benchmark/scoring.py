@@ -19,7 +19,6 @@ from cdtool.evaluation.results import (
 )
 from cdtool.evaluation.sweep import sweep_operation
 from cdtool.findings import Finding
-from cdtool.findings.scoring import ForceUnassessable
 from cdtool.ingest.run_reading import read_runs
 from cdtool.log_section import LogSection
 from cdtool.logged_recording import LoggedRecording
@@ -327,11 +326,11 @@ def _force_not_seen(
 ) -> list[RecordingFinding]:
     """Return the contacts not assessable by a force profile because load-cell samples are missing: a data loss."""
     unassessable = [
-        ForceUnassessable(number, profile, verdict.reason)
+        Finding("force_unassessable", "", {"contact": number, "profile": profile, "reason": verdict.reason})
         for number, verdict in verdicts.items()
         if verdict.outcome == "not_assessable" and curves[number].has_missing_samples
     ]
-    return [RecordingFinding.of(recording.name, Finding(item, severity="loss")) for item in unassessable]
+    return [RecordingFinding.of(recording.name, item) for item in unassessable]
 
 
 def _recording_result(

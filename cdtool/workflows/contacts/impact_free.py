@@ -10,7 +10,6 @@ from cdtool.errors import RecordingError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.findings import Finding
-from cdtool.findings.scoring import AssumedImpactFree
 from cdtool.operations import Operation
 from cdtool.plain_text import counted, digits
 from cdtool.recording import Contact, Recording
@@ -53,7 +52,7 @@ def unchecked(notes: Sequence[tuple[str, Finding]]) -> list[RecordingFinding]:
         return []
     logs = list(dict.fromkeys(name for name, _ in notes))
     which = logs[0] if len(logs) == 1 else f"{counted(len(logs), 'log')}, the first {logs[0]}"
-    return [RecordingFinding.of(which, Finding(AssumedImpactFree(str(notes[0][1]))))]
+    return [RecordingFinding.of(which, Finding("assumed_impact_free", "", {"absent": str(notes[0][1])}))]
 
 
 def _described(contact: Contact) -> str:

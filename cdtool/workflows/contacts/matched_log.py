@@ -14,9 +14,6 @@ from cdtool.evaluation.force.curve import ForceTimeCurve, force_time_curve
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import match
 from cdtool.findings import Finding
-from cdtool.findings.channels import UnitContradicted
-from cdtool.findings.scoring import LogNotCut, NoForce, OnsetUnseen, PeakUnseen
-from cdtool.findings.truth import InProgress
 from cdtool.operations import Operation, motion_spans
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, Recording
@@ -70,7 +67,11 @@ class UncutStrokes:
         numbers = sorted({number for numbers in self.not_assessable.values() for number in numbers})
         if not numbers:
             return []
-        return [RecordingFinding.of(self.recording, Finding(LogNotCut(self.strokes, tuple(numbers))))]
+        return [
+            RecordingFinding.of(
+                self.recording, Finding("log_not_cut", "", {"strokes": self.strokes, "not_assessable": tuple(numbers)})
+            )
+        ]
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,8 @@ def _not_scored(
     found = []
     for contact in contacts:
         if contact.in_progress:
-            found.append(Skipped(recording.name, f"{InProgress(contact.end).sentence()}, it is not scored"))
+            in_progress = Finding("in_progress", "force", {"end": contact.end})
+            found.append(Skipped(recording.name, f"{in_progress.sentence}, it is not scored"))
         elif not any(contact in own for own in inside):
             text = f"the contact at {contact.start:.3f} s is outside all operations (cut by {cut_by})"
             found.append(Skipped(recording.name, text))
@@ -163,7 +165,11 @@ def _unseen_onsets(contacts: Sequence[Contact], window: float) -> list[Finding]:
     for number, contact in enumerate(contacts, 1):
         if contact.hole and not contact.in_progress:
             later = contact.uncertainty if contact.uncertainty < window else None
-            found.append(Finding(OnsetUnseen(number, contact.hole, contact.start, later), severity="loss"))
+            found.append(
+                Finding(
+                    "onset_unseen", "", {"contact": number, "hole": contact.hole, "time": contact.start, "later": later}
+                )
+            )
     return found
 
 
@@ -174,7 +180,7 @@ def _unseen_forces(contacts: Sequence[Contact], curves: Mapping[int, ForceTimeCu
         contact = contacts[number - 1]
         hole = curve.longest_hole(contact.end - contact.start)
         if hole and not contact.hole:
-            found.append(Finding(PeakUnseen(number, hole)))
+            found.append(Finding("peak_unseen", "", {"contact": number, "hole": hole}))
     return found
 
 
@@ -199,7 +205,7 @@ def force_curves(
     if "force" not in recording:
         return found, missing
     for item in recording.findings:
-        if item.channel == "force" and isinstance(item.fact, UnitContradicted):
+        if item.channel == "force" and item.kind == "unit_contradicted":
             return found, [replace(item, severity="warning")]
     ends = [*(contact.start for contact in contacts[1:]), float("inf")]
     for number, (contact, until) in enumerate(zip(contacts, ends, strict=False), 1):
@@ -208,7 +214,7 @@ def force_curves(
         try:
             found[number] = force_time_curve(recording, contact, mass_before_cell, until)
         except CdtoolError as fault:
-            missing.append(Finding(NoForce(number, fault.message)))
+            missing.append(Finding("no_force", "", {"contact": number, "reason": fault.message}))
     return found, missing
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from cdtool.errors import RecordingError, UsageError
 from cdtool.files import replaced
 from cdtool.findings import Finding
-from cdtool.findings.containers import Unverified
 from cdtool.formats.groups import UNVERIFIED, Parts
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.parts import join_digests
@@ -19,7 +18,7 @@ from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.remote.remote_path import location
 from cdtool.version import __version__
-from cdtool.workflows.channel_rows import channel_rows
+from cdtool.workflows.channel_rows import ChannelRows
 from cdtool.workflows.convert.section_rows import Rows, SectionRows
 from cdtool.workflows.log_rows import LogRows
 from cdtool.workflows.written_files import files_of, machine_text, writer_of
@@ -97,7 +96,7 @@ def convert(
     machine_file = (
         None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     )
-    rows: Rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
+    rows: Rows = ChannelRows(log, machine_file) if machine_file else LogRows(log)
     if not rows.groups:
         raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
     rows = SectionRows(log, rows, section, machine_file) if section else rows
@@ -177,7 +176,7 @@ def _provenance(
         told["section"] = str(section)
     if lost := [str(finding) for finding in rows.findings if finding.severity == "loss"]:
         told["lost"] = "; ".join(lost)
-    if unverified := [finding.message for finding in rows.findings if isinstance(finding.fact, Unverified)]:
+    if unverified := [finding.message for finding in rows.findings if finding.kind == "unverified"]:
         told[UNVERIFIED] = "; ".join(unverified)
     if machine_file is not None:
         told |= {"machine": machine_file.machine.name, "machine_fingerprint": fingerprint(machine_file.machine)}

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cdtool.errors import UsageError, WorkerError
-from cdtool.kernel_warm_up import compile_package
 from cdtool.remote.staging import copies_in_use
 from cdtool.workflows.execution.in_worker import Failed, keep_freed_memory
 
@@ -198,7 +197,6 @@ def _made(
         return _on_cluster(work, items, total, workers, of_lost, together)
     if workers.timeout is None and min(workers.jobs, total - 1) <= 1:
         return map(work, items)
-    compile_package()
     from cdtool.workflows.execution.processes import Processes
 
     pool = Processes(work, min(workers.jobs, total), workers.timeout)

@@ -384,8 +384,8 @@ def _impact_free(paths: Sequence[Path], machine_file: MachineFile, reading: RunR
         reason = runs.skipped[0].reason if runs.skipped else "no log is given"
         raise IdentificationError(f"no impact-free log is left: {reason}", "give other logs")
     for check in runs.ranges.all.contradicted:
-        if check.found != "inertia":  # that of the machine file is what is to be identified
-            raise IdentificationError(f"{machine_file.path}: {check.channel}: {check.sentence()}")
+        if check.numbers["found"] != "inertia":  # that of the machine file is what is to be identified
+            raise IdentificationError(f"{machine_file.path}: {check}")
     return runs, recordings
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.findings.plausibility import ChannelCheck
+from cdtool.findings import Finding
 from cdtool.recording import CONTACT_PRESSURE, RIG_UNITS, UNITLESS
 from cdtool.workflows.init.derived_speed import LowPass
 from cdtool.workflows.init.machine_side import Side
@@ -70,7 +70,7 @@ class Draft:
         return {name: self.evidence.logged(name) for name in self.channels.found if name not in UNITLESS}
 
 
-def draft_text(draft: Draft, left_out: Mapping[str, str], reverse: Sequence[ChannelCheck]) -> str:
+def draft_text(draft: Draft, left_out: Mapping[str, str], reverse: Sequence[Finding]) -> str:
     """Return the machine file; channels `left_out` become comments with the reason, those to `reverse` change sign."""
     side = draft.side
     lines = [
@@ -128,7 +128,7 @@ def _value(value: object) -> str:
     return _text(value) if isinstance(value, str) else json.dumps(value)
 
 
-def _mapped(draft: Draft, name: str, logged: Logged | None, reverse: Sequence[ChannelCheck]) -> list[str]:
+def _mapped(draft: Draft, name: str, logged: Logged | None, reverse: Sequence[Finding]) -> list[str]:
     """Return one channel's line, and the comment with the reason and what to check."""
     found = draft.channels.found[name]
     why, checks = f"guessed: {found.why}", [found.check]
@@ -136,12 +136,14 @@ def _mapped(draft: Draft, name: str, logged: Logged | None, reverse: Sequence[Ch
         why += f"; unit: {logged.why}" if logged.why else ""
         checks.append(logged.check)
     if reverse:
-        why += f"; with a positive scale it {reverse[0].seen}: inverted"
+        why += f"; with a positive scale it {reverse[0].words_for('seen')}: inverted"
     if name == "force":
         checks.append("ground truth only: is it the load cell of the test?")
     if name == CONTACT_PRESSURE:
         checks.append("ground truth only: is it the pressure of the contact, not of oil or air?")
-    turned = {joint for item in reverse for joint in ([item.joint] if item.joint else draft.joints)}
+    turned = {
+        joint for item in reverse for joint in ([item.numbers["joint"]] if item.numbers["joint"] else draft.joints)
+    }
     signs = [-1.0 if joint in turned else 1.0 for joint in draft.joints]
     # A force in a guessed unit is not compared with limits.
     guess = ", unit_confirmed = false }" if name in RIG_UNITS and logged and logged.check and not logged.why else " }"

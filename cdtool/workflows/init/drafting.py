@@ -15,9 +15,6 @@ from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.files import write_text
 from cdtool.findings import Finding, worst_first
-from cdtool.findings.clocks import ClockUnitAssumed
-from cdtool.findings.plausibility import ChannelCheck
-from cdtool.findings.tables import UnreadCells
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.source import Format, Source
@@ -214,7 +211,7 @@ def _settled(logs: Sequence[Path], draft: Draft) -> Drafted:
     Signs that the mechanics of the machine contradict are reversed.
     """
     left_out: dict[str, str] = {}
-    reverse: list[ChannelCheck] = []
+    reverse: list[Finding] = []
     if not draft.channels.found:
         return Drafted("", draft_text(draft, {}, ()), (), (), (), draft.unmapped)
     with TemporaryDirectory() as folder:
@@ -232,22 +229,31 @@ def _settled(logs: Sequence[Path], draft: Draft) -> Drafted:
                 left_out[fault.channel] = ""
                 continue
             if len(logs) > 1 and mapped:
-                findings = tuple(item for item in findings if not isinstance(item.fact, ChannelCheck))
+                findings = tuple(item for item in findings if item.kind != "channel_check")
                 findings += _checked_together(logs[:ENOUGH_RUNS], machine_file)
-            checks = [item.fact for item in findings if isinstance(item.fact, ChannelCheck)]
-            wrong = [item for item in checks if item.answer == "contradicts"]
-            agreed = {(item.channel, item.check) for item in checks if item.answer == "agrees"}
+            checks = [item for item in findings if item.kind == "channel_check"]
+            wrong = [item for item in checks if item.numbers["answer"] == "contradicts"]
+            agreed = {_checked(item) for item in checks if item.numbers["answer"] == "agrees"}
             turned = {item.channel for item in reverse}
-            signs = [item for item in wrong if item.found in _REVERSED and item.channel not in turned]
-            others = {item.channel: item.seen for item in wrong if item.found in _ANOTHER}
-            others |= {item.channel: item.seen for item in wrong if item.found in _REVERSED and item.channel in turned}
+            reversed_ = [item for item in wrong if item.numbers["found"] in _REVERSED]
+            signs = [item for item in reversed_ if item.channel not in turned]
+            another = [item for item in wrong if item.numbers["found"] in _ANOTHER]
+            another += [item for item in reversed_ if item.channel in turned]
+            others = {item.channel: item.words_for("seen") for item in another}
             if not signs and not others:
                 # What is left contradicts a placeholder, as a transmission ratio, or a unit that is marked.
-                found = [replace(item, severity="warning") if item.fact in wrong else item for item in findings]
+                found = [replace(item, severity="warning") if item in wrong else item for item in findings]
                 return Drafted("", text, mapped, tuple(left_out), worst_first(found), draft.unmapped)
             # The sign of a channel is usually that of all its joints, also of those whose motion does not show it.
-            reverse += [item if (item.channel, item.check) in agreed else replace(item, joint="") for item in signs]
+            reverse += [
+                item if _checked(item) in agreed else replace(item, numbers={**item.numbers, "joint": ""})
+                for item in signs
+            ]
             left_out |= others
+
+
+def _checked(item: Finding) -> tuple[str, str]:
+    return item.channel, item.numbers["check"]
 
 
 def _checked_together(logs: Sequence[Path], machine_file: MachineFile) -> tuple[Finding, ...]:
@@ -312,7 +318,7 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     side = side_of(channels, ratio, clock, messages_si)
     joints, why = _joints(path, channels, topics)
     doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
-    assumed = next((item.fact.sentence() for item in source.findings if isinstance(item.fact, ClockUnitAssumed)), "")
+    assumed = next((item.sentence for item in source.findings if item.kind == "clock_unit_assumed"), "")
     time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
     if stamp and time.column == stamp[0]:
         time = replace(time, why="seconds and nanoseconds of one stamp, by their names", nanoseconds=stamp[1])
@@ -327,8 +333,9 @@ def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:
     """Return the words that findings name in columns of numbers, each once."""
     found: dict[str, UnreadWord] = {}
     for item in findings:
-        if isinstance(item.fact, UnreadCells) and item.fact.advice.looks_like == "word":
-            found.setdefault(item.fact.cell, UnreadWord(item.fact.cell, item.channel, item.fact.first[0]))
+        if item.kind == "unread_cells" and item.numbers["advice"]["looks_like"] == "word":
+            cell = item.numbers["cell"]
+            found.setdefault(cell, UnreadWord(cell, item.channel, item.numbers["first"][0]))
     return tuple(found.values())
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal
 
 from cdtool.findings import Finding
-from cdtool.findings.motion import Motion, NoMotion, NoMotionMapped
 from cdtool.motion import motion_class
 from cdtool.operations import motion_spans
 from cdtool.recording import Recording
@@ -14,12 +13,24 @@ from cdtool.recording import Recording
 def motion_findings(recording: Recording) -> list[Finding]:
     """Return the number of strokes, speed and direction."""
     if "speed" not in recording:
-        return [Finding(NoMotionMapped(), "speed", "note")]
+        return [Finding("no_motion_mapped", "speed")]
     motion = motion_class(recording)
     if motion.direction == 0:
-        return [Finding(NoMotion(), "speed", "note")]
+        return [Finding("no_motion", "speed")]
     unit = recording["speed"].unit
     strokes = len(motion_spans(recording))
     direction: Literal["forward", "backward"] = "forward" if motion.direction > 0 else "backward"
     joint = recording.joints[motion.joint] if len(recording.joints) > 1 else ""
-    return [Finding(Motion(strokes, motion.nominal_speed, unit, direction, joint), "speed", "note")]
+    return [
+        Finding(
+            "motion",
+            "speed",
+            {
+                "strokes": strokes,
+                "nominal_speed": motion.nominal_speed,
+                "unit": unit,
+                "direction": direction,
+                "joint": joint,
+            },
+        )
+    ]

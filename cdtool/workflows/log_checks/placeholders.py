@@ -12,7 +12,6 @@ from cdtool.bounded_loading import read_text
 from cdtool.channels import ChannelSource
 from cdtool.errors import ConfigurationError
 from cdtool.findings import Finding
-from cdtool.findings.placeholders import PlaceholderInertia, PlaceholderRatio, PlaceholderScale, UncheckedLines
 from cdtool.machine_file import MachineFile
 from cdtool.recording import Recording
 from cdtool.units import RAW_UNITS, find_unit
@@ -40,15 +39,18 @@ def placeholder_findings(recording: Recording, machine_file: MachineFile) -> lis
     found = []
     of_motor = getattr(machine, "ratio_unit", "") == "m/rad" and getattr(machine, "coordinates", "") == "motor"
     if of_motor and any(ratio == 1.0 for ratio in getattr(machine, "transmission_ratio", ())):
-        found.append(Finding(PlaceholderRatio(_top_speed(recording))))
+        found.append(Finding("placeholder_ratio", "", {"speed": _top_speed(recording)}))
     maps = machine_file.topics if machine_file.topics.sources else machine_file.columns
-    found += [Finding(PlaceholderScale(*scale), channel) for channel, scale in _scales(maps.sources)]
+    found += [
+        Finding("placeholder_scale", channel, {"raw": raw, "unit": unit, "per": per})
+        for channel, (raw, unit, per) in _scales(maps.sources)
+    ]
     key = getattr(machine, "inertia_key", "")
     load = getattr(machine, "load_inertia", (1.0,))
     if key and not any(load) and not any(getattr(machine, "motor_inertia", (1.0,))):
-        found.append(Finding(PlaceholderInertia(key), severity="note"))
+        found.append(Finding("placeholder_inertia", "", {"key": key}))
     count, keys = _marked_keys(machine_file)
-    return [*found, Finding(UncheckedLines(count, keys))] if count else found
+    return [*found, Finding("unchecked_lines", "", {"count": count, "keys": keys})] if count else found
 
 
 def _top_speed(recording: Recording) -> float:

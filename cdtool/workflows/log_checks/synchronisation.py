@@ -8,15 +8,12 @@ from collections.abc import Sequence
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.synchronisation.latency import ChannelLatency, pooled, preferred
 from cdtool.findings import Finding
-from cdtool.findings.synchronisation import ChannelShift, ShiftNotAssessable
 
 
 def latency_findings(latencies: Sequence[ChannelLatency]) -> list[Finding]:
     """Return one finding per channel and reference; a log without a contact says nothing about its load cell."""
     return [
-        Finding(_fact(item), item.channel, "note")
-        for item in preferred(latencies)
-        if item.assessable or item.events or item.channel != "force"
+        _finding(item) for item in preferred(latencies) if item.assessable or item.events or item.channel != "force"
     ]
 
 
@@ -50,23 +47,26 @@ def pooled_latencies(logs: Sequence[Sequence[ChannelLatency]], origins: Sequence
     return tuple(found)
 
 
-def _fact(item: ChannelLatency) -> ChannelShift | ShiftNotAssessable:
+def _finding(item: ChannelLatency) -> Finding:
+    about = {"joint": item.joint, "reference": item.reference, "examined": len(item.events)}
     if not item.assessable:
-        return ShiftNotAssessable(item.joint, item.reference, item.reason, len(item.events))
-    return ChannelShift(
-        joint=item.joint,
-        reference=item.reference,
-        rests_on=item.rests_on,
-        offset=item.offset.value,
-        low=item.offset.low,
-        high=item.offset.high,
-        at=item.at,
-        event="section" if item.rests_on == "derivative" else "contact",
-        events=len(item.used),
-        examined=len(item.events),
-        drift=(item.drift.value, item.drift.low, item.drift.high) if item.drift.known else None,
-        stiff=_value(item.stiff),
-        soft=_value(item.soft),
+        return Finding("shift_not_assessable", item.channel, {**about, "reason": item.reason})
+    return Finding(
+        "channel_shift",
+        item.channel,
+        {
+            **about,
+            "rests_on": item.rests_on,
+            "offset": item.offset.value,
+            "low": item.offset.low,
+            "high": item.offset.high,
+            "at": item.at,
+            "event": "section" if item.rests_on == "derivative" else "contact",
+            "events": len(item.used),
+            "drift": (item.drift.value, item.drift.low, item.drift.high) if item.drift.known else None,
+            "stiff": _value(item.stiff),
+            "soft": _value(item.soft),
+        },
     )
 
 

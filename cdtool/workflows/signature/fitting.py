@@ -12,8 +12,7 @@ from cdtool.detection import Signal
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError
 from cdtool.evaluation.results import RecordingFinding, Skipped
-from cdtool.findings.finding import Finding
-from cdtool.findings.scoring import CreepNotLearned, SingleSpeed, SpeedsPooled
+from cdtool.findings import Finding
 from cdtool.motion import MotionClass
 from cdtool.motion.speed_range import in_ranges
 from cdtool.operations import Operation
@@ -61,15 +60,18 @@ class Fitted:
         """
         reasons = Counter(item.reason for item in self.creeping)
         creeping = tuple(
-            RecordingFinding.of(detector, Finding(CreepNotLearned(count, reason), severity="note"))
+            RecordingFinding.of(detector, Finding("creep_not_learned", "", {"strokes": count, "reason": reason}))
             for reason, count in reasons.items()
         )
         if not getattr(rule, "speed_range", False):
             pooled = () if getattr(rule, "by_class", False) or is_per_run(rule) else _pooled(rule, self.used)
-            return (*creeping, *(RecordingFinding.of(detector, Finding(fact)) for fact in pooled))
+            return (*creeping, *(RecordingFinding.of(detector, item) for item in pooled))
         motions = [motion for item in self.thresholds if (motion := getattr(item, "motion", None))]
         single = [motions[numbers[0]].described for numbers in in_ranges(motions) if len(numbers) == 1]
-        return (*creeping, *(RecordingFinding.of(detector, Finding(SingleSpeed(motion))) for motion in single))
+        return (
+            *creeping,
+            *(RecordingFinding.of(detector, Finding("single_speed", "", {"motion": motion})) for motion in single),
+        )
 
     @property
     def used(self) -> tuple[Operation, ...]:
@@ -77,14 +79,16 @@ class Fitted:
         return tuple(operation for operations in self.learned_from for operation in operations)
 
 
-def _pooled(rule: Threshold, operations: Sequence[Operation]) -> list[SpeedsPooled]:
+def _pooled(rule: Threshold, operations: Sequence[Operation]) -> list[Finding]:
     """Return the slowest and the fastest runs of each motion whose speeds are those of two classes."""
     motions = [item.motion for item in operations if "speed" in item.recording and item.motion.direction]
     kinds: dict[tuple[int, int], list[MotionClass]] = {}
     for motion in sorted(motions, key=lambda motion: motion.nominal_speed):
         kinds.setdefault((motion.joint, motion.direction), []).append(motion)
     return [
-        SpeedsPooled(rule.name, kind[0].described, kind[-1].described)
+        Finding(
+            "speeds_pooled", "", {"threshold": rule.name, "slowest": kind[0].described, "fastest": kind[-1].described}
+        )
         for kind in kinds.values()
         if not kind[0].matches(kind[-1], SPEED_TOLERANCE)
     ]

@@ -8,7 +8,7 @@ from statistics import median
 
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import RecordingFinding
-from cdtool.findings import Finding, Remark
+from cdtool.findings import remark
 from cdtool.motion import measured_class
 from cdtool.operations import Operation
 from cdtool.signature_file import SignatureFile
@@ -57,7 +57,7 @@ def normals_of(file: SignatureFile) -> NormalMotions:
 
 def notes_on(file: SignatureFile) -> list[RecordingFinding]:
     """Return the notes on a signature file of an earlier version, under its name; else empty."""
-    note = Finding(Remark(file.of_earlier_version), severity="note")
+    note = remark(file.of_earlier_version, severity="note")
     return [RecordingFinding.of(file.source, note)] if file.of_earlier_version else []
 
 

@@ -12,21 +12,17 @@ from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
-from importlib import import_module
 from operator import attrgetter
 from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from cdtool.bounded_loading import parse_own_json
-from cdtool.findings import Fact
 
 T = TypeVar("T")
 
 _PLAIN = (str, int, float, bool, type(None))
 _as_json = json.JSONEncoder(separators=(",", ":"), check_circular=False).encode
-# Facts are restored from modules below this one only.
-_FACTS = "cdtool.findings."
 
 
 class _Plan(NamedTuple):
@@ -69,8 +65,8 @@ def _plan(kind: Any) -> _Plan:
         return _mapping(inner[1])
     if origin is np.ndarray:
         return _array(np.dtype(get_args(inner[1])[0]).newbyteorder("<"))
-    if kind is Fact:
-        return _Plan(_encode_fact, _decode_fact)
+    if kind is Any:  # the numbers of a finding: JSON values and tuples
+        return _Plan(lambda value: value, _with_tuples)
     if is_dataclass(kind):
         return _record(kind)  # type: ignore[arg-type]  # a class, not an instance
     raise TypeError(f"{kind} has no JSON form")
@@ -152,18 +148,7 @@ def _record(kind: type[Any]) -> _Plan:
     return _Plan(encode, decode)
 
 
-def _encode_fact(fact: Fact) -> list[Any]:
-    kind = type(fact)
-    encode = _record(kind).encode
-    assert encode is not None, "a fact is a dataclass"
-    return [kind.__module__, kind.__qualname__, encode(fact)]
-
-
-def _decode_fact(values: list[Any]) -> Any:
-    module, name, inner = values
-    if not module.startswith(_FACTS):
-        raise ValueError(f"{module}.{name} is not a fact")
-    kind = getattr(import_module(module), name)
-    decode = _record(kind).decode
-    assert decode is not None, "a fact is a dataclass"
-    return decode(inner)
+def _with_tuples(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _with_tuples(item) for name, item in value.items()}
+    return tuple([_with_tuples(item) for item in value]) if isinstance(value, list) else value

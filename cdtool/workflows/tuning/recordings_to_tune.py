@@ -12,7 +12,6 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.findings import Finding
-from cdtool.findings.scoring import ConditionsNotTunedOn
 from cdtool.operations import Operation
 from cdtool.plain_text import counted
 from cdtool.recording import Contact
@@ -62,7 +61,7 @@ def read_recordings(
     checkable = is_checkable(budget, runs.operations)
     recordings = in_folds(runs.operations, struck, setup.split, seed, budget, is_nested=checkable)
     changed = len({item.condition for item in setup.conditions})
-    unused = [Finding(ConditionsNotTunedOn(changed), severity="note")] if changed else []
+    unused = [Finding("conditions_not_tuned_on", "", {"count": changed})] if changed else []
     findings = (*runs.findings, *(RecordingFinding.of(str(setup.path), item) for item in unused))
     return ReadRecordings(runs, recordings, (*runs.skipped, *skipped), findings)
 

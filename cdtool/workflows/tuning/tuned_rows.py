@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from cdtool.frozen import frozen
 from cdtool.tuning.tuned import ChoiceResults, TunedDetector
 
 
-@frozen
+@dataclass(frozen=True)
 class TunedRow:
     """The results of a tuned detector on the contacts of one group: a row of `Tuning.summary()`.
 

@@ -16,7 +16,6 @@ from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.frames import rows_as_frame
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.html_table import html_table
-from cdtool.kernel_warm_up import compile_package
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector, signal_of_log
@@ -245,7 +244,6 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
     refuse_limits_by_hand(replace(setup, budget=options.budget))
     setup = _with_impacts(setup, options.impacts, workers, progress)
     with workers.ready():
-        compile_package()
         read = read_recordings(setup, options.budget, options.seed, workers, progress)
         if options.goal is Goal.FORCE and not np.isfinite(read.recordings.peak_of).any():
             raise UsageError("objective is 'force', but no log has the force of its contact", "map the load cell")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.evaluation.explanation.movement import find_movement
+from cdtool.evaluation.explanation.movement import _found
 
 AHEAD = (0.05, 0.1, 0.2)
 
@@ -91,5 +91,5 @@ def test_a_movement_is_the_bits_of_lines_from_whole_arrays(seed, count, shape, o
     if has_step:
         value[random.integers(count) :] += 20.0 * random.standard_normal()
     begin = float(time[random.integers(count)])
-    found = find_movement(time, value, value.mean(), begin, length, np.empty((5, count + 1)))
+    found = _found(time, value, begin, length)
     assert found == _by_whole_arrays(time, value, begin, length)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.evaluation.explanation.normal_choice import NormalMotions, median_distance
+from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.motion import measured_class
 from cdtool.recording import Recording, Series
 from cdtool.thresholds.normal_motion import learn_normal_motion
@@ -35,13 +34,3 @@ def test_alarms_of_one_operation_share_a_comparison_that_equals_a_separate_one()
         rows = slice(first, last + 1)
         for name in ("time", "value", "mean", "spread", "level", "level_mean", "level_spread", "running", "distance"):
             np.testing.assert_array_equal(getattr(one, name)[rows], getattr(other, name))
-
-
-@given(st.lists(st.tuples(VALUES, VALUES, VALUES), max_size=30), st.integers(1, 8))
-def test_the_median_distance_is_numpys(rows, least):
-    value, mean, spread = np.array(rows, dtype=np.float64).reshape(-1, 3).T.copy()
-    with np.errstate(invalid="ignore", divide="ignore"):
-        off = np.abs(value - mean) / spread
-    known = off[np.isfinite(off)]
-    expected = np.median(known) if len(known) >= least else np.nan
-    np.testing.assert_array_equal(median_distance(value, mean, spread, np.empty(len(value)), least), expected)

@@ -15,7 +15,6 @@ from cdtool.evaluation.protocol.plan import MeasuringPoint
 from cdtool.evaluation.protocol.speed import speed_before
 from cdtool.evaluation.protocol.speed_reasons import speed_reasons
 from cdtool.findings import Finding
-from cdtool.findings.channels import DerivedSpeed
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 CONTACT = Contact(start=2.0, end=2.5, uncertainty=0.0)
@@ -56,7 +55,7 @@ def test_a_position_that_the_log_repeats_has_the_speed_of_its_readings(seed, hol
         "",
         ("axis",),
         {"position": Series(time, position, "m"), "speed": derived},
-        findings=(Finding(DerivedSpeed(50.0), "speed", "note"),),
+        findings=(Finding("derived_speed", "speed", {"low_pass": 50.0}),),
     )
     # The readings are late by up to one period, and so is the deceleration.
     assert speed_before(run, CONTACT) == pytest.approx(0.2, abs=deceleration * hold + 0.02)

@@ -10,9 +10,9 @@ import pytest
 
 from cdtool.evaluation.truth.doubts import follows_torque, truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.findings.truth import FollowsTorque, ForceLeft, RestLevelShifted
 from cdtool.recording import FloatArray, Recording, Series
 from tests.data_folder import UR10E_LOGS
+from tests.findings.facts import fact_of
 
 RULE = OnsetRule(above=20.0, back_to=8.0)
 TIME = np.arange(6000) * 1e-3
@@ -34,7 +34,7 @@ def log(force: FloatArray, torque: FloatArray, clock: FloatArray = TIME) -> Reco
 def warnings_of(recording: Recording) -> list[Any]:
     found = truth_findings(recording, find_contacts(recording, RULE), RULE)
     assert all((item.channel, item.severity) == ("force", "warning") for item in found)
-    return [item.fact for item in found]
+    return [fact_of(item) for item in found]
 
 
 @pytest.mark.parametrize("scale", [0.8, -25.0])
@@ -44,7 +44,7 @@ def test_a_force_computed_from_the_torque_is_not_independent_truth(scale, rate):
     torque = np.column_stack((np.sin(clock), 2.0 + press(clock) / abs(scale)))
     force = np.sign(scale) * press(TIME) + noise(2.0, 1)
     (fact,) = warnings_of(log(force, torque, clock))
-    assert fact == FollowsTorque("b", pytest.approx(np.sign(scale), abs=0.05))
+    assert fact == ("follows_torque", {"joint": "b", "r": pytest.approx(np.sign(scale), abs=0.05)})
 
 
 @pytest.mark.parametrize("lag", [0.01, 0.03, 0.08])
@@ -67,8 +67,11 @@ def test_without_contacts_or_required_channels_nothing_is_reported():
 def test_a_rest_level_that_drifted_beyond_the_lower_level_is_reported():
     torque = np.column_stack((np.sin(TIME), np.cos(TIME)))
     (fact,) = warnings_of(log(press(TIME) + noise(2.0, 1) + 30.0 * TIME / 7.0, torque))
-    assert isinstance(fact, RestLevelShifted) and fact.drift
-    assert (fact.shift, fact.onset) == (pytest.approx(16.5, abs=0.5), pytest.approx(4.05, abs=0.05))
+    assert fact.kind == "rest_level_shifted" and fact.numbers["drift"]
+    assert (fact.numbers["shift"], fact.numbers["onset"]) == (
+        pytest.approx(16.5, abs=0.5),
+        pytest.approx(4.05, abs=0.05),
+    )
     assert warnings_of(log(press(TIME) + noise(2.0, 1) + 7.0 * TIME / 7.0, torque)) == []
 
 
@@ -77,7 +80,7 @@ def test_a_force_next_to_nothing_that_stays_to_the_end_of_the_log_is_named():
     hit = np.where((TIME > 3.0) & (TIME < 3.2), 900.0, 0.0) + noise(2.0, 1)
     assert warnings_of(log(hit, torque)) == []
     (fact,) = warnings_of(log(hit + 25.0 * (TIME > 3.1), torque))
-    assert fact == ForceLeft(pytest.approx(25.0, abs=0.5), pytest.approx(3.0, abs=0.05))
+    assert fact == ("force_left", {"force": pytest.approx(25.0, abs=0.5), "onset": pytest.approx(3.0, abs=0.05)})
     assert warnings_of(log(press(TIME) + noise(2.0, 1), torque)) == []
 
 

@@ -16,8 +16,8 @@ from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.force_vector import ForceMagnitude, force_magnitude, quiet_level, with_scalar_force
 from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.findings.truth import ForceMagnitudeUsed
 from cdtool.recording import Contact, FloatArray, Recording, Series
+from tests.findings.facts import fact_of
 
 GATE = OnsetRule(above=20.0, back_to=8.0)
 RULES = {"levels by hand": GATE, "levels from the noise": OnsetRule()}
@@ -173,8 +173,8 @@ def test_an_axis_at_its_stop_is_seen_although_the_magnitude_changes():
 def test_the_rest_level_of_every_axis_is_reported():
     time = clock()
     reduced = with_scalar_force(recording(time, REST + np.outer(pulse(time, 3.0), OBLIQUE)), GATE)
-    facts = [item.fact for item in truth_findings(reduced, find_contacts(reduced, GATE), GATE)]
-    assert [item.rest for item in facts if isinstance(item, ForceMagnitudeUsed)] == [pytest.approx(REST)]
+    facts = [fact_of(item) for item in truth_findings(reduced, find_contacts(reduced, GATE), GATE)]
+    assert [item.numbers["rest"] for item in facts if item.kind == "force_magnitude_used"] == [pytest.approx(REST)]
 
 
 def test_a_single_load_cell_is_left_as_it_is():

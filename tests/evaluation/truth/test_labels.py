@@ -11,8 +11,8 @@ from cdtool.detection import Alarm, Signal, Verdict
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.evaluation.truth.labels import read_labels
 from cdtool.evaluation.truth.matching import match
-from cdtool.findings.truth import KindsExcluded, LabelsWithoutZone
 from cdtool.recording import Recording, Series, TableRows
+from tests.findings.facts import fact_of
 
 EPOCH = 1_743_681_600.25  # 2025-04-03T12:00:00.250Z
 
@@ -160,7 +160,7 @@ def test_a_date_is_on_the_clock_of_the_source_without_saying_so(tmp_path):
 
 def test_dates_without_a_zone_are_utc_and_that_is_stated(tmp_path):
     path = write(tmp_path, "recording,start_time,end_time\n01.csv,2025-04-03T14:00:02.750,\n")
-    assert [type(item.fact) for item in read_labels(path).findings] == [LabelsWithoutZone]
+    assert [item.kind for item in read_labels(path).findings] == ["labels_without_zone"]
     zoned = read_labels(path, zone="+02:00")
     assert zoned.findings == () and zoned.contacts_in(log(EPOCH))[0].start == pytest.approx(2.5, abs=1e-6)
     with pytest.raises(RecordingError, match="labels_zone"):
@@ -230,4 +230,4 @@ def test_kinds_that_are_no_contacts_are_left_out_and_counted(tmp_path):
     assert [item.start for item in labels.contacts_in(log())] == [3.0]
     assert labels.kinds == ("hard",)
     (note,) = labels.findings
-    assert note.fact == KindsExcluded(2, ("intended",))
+    assert fact_of(note) == ("kinds_excluded", {"count": 2, "kinds": ("intended",)})

@@ -7,7 +7,6 @@ import pytest
 
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.findings.truth import NotTared
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 GATE = OnsetRule(above=20.0, back_to=8.0)
@@ -303,7 +302,7 @@ def test_the_offset_of_a_cell_that_is_not_tared_is_reported():
     force = 200.0 - pulse(T, 6.0) + noise(T)
     log = Recording("r", "r", ("axis",), {"force": Series(T, force, "N")})
     (finding,) = truth_findings(log, find_contacts(log, GATE), GATE)
-    assert finding.channel == "force" and isinstance(finding.fact, NotTared)
-    assert finding.fact.rest == pytest.approx(200.0, abs=0.5)
+    assert finding.channel == "force" and finding.kind == "not_tared"
+    assert finding.numbers["rest"] == pytest.approx(200.0, abs=0.5)
     tared = Recording("r", "r", ("axis",), {"force": Series(T, force - 195.0, "N")})
     assert truth_findings(tared, find_contacts(tared, GATE), GATE) == []

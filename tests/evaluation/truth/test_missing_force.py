@@ -12,8 +12,8 @@ from cdtool.evaluation.force.verdict import assess_force
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.matching import match
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.findings.truth import ForceBeginsLate
 from cdtool.recording import Contact, FloatArray, Recording, Series
+from tests.findings.facts import fact_of
 
 RULE = OnsetRule(above=20.0, back_to=8.0)
 TIME = np.arange(9000) * 1e-3
@@ -142,7 +142,7 @@ def test_a_cell_starting_just_before_the_contact_is_a_warning_and_a_masked_one_a
     (contact,) = find_contacts(one, RULE)
     assert contact.hole == 0.0
     (warning,) = truth_findings(one, [contact], RULE)
-    assert warning.fact == ForceBeginsLate(pytest.approx(5.3), contact.start)
+    assert fact_of(warning) == ("force_begins_late", {"begin": pytest.approx(5.3), "onset": contact.start})
     masked = Recording("a", "a.csv", ("x",), {"force": Series(TIME, np.where(lost, np.nan, force), "N")})
     (contact,) = find_contacts(masked, RULE)
     assert contact.hole > 1.0

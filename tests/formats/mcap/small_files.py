@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.log import Log
 
 COMPRESSIONS = ("none", "lz4", "zstd")
 Message = tuple[str, int, bytes]
@@ -38,7 +38,7 @@ def read(path: Path, **options) -> tuple[list[Message], list[Finding], Log]:
     """Return all messages in the order of the file, the findings and the log; only RecordingError may be raised."""
     log = Log(path, **options)
     messages = []
-    for piece in log.pieces():
+    for piece in log.blocks():
         rows = [
             (int(batch.start[i]), item.stream.topic, int(batch.log_time[i]), _payload(batch, i))
             for item in piece

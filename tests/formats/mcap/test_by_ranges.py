@@ -11,7 +11,7 @@ from mcap.writer import CompressionType, Writer
 
 import cdtool
 from cdtool.errors import CdtoolError, RecordingError, is_lasting
-from cdtool.formats.mcap.container.file_bytes import FileBytes
+from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.remote import ranges, remote_path, staging, transferred
 
 MACHINE = """

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import LostBytes, MessageCountDiffers, Unverified
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.log import Log
+from tests.findings.facts import fact_of
 from tests.formats.mcap.small_files import COMPRESSIONS, read, read_or_refused, small_file
 
 
@@ -67,8 +67,8 @@ def test_after_a_damaged_chunk_reading_continues_with_the_next(tmp_path, compres
     assert set(messages) < set(sent)
     assert [loss.chunks for loss in log.section.losses.entries] == [1]
     span = tuple((stamp - 10**9) / 1e9 for stamp in (hit.message_start_time, hit.message_end_time))
-    assert findings[0].fact.lost == LostBytes(hit.chunk_length, True, lost, span)
-    assert Finding(MessageCountDiffers(len(sent), len(messages)), severity="loss") in findings
+    assert findings[0].numbers["lost"] == {"size": hit.chunk_length, "is_chunk": True, "messages": lost, "time": span}
+    assert Finding("message_count_differs", "", {"stated": len(sent), "read": len(messages)}) in findings
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
@@ -94,7 +94,7 @@ def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_pat
     messages, findings, log = read(path)
     assert messages == sent[:-1]
     assert 0 < log.unverified < len(messages)
-    assert findings[-1].fact == Unverified(log.unverified, len(messages))
+    assert fact_of(findings[-1]) == ("unverified", {"count": log.unverified, "messages": len(messages)})
 
 
 def test_a_lost_definition_is_read_from_the_summary(tmp_path):
@@ -128,7 +128,7 @@ def test_messages_that_no_checksum_covers_are_counted(tmp_path):
     messages, findings, log = read(path)
     assert messages == sent
     assert log.unverified == len(sent)
-    assert findings == [Finding(Unverified(len(sent), len(sent)), severity="note")]
+    assert findings == [Finding("unverified", "", {"count": len(sent), "messages": len(sent)})]
 
 
 def test_nothing_is_read_after_a_message_shorter_than_its_header(tmp_path):
@@ -159,4 +159,4 @@ def test_a_wrong_checksum_of_an_attachment_is_a_loss(tmp_path):
     messages, findings, _ = read(path)
     assert len(messages) == 1
     assert findings[0].severity == "loss"
-    assert findings[0].fact.reason == "the checksum of an attachment does not match"
+    assert findings[0].numbers["reason"] == "the checksum of an attachment does not match"

@@ -8,10 +8,10 @@ import pytest
 from mcap.reader import make_reader
 
 from cdtool.errors import RecordingError, UsageError
-from cdtool.findings.containers import Unverified
-from cdtool.formats.mcap.container.log import Log
-from cdtool.formats.mcap.container.records import Attachment
+from cdtool.formats.mcap.log import Log
+from cdtool.formats.mcap.records import Opcode
 from cdtool.workflows.recovering import recover
+from tests.findings.facts import fact_of
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
 
@@ -88,7 +88,7 @@ def test_without_any_checksum_nothing_is_recovered_unless_requested(tmp_path):
     assert messages == sent
     assert log.unverified == len(sent)
     assert not log.summary.verified
-    assert findings[0].fact == Unverified(24, 24)
+    assert fact_of(findings[0]) == ("unverified", {"count": 24, "messages": 24})
 
 
 def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path):
@@ -138,7 +138,7 @@ def test_attachments_and_metadata_are_recovered(tmp_path):
         (attachment,) = reader.iter_attachments()
         assert (attachment.name, attachment.data, attachment.log_time) == ("note.bin", b"\x00\x01" * 700_000, 2)
         assert {record.name: record.metadata for record in reader.iter_metadata()}["machine"] == {"name": "gate"}
-    assert [opcode for opcode, _, _ in read(output)[2].section.extras].count(Attachment.opcode) == 1
+    assert [opcode for opcode, _, _ in read(output)[2].section.extras].count(Opcode.ATTACHMENT) == 1
 
 
 def test_the_same_file_gives_the_same_bytes(tmp_path):

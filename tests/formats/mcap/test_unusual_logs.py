@@ -10,11 +10,9 @@ from mcap.writer import Writer
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
-from cdtool.findings.clocks import OutOfOrder
-from cdtool.findings.containers import DamagedAt, LostBytes, SeveralWriters
-from cdtool.findings.messages import UndecodableMessages
 from cdtool.formats.mcap import Mcap
 from cdtool.workflows.recovering import recover
+from tests.findings.facts import fact_of
 from tests.formats.mcap.small_files import small_file
 
 MS = 10**6
@@ -51,7 +49,7 @@ def json_state(names, position):
 
 
 def facts_above_notes(source):
-    return [finding.fact for finding in source.findings if finding.severity != "note"]
+    return [fact_of(finding) for finding in source.findings if finding.severity != "note"]
 
 
 @pytest.mark.parametrize(("late", "severity"), [(2, "note"), (300, "warning")])
@@ -61,10 +59,13 @@ def test_backward_stamps_are_reported_with_the_message(tmp_path, late, severity,
     times[350] -= late
     path = write(tmp_path / "log.mcap", [(0, time * MS, cdr(float(i), 0.0)) for i, time in enumerate(times)])
     source = Mcap().columns(path, None if survey else wanted(("/a", "force")))
-    (finding,) = [finding for finding in source.findings if isinstance(finding.fact, OutOfOrder)]
+    (finding,) = [finding for finding in source.findings if finding.kind == "out_of_order"]
     assert finding.severity == severity
     back = pytest.approx((late - 1) / 1e3)
-    assert finding.fact == OutOfOrder(1, 400, back, set_back=severity == "warning", worst=350)
+    assert fact_of(finding) == (
+        "out_of_order",
+        {"count": 1, "messages": 400, "back": back, "set_back": severity == "warning", "worst": 350},
+    )
 
 
 def test_stamps_in_order_are_not_reported(tmp_path):
@@ -76,7 +77,7 @@ def test_two_channels_of_a_topic_are_reported(tmp_path):
     messages = [(i % 2, i * MS, cdr(float(i), 0.0)) for i in range(20)]
     path = write(tmp_path / "log.mcap", messages, channels=2)
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "force")))):
-        assert facts_above_notes(source) == [SeveralWriters(2)]
+        assert facts_above_notes(source) == [("several_writers", {"channels": 2})]
     path = write(tmp_path / "log.mcap", [(0, time, payload) for _, time, payload in messages], channels=2)
     assert not facts_above_notes(Mcap().columns(path))
 
@@ -92,7 +93,7 @@ def test_a_message_longer_than_its_definition_is_not_read(tmp_path, every):
     source = Mcap().columns(path, wanted(("/a", "force")))
     assert source.columns["/a force"].values.tolist() == [float(i) for i in range(30) if i % every]
     fact = facts_above_notes(source)[0]
-    assert isinstance(fact, UndecodableMessages) and (fact.count, fact.messages) == (10, 30)
+    assert fact.kind == "undecodable_messages" and (fact.numbers["count"], fact.numbers["messages"]) == (10, 30)
 
 
 def test_up_to_three_bytes_of_padding_are_ignored(tmp_path):
@@ -144,7 +145,15 @@ def test_a_file_appended_to_a_log_is_reported_and_not_as_a_false_summary(tmp_pat
     size, after = first.stat().st_size, second.stat().st_size
     first.write_bytes(first.read_bytes() + second.read_bytes())
     (fact,) = facts_above_notes(Mcap().columns(first))
-    assert fact == DamagedAt(size, "the log ends here: was another file appended?", LostBytes(after))
+    assert fact == (
+        "damaged_at",
+        {
+            "byte": size,
+            "reason": "the log ends here: was another file appended?",
+            "lost": {"size": after, "is_chunk": False, "messages": None, "time": None},
+            "read_before": None,
+        },
+    )
 
 
 def test_a_recovered_file_has_the_profile_of_its_source(tmp_path):

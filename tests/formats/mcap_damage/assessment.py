@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from cdtool.errors import CdtoolError
-from cdtool.findings.containers import Unverified
-from cdtool.findings.messages import UndecodableMessages
 from tests.formats.mcap_damage.bombs import without_bomb
 from tests.formats.mcap_damage.readers import READERS, Key, Reading
 from tests.formats.mcap_damage.truth import Case, Message, Truth
@@ -71,7 +69,7 @@ def faults_in(truth: Truth, reading: Reading, key: Callable[[Message], Key]) -> 
         1e-9 + 1e-15 * max((abs(seconds) for _, seconds in reading.messages), default=0.0) + 1e-15 * abs(reading.origin)
     )
     wrong = [message for message in reading.messages if not _remove(left, *message, near)]
-    if wrong and (truth.checked or not reading.has(Unverified)):
+    if wrong and (truth.checked or not reading.has("unverified")):
         yield f"{len(wrong)} values that the file does not contain, the first {wrong[0]}"
     read = _by_key_of(reading)
     gone = [message for message in required if not _remove(read, key(message), message.time / 1e9, near)]
@@ -82,7 +80,7 @@ def faults_in(truth: Truth, reading: Reading, key: Callable[[Message], Key]) -> 
         yield f"only {count} of {len(mostly_required)} messages of a cut chunk were read"
     read = _by_key_of(reading)
     missing = [message for message in written if not _remove(read, key(message), message.time / 1e9, near)]
-    is_reported = reading.lossy or reading.has(UndecodableMessages)
+    is_reported = reading.lossy or reading.has("undecodable_messages")
     if missing and not is_reported and not truth.undetectable:
         yield f"{len(missing)} messages are missing without a finding, the first at {missing[0].time} ns"
     if truth.loss is True and not is_reported and (reading.topics is None or not truth.skippable):
@@ -90,7 +88,7 @@ def faults_in(truth: Truth, reading: Reading, key: Callable[[Message], Key]) -> 
     if truth.loss is False and reading.lossy:
         losses = [finding.message for finding in reading.findings if finding.severity == "loss"]
         yield f"a loss is reported although there is no loss: {losses[0]}"
-    if truth.unverified and reading.messages and not reading.has(Unverified):
+    if truth.unverified and reading.messages and not reading.has("unverified"):
         yield "messages without a checksum are not reported as unverified"
     yield from _texts(str(finding) for finding in reading.findings)
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
-from cdtool.findings import Fact, Finding
+from cdtool.findings import Finding
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.log import Log
 from cdtool.formats.source import Source
 from tests.formats.mcap_damage.truth import FIELDS, Message
 
@@ -33,9 +33,9 @@ class Reading:
     topics: tuple[str, ...] | None = None
     origin: float = 0.0
 
-    def has(self, *kinds: type[Fact]) -> bool:
+    def has(self, *kinds: str) -> bool:
         """Return whether a finding is of one of the kinds."""
-        return any(isinstance(finding.fact, kinds) for finding in self.findings)
+        return any(finding.kind in kinds for finding in self.findings)
 
     @property
     def lossy(self) -> bool:
@@ -70,7 +70,7 @@ def wanted(path: Path, topics: tuple[str, ...]) -> Reading:
 
 def streamed(path: Path, topics: tuple[str, ...]) -> Reading:
     """Read the payloads of all messages, from the start of the file."""
-    return _refusable(lambda: _of_log(Log(path, use_index=False)))
+    return _refusable(lambda: _of_log(Log(path)))
 
 
 def indexed(path: Path, topics: tuple[str, ...]) -> Reading:
@@ -105,7 +105,7 @@ def _of_source(source: Source, topics: tuple[str, ...] | None = None) -> Reading
 
 def _of_log(log: Log, topics: tuple[str, ...] | None = None) -> Reading:
     read: list[tuple[Key, float]] = []
-    for piece in log.pieces():
+    for piece in log.blocks():
         for messages in piece:
             batch, topic = messages.batch, messages.stream.topic
             rows = zip(batch.start.tolist(), batch.length.tolist(), batch.log_time.tolist(), strict=True)

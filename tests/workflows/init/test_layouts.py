@@ -8,7 +8,6 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from cdtool.findings.channels import UnitContradicted
 from cdtool.ingest.reading import read_recording
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.init.drafting import init
@@ -66,9 +65,11 @@ def test_the_unit_of_no_drafted_channel_is_in_doubt(tmp_path, layouts):
         log = written(layout, tmp_path)
         init(log, tmp_path / "machine.toml", force=True)
         found = read_recording(log, read_machine_file(tmp_path / "machine.toml")).findings
-        doubted = [item for item in found if isinstance(item.fact, UnitContradicted)]
+        doubted = [item for item in found if item.kind == "unit_contradicted"]
         doubted = [item for item in doubted if item.severity == "loss" or item.channel == "force"]
-        assert {item.fact.advice for item in doubted} <= {"confirm"}, layout.name  # a unit that the log does not state
+        assert {item.numbers["advice"] for item in doubted} <= {"confirm"}, (
+            layout.name
+        )  # a unit that the log does not state
 
 
 def test_a_missing_channel_is_not_replaced_by_another_one_without_a_mark(tmp_path):

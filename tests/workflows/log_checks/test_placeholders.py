@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.findings.placeholders import PlaceholderInertia, PlaceholderRatio, PlaceholderScale, UncheckedLines
 from cdtool.workflows.information import info
 from cdtool.workflows.init.drafting import init
 from tests.command import cdtool
+from tests.findings.facts import fact_of
 
-KINDS = (PlaceholderInertia, PlaceholderRatio, PlaceholderScale, UncheckedLines)
+KINDS = ("placeholder_inertia", "placeholder_ratio", "placeholder_scale", "unchecked_lines")
 
 
 @pytest.fixture
@@ -37,17 +37,20 @@ def machine_file(folder, kind="linear_axis", ratio=1.0, mass=0.0, scale=1.0, coo
 
 
 def placeholders(log, machine):
-    return {type(item.fact): item.fact for item in info(log, machine=machine).findings if isinstance(item.fact, KINDS)}
+    return {item.kind: fact_of(item) for item in info(log, machine=machine).findings if item.kind in KINDS}
 
 
 def test_a_draft_has_warnings_with_the_speed_that_a_placeholder_causes(log, tmp_path):
     init(log, tmp_path / "machine.toml")
     found = placeholders(log, tmp_path / "machine.toml")
     assert set(found) == set(KINDS)
-    assert found[PlaceholderRatio].speed == pytest.approx(150.0, rel=1e-3)
-    assert found[PlaceholderScale] == PlaceholderScale("A", "N m", "A")
-    assert found[PlaceholderInertia].key == "load_mass"
-    assert "transmission_ratio" in found[UncheckedLines].keys and found[UncheckedLines].count >= 4
+    assert found["placeholder_ratio"].numbers["speed"] == pytest.approx(150.0, rel=1e-3)
+    assert found["placeholder_scale"] == ("placeholder_scale", {"raw": "A", "unit": "N m", "per": "A"})
+    assert found["placeholder_inertia"].numbers["key"] == "load_mass"
+    assert (
+        "transmission_ratio" in found["unchecked_lines"].numbers["keys"]
+        and found["unchecked_lines"].numbers["count"] >= 4
+    )
 
 
 def test_a_complete_machine_file_has_no_such_warning(log, tmp_path):
@@ -56,8 +59,8 @@ def test_a_complete_machine_file_has_no_such_warning(log, tmp_path):
 
 def test_each_placeholder_is_found_alone(log, tmp_path):
     complete = {"ratio": 0.01, "mass": 20.0, "scale": 0.05}
-    for key, value, kind in (("ratio", 1.0, PlaceholderRatio), ("mass", 0.0, PlaceholderInertia),
-                             ("scale", 1.0, PlaceholderScale)):  # fmt: skip
+    for key, value, kind in (("ratio", 1.0, "placeholder_ratio"), ("mass", 0.0, "placeholder_inertia"),
+                             ("scale", 1.0, "placeholder_scale")):  # fmt: skip
         assert set(placeholders(log, machine_file(tmp_path, **{**complete, key: value}))) == {kind}
 
 
@@ -72,7 +75,9 @@ def test_marks_are_counted_by_key_after_the_line_and_before_it(log, tmp_path):
     path.write_text(
         text.replace("load_mass = 20.0", 'load_mass = 20.0  # from the data sheet. CHECK: "with the leaf"?')
     )
-    assert placeholders(log, path) == {UncheckedLines: UncheckedLines(2, ("transmission_ratio", "load_mass"))}
+    assert placeholders(log, path) == {
+        "unchecked_lines": ("unchecked_lines", {"count": 2, "keys": ("transmission_ratio", "load_mass")})
+    }
 
 
 def test_info_shows_the_warning(log, tmp_path):

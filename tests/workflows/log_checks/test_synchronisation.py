@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import cdtool as package
-from cdtool.findings.synchronisation import ChannelShift, ShiftNotAssessable
 from cdtool.workflows.information import Info, common_latencies
 from tests.command import cdtool
+from tests.findings.facts import fact_of
 from tests.synthetic.shifted_clocks import Clocks, collisions
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
@@ -35,16 +35,16 @@ def survey(name: str) -> Info:
     return package.info(GATE / name, machine=GATE / "machine.toml")
 
 
-def shifts(info: Info) -> dict[str, ChannelShift]:
-    return {item.channel: item.fact for item in info.findings if isinstance(item.fact, ChannelShift)}
+def shifts(info: Info) -> dict[str, tuple]:
+    return {item.channel: fact_of(item) for item in info.findings if item.kind == "channel_shift"}
 
 
 def test_the_filter_of_the_simulated_speed_is_found_as_its_latency():
     """Two low-passes of a / (1 - a) sample periods each, a = exp(-2 pi 60 Hz 1 ms), and half a period: a difference."""
     keep = np.exp(-2.0 * np.pi * 60.0 * 1e-3)
     true = (2.0 * keep / (1.0 - keep) + 0.5) * 1e-3
-    found = shifts(survey("stiff/03.csv"))["speed"]
-    assert found.low <= true <= found.high and found.offset == pytest.approx(true, abs=1e-4)
+    found = shifts(survey("stiff/03.csv"))["speed"].numbers
+    assert found["low"] <= true <= found["high"] and found["offset"] == pytest.approx(true, abs=1e-4)
 
 
 def test_a_log_without_a_contact_says_nothing_about_its_load_cell():
@@ -52,15 +52,15 @@ def test_a_log_without_a_contact_says_nothing_about_its_load_cell():
 
 
 def test_what_is_not_assessable_has_a_reason():
-    facts = [item.fact for item in survey("stiff/03.csv").findings if isinstance(item.fact, ShiftNotAssessable)]
-    assert facts and all(fact.reason for fact in facts)
+    facts = [fact_of(item) for item in survey("stiff/03.csv").findings if item.kind == "shift_not_assessable"]
+    assert facts and all(fact.numbers["reason"] for fact in facts)
 
 
 def test_several_logs_have_a_common_result_with_stiff_and_soft_contacts_apart():
     logs = [survey(name) for name in ("stiff/01.mcap", "stiff/03.csv", "stiff/04.csv", "soft/03.csv", "soft/04.csv")]
-    found = {item.channel: item.fact for item in common_latencies(logs)}
-    assert isinstance(found["force"], ChannelShift) and found["force"].stiff is not None
-    assert found["speed"].events > max(shifts(log)["speed"].events for log in logs)
+    found = {item.channel: fact_of(item) for item in common_latencies(logs)}
+    assert found["force"].kind == "channel_shift" and found["force"].numbers["stiff"] is not None
+    assert found["speed"].numbers["events"] > max(shifts(log)["speed"].numbers["events"] for log in logs)
 
 
 def write(folder: Path, name: str, seed: int, offset: float) -> Path:

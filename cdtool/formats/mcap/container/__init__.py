@@ -1,1 +1,0 @@
-"""The container of the messages: records, chunks, checksums, and recovery of damaged files."""

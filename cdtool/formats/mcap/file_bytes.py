@@ -1,0 +1,96 @@
+"""Random access to the bytes of a file, by reading; of a large one at a URL, by ranges of it.
+
+If the file shrinks or the drive fails, this raises an error; with a memory-mapped file the process would crash.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from cdtool.formats.mcap.chunks import Bytes
+from cdtool.formats.mcap.records import DamageError, crc32
+from cdtool.remote.ranges import RangedBytes
+from cdtool.remote.remote_path import RemotePath
+
+_PIECE = 1 << 20
+_MOST_AT_ONCE = 1 << 30  # macOS refuses to read 2 GiB and more in one call
+
+
+class FileBytes:
+    """A file of `size` bytes that can be read at any position."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.remote = RangedBytes(str(path)) if isinstance(path, RemotePath) and path.is_read_by_ranges() else None
+        self._file = path.open("rb", buffering=0) if self.remote is None else None
+        self.size = self._file.seek(0, 2) if self._file is not None else self._ranges.size
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+    @property
+    def _ranges(self) -> RangedBytes:
+        assert self.remote is not None, "a file is open, or at a URL"
+        return self.remote
+
+    def expect(self, ranges: Iterable[tuple[int, int]]) -> None:
+        """Read these ranges of a file at a URL together, from where they are needed soon; raises OSError."""
+        if self.remote is not None:
+            self.remote.expect(ranges)
+
+    def check_unchanged(self) -> None:
+        """Raise OSError if a file at a URL was replaced since it was opened."""
+        if self.remote is not None:
+            self.remote.check_unchanged()
+
+    def read(self, at: int, length: int) -> memoryview:
+        """Return up to `length` bytes from `at`, fewer only at the file's end."""
+        return self.array(at, length).data
+
+    def array(self, at: int, length: int) -> Bytes:
+        """Return the same as a new array."""
+        target = np.empty(max(0, min(length, self.size - at)), np.uint8)
+        self.read_into(at, target)
+        return target
+
+    def read_into(self, at: int, target: Bytes) -> None:
+        """Fill `target` with the bytes from `at`; raises DamageError if the file ends before."""
+        view, filled = target.data, 0
+        while filled < len(view):
+            count = self._fill(view[filled : filled + _MOST_AT_ONCE], at + filled)
+            if not count:
+                raise DamageError("the file became shorter while it was read")
+            filled += count
+
+    def _fill(self, view: memoryview, at: int) -> int:
+        if self._file is None:
+            content = self._ranges.read(at, len(view))
+            view[: len(content)] = content
+            return len(content)
+        self._file.seek(at)
+        return self._file.readinto(view)
+
+    def crc(self, at: int, end: int) -> int:
+        """Return the CRC-32 of the bytes from `at` to before `end`."""
+        crc, target = 0, np.empty(_PIECE, np.uint8)
+        while at < end:
+            piece = target[: min(_PIECE, end - at)]
+            self.read_into(at, piece)
+            crc = crc32(piece, crc)
+            at += len(piece)
+        return crc
