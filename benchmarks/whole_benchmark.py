@@ -32,14 +32,14 @@ COUNTS = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
 COPIES = 10
 SEED = 1
 ROUNDS = 5
-# 12 ms where the bare script takes 3.3 ms.
-AT_MOST_OF_BARE = 3.6
+# Logs are read by pandas: 1.35 times the 12 ms, where the bare script takes 3.3 ms, that compiled readers took.
+AT_MOST_OF_BARE = 4.9
 AT_LEAST_FASTER = 1.8
 AT_MOST_MIB, AT_MOST_MORE_MIB = 285.0, 250.0
-# The guard fails at twice the limit.
+# The guard, with few recordings in one process, is at 8 to 10: it fails where a recording costs a half more.
 GUARD_COUNTS = {"free": 11, "holdout": 17, "stiff": 17, "soft": 16}
 GUARD_ROUNDS = 3
-GUARD_AT_MOST = 7.3
+GUARD_AT_MOST = 14.0
 
 _RUN = "import json, sys; from whole_benchmark import run; print(json.dumps(run(sys.argv[1], int(sys.argv[2]))))"
 _BARE = "import sys; from whole_benchmark import bare; print(bare(sys.argv[1]))"
