@@ -208,7 +208,7 @@ def test_a_total_above_a_line_that_is_cut_off_is_no_sample(log):
     assert [finding.kind for finding in source.findings] == ["last_line_cut", "footer_skipped"]
 
 
-def test_a_total_is_said_in_a_table_of_many_blocks(log):
+def test_a_total_in_a_table_of_many_blocks_is_a_finding(log):
     rows = "".join(f"{i},{i % 7}.5,{i % 3}\n" for i in range(400_000))
     sums = sum(i % 7 + 0.5 for i in range(400_000)), sum(i % 3 for i in range(400_000))
     source = Csv().columns(log(f"t,a,b\n{rows},{sums[0]},{sums[1]}\n"))
