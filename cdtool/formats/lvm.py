@@ -323,7 +323,7 @@ def _counted(rows: int, samples: int, step: float, start: float, numbers: npt.ND
 
 
 def _derived(rows: int, samples: int, longer: float, start: float, stamps: npt.NDArray[Any]) -> FloatArray:
-    """Return the times of rows from the stamps of another channel, whose step is by `longer` [s] shorter."""
+    """Return the times of rows from the stamps of another channel, whose step is shorter by `longer` [s]."""
     row = np.arange(len(stamps)) % rows
     return np.where(row < samples, stamps + row * longer + start, np.nan)
 
