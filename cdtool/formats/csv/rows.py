@@ -1,7 +1,8 @@
 """Read the rows of a text table block by block: pandas reads the blocks of plain rows, Python the lines of the others.
 
-pandas fills rows that are too short with NaN, and drops the cells of rows that are too long: a block is plain only if
-each line has as many separators as a row. Any other block is halved down to a few hundred lines.
+pandas fills rows that are too short with NaN, and drops the cells of rows that are too long. A block is plain if it has
+as many separators as its rows need, and no NaN in its last column; or else if each line has as many as a row. Any other
+block is halved down to a few hundred lines.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 from warnings import catch_warnings
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from cdtool.findings import Finding
@@ -112,12 +114,10 @@ class RowReader:
             return None
         if separator == b" ":  # one between two cells
             block = re.sub(rb"^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block), flags=re.MULTILINE)
-        data = np.frombuffer(block, dtype=np.uint8)
-        ends = np.flatnonzero(data == ord("\n")) if ended else [*np.flatnonzero(data == ord("\n")), len(block)]
-        widths = 1 + np.diff(np.searchsorted(np.flatnonzero(data == separator[0]), ends), prepend=0)
-        count, width = len(widths), dialect.width
-        whole = widths == width
-        if not all(dialect.may_end_after(cells) for cells in np.unique(widths[~whole])) or not (ended or whole[-1]):
+        data, width = np.frombuffer(block, dtype=np.uint8), dialect.width
+        count = int(np.count_nonzero(data == ord("\n"))) + (not ended)
+        seem_full = np.count_nonzero(data == separator[0]) == count * (width - 1)
+        if not seem_full and not self._have_cells(data, ended):
             return None
         if dialect.trailing and sum(block.count(separator + end) for end in (b"\n", b"\r\n")) < count:
             return None
@@ -129,11 +129,24 @@ class RowReader:
         whole, unread = self._whole(texts)
         if unread or {*map(len, numbers.values()), *map(len, texts.values())} != {count}:  # line ends are mixed
             return None
-        if width == 1 and (not numbers or np.isnan(numbers[0]).any()):  # a blank line is no row
+        if np.isnan(numbers.get(width - 1, np.nan)).any() and (
+            width == 1  # a blank line is no row
+            or (seem_full and not self._have_cells(data, ended))
+        ):
             return None
         self.lines.line += count
         self.lines.rows += count
         return Rows(self.lines.rows - count, count, self.lines.line - 1, numbers, whole)
+
+    def _have_cells(self, data: npt.NDArray[np.uint8], ended: bool) -> bool:
+        """Return whether each line has as many cells as a row."""
+        ends = np.flatnonzero(data == ord("\n")) if ended else [*np.flatnonzero(data == ord("\n")), len(data)]
+        separators = np.flatnonzero(data == ord(self.dialect.separator))
+        cells = 1 + np.diff(np.searchsorted(separators, ends), prepend=0)
+        short = cells[cells != self.dialect.width]
+        return all(self.dialect.may_end_after(each) for each in np.unique(short)) and (
+            ended or cells[-1] == self.dialect.width
+        )
 
     def _parsed(self, block: bytes) -> tuple[dict[int, FloatArray], dict[int, list[str]]]:
         """Return the columns of numbers and the texts of the others, as parsed by pandas.

@@ -155,15 +155,15 @@ def table_pieces(
     reader = RowReader(dialect, replace(requested, categories=categories), survey=wanted is None)
     stamped = StampColumns(dialect, requested)
     rounded: Counter[str] = Counter()
-    above: dict[int, Sum] = {}
+    above, before = dict[int, Sum](), dict[int, FloatArray]()
     for rows in reader.pieces():
-        total = wanted is None and is_total(rows, above)
-        above = {} if wanted is not None else {i: added(above.get(i), values) for i, values in rows.numbers.items()}
+        above |= {i: added(above.get(i), values) for i, values in before.items()}
+        before = rows.numbers if wanted is None else {}
         numbers = {names[column]: values for column, values in rows.numbers.items()}
         rounded.update({key: rounded_integers(values) for key, values in numbers.items()})
         yield Piece("", None, numbers | stamped.seconds(rows), rows.count)
     findings = reader.findings
-    if total:
+    if wanted is None and is_total(rows, above):
         findings.append(Finding("total_row", "", {"line": rows.last_line}))
     findings += stamped.findings()
     remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
