@@ -19,7 +19,6 @@ from cdtool.formats.source import Source, TopicDetails
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.topic import Topic, wanted_columns, wanted_topics
-from cdtool.messages.topic_columns import TopicColumns
 from cdtool.messages.topic_survey import TopicSurvey
 
 IsWanted = Callable[[str], bool]
@@ -87,7 +86,7 @@ class TopicFormat(ABC):
         if wanted is None:
             return join_pieces(self.pieces(path), sort=True)
         log = self.log(path, {source.topic for source in wanted.sources}.__contains__)
-        topics = wanted_topics(path, wanted, TopicColumns, log.exact)
+        topics = wanted_topics(path, wanted, log.exact)
         for stream, batch, *_ in chain.from_iterable(log.blocks()):
             topics[stream.topic].add(stream, batch)
         return log.mapped_source(wanted, topics)

@@ -1,12 +1,12 @@
-"""The fields of topics that a channel map names: their values batch by batch, and the findings on them."""
+"""The fields of topics that a channel map names: collected batch by batch into columns, with the findings on them."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
+from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch, FieldValues
 from cdtool.messages.decoders import Decoders
@@ -75,7 +76,7 @@ class WantedField:
 
 
 class Topic:
-    """The wanted fields of a topic, batch by batch.
+    """The wanted fields of a topic, in memory.
 
     `texts` are the fields in the field language; whole arrays with named elements are in the order of `joints`. `exact`
     is the field with the time [s] of each message, if the log's time stamps are rounded.
@@ -91,18 +92,17 @@ class Topic:
         self.decoders, self.orders = Decoders(), StampOrders(topic)
         self.first_stamp: int | None = None  # [ns], by the chosen clock
         self.origin = 0  # [ns], the zero of its columns' times
+        self._batches: list[BatchValues] = []
+        self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None  # of fields that every message has
 
-    def decode(self, stream: Stream, batch: Batch) -> BatchValues | None:
-        """Return stamps and field values of a batch's decoded messages; None if its channel cannot be decoded.
-
-        Raises RecordingError if a field or the header's time stamp is missing.
-        """
+    def add(self, stream: Stream, batch: Batch) -> None:
+        """Decode a batch and keep its values; raises RecordingError if a field or the header's stamp is missing."""
         by_header = self.clock == "header"
         decoded = self.decoders.attempt(
             stream, batch, lambda decoder: decoder.decode(batch, self.wanted, self.joints, by_header)
         )
         if decoded is None:
-            return None
+            return
         whole = self.decoders.keep(decoded)
         self._check(decoded, whole)
         stamps: Stamps = batch.log_time if self.clock == "log" else batch.publish_time
@@ -119,9 +119,9 @@ class Topic:
                 first = batch.rows(slice(_FIRST))
                 contents = self.decoders.attempt(stream, first, lambda decoder, first=first: decoder.contents(first))  # type: ignore[misc]
                 each.names = sorted({name for content in contents or () for name in element_names(content)})
-        return BatchValues(stamps, values)
+        self._batches.append(BatchValues(stamps, values))
 
-    def rows_of(self, decoded: BatchValues, text: str) -> FieldRows:
+    def _rows_of(self, decoded: BatchValues, text: str) -> FieldRows:
         """Return one field of the messages that name its joints."""
         (values, other), stamps = decoded.values[text], decoded.stamps
         exact = decoded.values[self.exact][0] if self.exact else None
@@ -151,7 +151,28 @@ class Topic:
             raise min(faults, key=lambda fault: fault[0])[1]
 
     def column(self, text: str) -> tuple[Column, list[Finding]]:
-        """Return a field as a column without rows, and its findings; raises RecordingError."""
+        """Return a field as a column in the order of its times, and its findings; raises RecordingError."""
+        findings = self._findings(text)
+        each, name = self.fields[text], f"{self.topic} {text}"
+        parts = [self._rows_of(batch, text) for batch in self._batches]
+        for batch in self._batches if text != self.exact else ():
+            del batch.values[text]  # so that at most one column exists twice in memory
+        shape = (each.width or 1,) if each.widths else ()
+        tables = (np.full((len(stamps), *shape), np.nan) if part is None else part for stamps, _, part in parts)
+        values = np.concatenate([np.empty((0, *shape)), *tables])
+        is_whole = len(values) == sum(len(batch.stamps) for batch in self._batches)
+        clock = self._clock if is_whole else None
+        if clock is None:
+            exact = np.concatenate([part.exact for part in parts if part.exact is not None]) if self.exact else None
+            clock = sort_times(np.concatenate([part.stamps for part in parts]), self.origin, exact)
+        if is_whole:
+            self._clock = clock
+        time, order = clock
+        findings += rounding_finding(name, rounded_integers(values))
+        return Column(name, values if order is None else values[order], time), findings
+
+    def _findings(self, text: str) -> list[Finding]:
+        """Return the findings on a field; raises RecordingError."""
         each, name = self.fields[text], f"{self.topic} {text}"
         findings = []
         if each.elsewhere:
@@ -167,20 +188,16 @@ class Topic:
             )
         if each.widths[0]:
             findings.append(Finding("empty_arrays", name, {"count": each.widths[0]}))
-        shape = (0, each.width or 1) if each.widths else (0,)
-        return Column(name, np.empty(shape), np.empty(0)), findings
+        return findings
 
 
-_Topic = TypeVar("_Topic", bound=Topic)
-
-
-def wanted_topics(path: Path, wanted: ChannelMap, make: Callable[..., _Topic], exact: str = "") -> dict[str, _Topic]:
-    """Return the topics that a map names, each with its fields; `make` has the parameters of Topic."""
+def wanted_topics(path: Path, wanted: ChannelMap, exact: str = "") -> dict[str, Topic]:
+    """Return the topics that a map names, each with its fields."""
     texts: dict[str, dict[str, None]] = {}
     for source in wanted.sources:
         texts.setdefault(source.topic, {})[source.field] = None
     clock, joints = wanted.time.clock, wanted.joint_names
-    return {name: make(path, name, fields, clock, joints, exact) for name, fields in texts.items()}
+    return {name: Topic(path, name, fields, clock, joints, exact) for name, fields in texts.items()}
 
 
 def wanted_columns(
