@@ -104,12 +104,10 @@ class Decoder(ABC):
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> DecodedBatch:
         """Decode the wanted fields of all messages; whole arrays with named elements are in the order of `joints`."""
-        groups, reasons = self.groups(batch)
+        groups, reasons = self.wanted_groups(batch, wanted, joints, stamps)
         n = len(batch)
         fields = tuple(
-            absent_field(n, fault)
-            if (fault := self.absent(each))
-            else field_values(n, self.of_field(groups, each, joints), each, joints)
+            absent_field(n, fault) if (fault := self.absent(each)) else field_values(n, groups, each, joints)
             for each in wanted
         )
         status = np.zeros(n, np.uint8)
@@ -117,9 +115,15 @@ class Decoder(ABC):
         reason = reasons[min(reasons)] if reasons else ""
         return DecodedBatch(fields, status, reason, *(_header_times(n, groups) if stamps else ()))
 
-    def of_field(self, groups: list[Group], field: Field, joints: Sequence[str]) -> list[Group]:  # noqa: ARG002
-        """Return groups that are faster to read for one field."""
-        return groups
+    def wanted_groups(
+        self,
+        batch: Batch,
+        wanted: Sequence[Field],  # noqa: ARG002
+        joints: Sequence[str],  # noqa: ARG002
+        stamps: bool,  # noqa: ARG002
+    ) -> tuple[list[Group], dict[int, str]]:
+        """Return the groups of `groups`, or some that hold only what is wanted of the messages."""
+        return self.groups(batch)
 
 
 def absent_field(n: int, fault: FieldMissingError) -> FieldValues:

@@ -9,20 +9,21 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.decoded_batch import MOST_FIELDS, Decoder, Group, IntArray, UndecodableError
+from cdtool.messages.decoded_batch import MOST_FIELDS, Decoder, Group, UndecodableError
 from cdtool.messages.fields import (
+    STAMPS,
     Field,
     FieldMissingError,
     element_names,
     is_element_number,
     joint_order,
     numeric_fields,
+    parse_field,
 )
 from cdtool.recording import FloatArray
 
@@ -36,7 +37,6 @@ class JsonDecoder(Decoder):
     """Decoder of JSON."""
 
     _fields: dict[str, None] = field(default_factory=dict)
-    _rows: IntArray = field(default_factory=lambda: np.empty(0, np.int64))  # of the objects of the last batch
 
     def fields(self, batch: Batch) -> list[str]:
         """Return every numeric field of the messages so far, in order of first appearance."""
@@ -49,13 +49,17 @@ class JsonDecoder(Decoder):
     def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
         """Return the messages of a batch that are objects, and the reasons why the others are not, by row."""
         messages, reasons = _load(batch)
-        self._rows = rows = np.array(list(messages), np.int64)
+        rows = np.array(list(messages), np.int64)
         return [_Single(rows[k : k + 1], message) for k, message in enumerate(messages.values())], reasons
 
-    def of_field(self, groups: list[Group], field: Field, joints: Sequence[str]) -> list[Group]:
-        """Return all messages as one group, if no message needs the rules of the field language."""
-        table = _together([group.content for group in groups], field, joints)
-        return groups if table is None else [_Together(self._rows, None, table)]
+    def wanted_groups(
+        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool
+    ) -> tuple[list[Group], dict[int, str]]:
+        """Return all messages as one group, if none needs the rules of the field language."""
+        try:
+            return [_alike(batch, wanted, joints, stamps)], {}
+        except Exception:  # a message that cannot be read, or is not like the first: the field language says which
+            return self.groups(batch)
 
 
 class _Single(Group):
@@ -72,16 +76,17 @@ class _Single(Group):
 
 
 @dataclass(eq=False)
-class _Together(Group):
-    """All messages, for one field, whose numbers are in a `table` (rows, k)."""
+class _Alike(Group):
+    """Messages with the same names and sizes at the wanted fields, whose numbers are in a `table` (rows, k)."""
 
+    columns: dict[Field, list[float]]
     table: FloatArray
 
-    def find(self, field: Field, joints: Sequence[str]) -> float | list[float]:  # noqa: ARG002  it is in the table
-        return list(range(self.table.shape[1])) if field.whole else 0
+    def find(self, field: Field, joints: Sequence[str]) -> float | list[float]:  # noqa: ARG002  in their order
+        return self.columns[field] if field.whole else self.columns[field][0]
 
-    def read(self, found: Sequence[float]) -> FloatArray:  # noqa: ARG002  all of it
-        return self.table
+    def read(self, found: Sequence[float]) -> FloatArray:
+        return self.table[:, [int(column) for column in found]]
 
 
 def _load(batch: Batch) -> tuple[Messages, dict[int, str]]:
@@ -104,37 +109,77 @@ def _load(batch: Batch) -> tuple[Messages, dict[int, str]]:
     return messages, reasons
 
 
-def _together(messages: Sequence[Any], field: Field, joints: Sequence[str]) -> FloatArray | None:
-    """Return the numbers (n, k) of a field; None if a message needs the rules of the field language."""
-    values = messages
-    order = None
-    try:
+class _NumbersOf:
+    """The numbers of one field, message after message, at the place where the first message has them.
+
+    `add` raises LookupError, TypeError or ValueError for a message that has no such place, or other names of elements.
+    """
+
+    def __init__(self, field: Field, first: Any, joints: Sequence[str]) -> None:
+        self.keys: list[str | int] = []
+        self.width: int | None = None  # of a whole array
+        self.order: list[int] | None = None
+        self.parent: int | None = None  # the number of keys to the object with the names of the elements
+        self.names: Any = None
+        self.values: list[Any] = []
+        value = first
         for name, index in field.steps:
-            parents, values = values, [value[name] for value in values]
-            if index is None:
-                continue
-            if set(map(type, values)) != {list}:
-                return None
+            parent, value = value, value[name]
+            if index is not None and (joints or not is_element_number(index)):
+                self.parent, self.names = len(self.keys), parent.get("name")
+            self.keys.append(name)
             if index == ":":
-                if joints:
-                    order = joint_order(len(values[0]), _common_names(parents), joints)
+                self.width = len(value)
+                self.order = joint_order(len(value), element_names(parent), joints)
                 break
-            element = int(index) if is_element_number(index) else _common_names(parents).index(index)
-            values = [value[element] for value in values]
-        numbers = list(chain.from_iterable(values)) if field.whole else values
-        if field.whole and set(map(len, values)) != {len(values[0])}:
-            return None
-        if not set(map(type, numbers)) <= {int, float, bool}:
-            return None
-        table = np.array(numbers, dtype=np.float64).reshape(len(values), -1)
-    except (LookupError, TypeError, ValueError, OverflowError, FieldMissingError):
-        return None
-    return table if order is None else table[:, order]
+            if index is not None:
+                self.keys.append(int(index) if is_element_number(index) else element_names(parent).index(index))
+                value = value[self.keys[-1]]
+
+    def add(self, message: Any) -> None:
+        value = message
+        for number, key in enumerate(self.keys):
+            if number == self.parent and value.get("name") != self.names:
+                raise ValueError
+            value = value[key]
+        if self.width is None:
+            self.values.append(value)
+        elif len(value) == self.width:
+            self.values += value
+        else:
+            raise ValueError
+
+    def table(self, rows: int) -> FloatArray:
+        """Return the numbers (rows, k)."""
+        if not set(map(type, self.values)) <= {int, float, bool}:
+            raise TypeError
+        table = np.array(self.values, np.float64).reshape(rows, -1)
+        return table if self.order is None else table[:, self.order]
 
 
-def _common_names(parents: Sequence[Any]) -> list[str]:
-    """Return the names of the elements, if all messages have the same ones; raises ValueError."""
-    first = parents[0].get("name")
-    if any(parent.get("name") != first for parent in parents):
+def _alike(batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool) -> _Alike:
+    """Read the wanted numbers message by message, so that no more than one message is held as objects.
+
+    Raises what a message raises that is not like the first one.
+    """
+    content, decode = batch.data.data, json.JSONDecoder().raw_decode
+    if int(batch.length.max(initial=0)) > _LONGEST:
         raise ValueError
-    return element_names(parents[0])
+    first, _ = decode(str(batch.payload(0), "utf-8"))
+    names = next(pair for pair in STAMPS if {*pair} <= {*first["header"]["stamp"]}) if stamps else ()
+    stamp = [parse_field(f"header.stamp.{name}", "") for name in names]
+    numbers = [_NumbersOf(field, first, joints) for field in (*wanted, *stamp)]
+    adding = [each.add for each in numbers]
+    for start, stop in zip(batch.start.tolist(), (batch.start + batch.length).tolist(), strict=True):
+        text = str(content[start:stop], "utf-8")
+        message, end = decode(text)
+        if end < len(text) and text[end:].strip(" \t\r\n"):
+            raise ValueError
+        for add in adding:
+            add(message)
+    tables = [each.table(len(batch)) for each in numbers]
+    ends = np.cumsum([table.shape[1] for table in tables]).tolist()
+    columns: list[list[float]] = [[*range(end - table.shape[1], end)] for end, table in zip(ends, tables, strict=True)]
+    times = {name: found[0] for name, found in zip(names, columns[len(wanted) :], strict=True)}
+    of_field = dict(zip(wanted, columns, strict=False))
+    return _Alike(np.arange(len(batch)), {"header": {"stamp": times}}, of_field, np.hstack(tables))

@@ -77,6 +77,34 @@ def test_random_objects_decode_as_the_field_language_defines(objects, order):
     }
 
 
+ALIKE = st.fixed_dictionaries(
+    {
+        "header": st.fixed_dictionaries(
+            {"stamp": st.fixed_dictionaries({"sec": st.integers(0, 2**31), "nsec": st.integers(0, 10**9 - 1)})}
+        ),
+        "a": NUMBERS,
+        "b": st.fixed_dictionaries({"c": NUMBERS, "q": st.lists(NUMBERS, min_size=2, max_size=2), "name": ORDERS}),
+        "name": st.sampled_from([["x", "y"]] * 9 + [["y", "x"], ["x"], "x"]),
+        "q": st.lists(st.floats(), min_size=2, max_size=2),
+    }
+)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(ALIKE, min_size=1, max_size=6), st.one_of(st.none(), OBJECTS, TEXTS), st.integers(0, 6))
+def test_each_field_of_messages_alike_and_of_one_that_is_not(alike, other, place):
+    if other is not None:
+        alike.insert(place, other)
+    payloads = [json.dumps(value).encode() + b" \n" * (place > 3) for value in alike]
+    for field in ("a", "b.c", "q[:]", "q[1]", "q[x]", "b.q[:]", "name[0]"):
+        for joints in ((), JOINTS):
+            assert_equals_python(payloads, (field,), joints)
+    decoded = new_decoder().decode(batch_of(payloads), fields_of("q[0]"), stamps=True)
+    expected = [header_stamp(value) for value in alike]
+    found = zip(decoded.stamps.tolist(), decoded.has_stamp, strict=True)
+    assert [stamp if has else None for stamp, has in found] == expected
+
+
 @settings(max_examples=300, deadline=None)
 @given(st.text(alphabet='{}[]",:\\0123456789.eE+-truefalsn aNIfy\x01é', max_size=30))
 @example('{"a":1}x')
