@@ -180,8 +180,11 @@ def _commands(name: str, arguments: list[str], before: str, at_most: float, is_f
     with tempfile.TemporaryDirectory() as folder:
         for number in range(-1, ROUNDS):
             for place, (python, each) in enumerate(seconds.items()):
-                cache = f"{folder}/{place}_{number if is_first else 0}"
-                took = _cpu_time([python, "-m", "cdtool", *arguments], {**os.environ, "NUMBA_CACHE_DIR": cache})
+                kernels = f"{folder}/{place}_{number if is_first else 0}"
+                # Modules are compiled before, as after an installation.
+                caches = {"NUMBA_CACHE_DIR": kernels, "PYTHONPYCACHEPREFIX": f"{folder}/{place}_bytecode"}
+                environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", **caches}
+                took = _cpu_time([python, "-m", "cdtool", *arguments], environment)
                 if number >= 0:
                     each.append(took)
     shown = f"{name}: CPU time, {Spread.of(seconds[sys.executable])} s, over that before"
