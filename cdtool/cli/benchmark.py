@@ -23,7 +23,6 @@ from cdtool.cli.options import (
     listed,
 )
 from cdtool.cli.place import Place, location
-from cdtool.cli.protocol import file_of_protocol, show_written
 from cdtool.cli.summary_table import finish
 from cdtool.cli.written_reports import show_results, write_reports
 from cdtool.errors import UsageError
@@ -99,10 +98,11 @@ def benchmark(
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
     from cdtool.evaluation.results_file import to_json
-    from cdtool.report.outputs import check_outputs, write_outputs
-    from cdtool.report.protocol.names import protocol_names
+    from cdtool.report.model import SECTIONS as REPORT_SECTIONS
+    from cdtool.report.outputs import check_outputs
     from cdtool.report.writers.base import Report
     from cdtool.workflows.benchmark.benchmark import benchmark as run
+    from cdtool.workflows.benchmark.benchmark_file import SECTIONS
     from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.store.use import StoreUse
 
@@ -113,10 +113,9 @@ def benchmark(
     if dry_run:
         _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
         return
-    documents, targets = protocol_names(output or [], protocol is not None)
-    protocol_file = file_of_protocol(file, protocol, documents)
-    check_outputs(targets, force=force)
-    check_outputs(documents, force=force, subject="protocol")
+    documents = SECTIONS.load("protocol")(file, protocol, output or [], force)
+    check_outputs(documents.reports, force=force)
+    documents.check()
     with progress("benchmark", quiet=quiet) as advance:
         done = run(
             file,
@@ -126,30 +125,22 @@ def benchmark(
             store=use,
             progress=advance,
         )
-    made, evaluated = None, done.evaluated
+    evaluated: Evaluated = done.evaluated
     try:
-        if protocol_file is not None:
-            from cdtool.report.protocol.document import ProtocolReport, protocol_statement
-            from cdtool.workflows.protocol.making import make_protocol
-
-            command = _command(file, protocol, output or [], detectors, false_alarm_budget)
-            made = make_protocol(protocol_file, done, command)
-            evaluated = evaluated.with_protocol(*protocol_statement(made))
-            inputs = (*done.inputs, protocol_file.path)
-            write_outputs(ProtocolReport(made), documents, force=force, inputs=inputs, subject="protocol")
+        command = _command(file, protocol, output or [], detectors, false_alarm_budget)
+        evaluated, lines = documents.write(done, command)
     finally:  # a protocol that cannot be made does not cost the reports
         report = Report(evaluated, done.traces)
-        written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
+        written = write_reports(report, documents.reports, force=force, quiet=quiet, inputs=done.inputs)
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
         typer.echo(to_json(evaluated.results), nl=False)
     else:
         show_results(evaluated, written, quiet=quiet, more=_stored(done.stored))
-        if not quiet:
-            _show_agreement(evaluated)
-        if made is not None:
-            show_written(made, documents)
-        elif done.results.forces and not quiet:
+        injected = [] if quiet else REPORT_SECTIONS.load("injected").lines(evaluated)
+        for line in [*injected, *lines]:
+            typer.echo(line)
+        if not lines and done.results.forces and not quiet:
             typer.echo("next, for a test protocol of these forces:")
             typer.echo(f"  cdtool protocol init {shlex.quote(plain(file))} -o protocol.toml")
     finish(evaluated)
@@ -171,23 +162,6 @@ def _stored(outcomes: StoreReport | None) -> list[str]:
     if outcomes is None:
         return []
     return [f"store: {counted(outcomes.computed, 'recording')} computed, {outcomes.reused} as stored"]
-
-
-def _show_agreement(evaluated: Evaluated) -> None:
-    """Print the latencies of injected contacts that are compared with real ones, and those that are a range."""
-    from cdtool.evaluation.agreement import agreements
-    from cdtool.report.tables.injected import median_range, milliseconds
-
-    shown = [item for item in agreements(evaluated) if item.real_group or item.is_range]
-    for item in shown:
-        line = f"{item.detector}: {plain(item.injected_group)} {median_range(item)}"
-        if item.real_group:
-            line += f", real ({plain(item.real_group)}) {milliseconds(item.real_ms)}"
-            typer.echo(f"{line} ms, n = {item.injected_count} and {item.real_count}")
-        else:
-            typer.echo(f"{line} ms, n = {item.injected_count}")
-    for assumed in dict.fromkeys(text for item in shown for text in item.assumed):
-        typer.echo(f"bracket: {assumed}")
 
 
 def _show_dry_run(

@@ -1,4 +1,4 @@
-"""`cdtool protocol init|check|write`, and what `cdtool benchmark` shows of a protocol."""
+"""`cdtool protocol init|check|write`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from cdtool.evaluation.protocol.protocol import Protocol
     from cdtool.workflows.protocol.checking import CheckedProtocol
-    from cdtool.workflows.protocol.protocol_file import ProtocolFile
 
 protocol = typer.Typer(
     help="Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies.",
@@ -150,28 +149,10 @@ def _show_checked(checked: CheckedProtocol) -> None:
     typer.echo("  " + " ".join([*command, "-o protocol.pdf"]))
 
 
-def file_of_protocol(benchmark: Path, given: Path | None, targets: Sequence[Path]) -> ProtocolFile | None:
-    """Return the protocol file for the targets that are protocols; None without any.
-
-    Raises UsageError for a protocol without a file, or a file without a protocol to write.
-    """
-    from cdtool.workflows.protocol.protocol_file import has_protocol, read_protocol_file
-
-    if not targets:
-        if given is not None:
-            raise UsageError("-p: no output is the protocol", "add -o protocol.pdf or -o protocol.html")
-        return None
-    if given is None and not has_protocol(benchmark):
-        raise UsageError(
-            f"--output is {plain(targets[0])}, and {plain(benchmark)} has no [protocol]",
-            f"draft one, cdtool protocol init {_quoted(benchmark)} -o protocol.toml, then -p protocol.toml",
-        )
-    return read_protocol_file(benchmark if given is None else given)
-
-
 def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
     """Print the verdict of a protocol, the first of its reasons, its files, and the next step."""
     from cdtool.report.protocol.document import protocol_statement
+    from cdtool.workflows.protocol.of_benchmark import written_lines
 
     outcome, headline, *sentences = protocol_statement(made)
     say(headline, tone={"pass": "good", "fail": "bad"}.get(outcome, "unknown"))
@@ -179,17 +160,8 @@ def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
         say(f"- {sentence}", indent="  ")
     if len(sentences) > _SHOWN:
         typer.echo(f"  and {len(sentences) - _SHOWN} more, all in the protocol")
-    show_written(made, written)
-
-
-def show_written(made: Protocol, written: Sequence[Path]) -> None:
-    """Print the files of a protocol, and the next step."""
-    for path in written:
-        typer.echo(f"written: {plain(path)}")
-    if made.verdict.outcome == "incomplete":
-        typer.echo("next: settle what is incomplete, and write the protocol again")
-    else:
-        typer.echo("next: check entries, curves and limits against the standard, print and sign")
+    for line in written_lines(made, written):
+        typer.echo(line)
 
 
 def _plain(value: object) -> object:

@@ -12,6 +12,7 @@ from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import ContactResult, Results, onset_words
 from cdtool.evaluation.rows import picked, values_of
 from cdtool.plain_text import counted, shorten
+from cdtool.registry import Registry
 from cdtool.report.few_contacts import explained
 from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
@@ -19,7 +20,6 @@ from cdtool.report.table import Log, Table
 from cdtool.report.tables import forces, recordings
 from cdtool.report.tables.attention import attention_table, failed_recordings
 from cdtool.report.tables.conditions import conditions_table
-from cdtool.report.tables.injected import injected_table
 from cdtool.report.tables.provenance import provenance_tables
 from cdtool.report.tables.results import (
     calibration_table,
@@ -34,6 +34,9 @@ from cdtool.report.tables.results import (
     too_few_note,
 )
 from cdtool.report.tables.worst_cases import worst_cases_table
+
+# The tables of a command's own section of a benchmark file, and their lines on a terminal: `table` and `lines`.
+SECTIONS = Registry("section of a report", {"injected": "cdtool.report.tables.injected:InjectedSection"})
 
 NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
 UNCHECKED = "Values to be checked against the standard."
@@ -189,7 +192,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         results_table(results, summaries),
         kinds_table(results, evaluated.kinds),
         conditions_table(evaluated),
-        injected_table(evaluated),
+        *(SECTIONS.load(name).table(evaluated) for name in SECTIONS.names()),
         comparisons_table(evaluated),
         differences_table(evaluated),
         forces.groups_table(results),

@@ -16,9 +16,9 @@ from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.workflows.benchmark.benchmark import benchmark
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
-from cdtool.workflows.benchmark.with_injected import injected_logs, with_groups
+from cdtool.workflows.benchmark.with_injected import injected_logs, section_of, with_groups
 from cdtool.workflows.execution.workers import Progress, Workers
-from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, require_section
+from cdtool.workflows.injection.inject_section import INJECTED, InjectSection
 from cdtool.workflows.injection.injected_logs import InjectedCase
 from cdtool.workflows.runs import shown_path
 
@@ -94,7 +94,7 @@ def coverage(
     workers = workers or Workers()
     setup = read_benchmark_file(file)
     setup = with_detectors(setup, detectors) if detectors else setup
-    section = require_section(setup.inject, setup.path)
+    section = section_of(setup)
     units = {mark.unit for mark in section.positions}
     if len(units) > 1:
         raise ConfigurationError(

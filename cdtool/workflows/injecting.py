@@ -19,9 +19,9 @@ from cdtool.short_repr import short_repr
 from cdtool.tables import read_toml
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
-from cdtool.workflows.benchmark.with_injected import mark_as_made
+from cdtool.workflows.benchmark.with_injected import mark_as_made, section_of
 from cdtool.workflows.execution.workers import Progress, Workers
-from cdtool.workflows.injection.inject_section import InjectSection, require_section
+from cdtool.workflows.injection.inject_section import InjectSection
 from cdtool.workflows.injection.injected_logs import CONTACTS, InjectedLogs, write_injected, write_recording
 from cdtool.workflows.written_files import require_free_folder
 
@@ -94,7 +94,7 @@ def inject(
     (32, 'injected_stiff')
     """
     setup = read_benchmark_file(file)
-    section = require_section(setup.inject, setup.path)
+    section = section_of(setup)
     if file_format is not None:
         section = replace(section, file_format=file_format)
     folder = location(output)

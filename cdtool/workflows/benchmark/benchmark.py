@@ -41,7 +41,6 @@ from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisa
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
 from cdtool.workflows.benchmark.stored_learned import StoreOfRun
 from cdtool.workflows.benchmark.stored_outcomes import StoreReport
-from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import to_be_seen
@@ -129,7 +128,7 @@ def benchmark(
     """
     workers = workers or Workers(jobs)
     work = BenchmarkWork.of(file, detectors, false_alarm_budget)
-    work = replace(work, setup=with_injected(work.setup, workers, progress))
+    work = replace(work, setup=work.setup.with_made(workers, progress))
     with ExitStack() as stack:
         folder = stack.enter_context(store.opened()) if store else None
         logs = [path for item in work.setup.impacts.values() for path in item.logs]
@@ -169,7 +168,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     seconds = perf_counter() - begin
     factors = sweep_factors(setup, learned.thresholds)
     gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
-    gathered.skipped += (*setup.not_injected, *learned.about.skipped)
+    gathered.skipped += (*setup.not_made, *learned.about.skipped)
     gathered.findings += [*measured, *learned.about.findings]
     gathered.findings += unchecked(work.limits, setup.detectors, str(setup.path))
     gathered.skipped += [

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from cdtool.activation import Activation
 from cdtool.bounded_loading import read_bytes
@@ -23,20 +23,18 @@ from cdtool.evaluation.summary import kind_group
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
 from cdtool.ingest.run_reading import split_run
-from cdtool.injection.assumption import assumptions_of
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import RunCut
 from cdtool.plain_text import counted, digits
+from cdtool.registry import Registry
 from cdtool.remote.remote_path import joined, location
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.execution.workers import Workers
-from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, read_inject_section
-from cdtool.workflows.injection.injected_logs import model_of
+from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.log_groups import Split
 from cdtool.workflows.named_logs import LogsOf, labels_of, named_logs
 from cdtool.workflows.runs import RunReading, resolve_all, shown_path
@@ -73,6 +71,37 @@ class ImpactGroup:
     counterpart: str = ""
 
 
+class MadeGroups(Protocol):
+    """Groups of logs that a command makes for a benchmark, by a section of its own in the benchmark file."""
+
+    @classmethod
+    def read(cls, root: Table, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]) -> MadeGroups:
+        """Read and check the section in the file `root`; `groups` are the others. Raises ConfigurationError."""
+        ...
+
+    def names(self, machine_file: MachineFile) -> tuple[str, ...]:
+        """Return the names of the groups."""
+        ...
+
+    def added(self, setup: BenchmarkFile, workers: Workers, progress: Progress | None) -> BenchmarkFile:
+        """Return the benchmark with the groups, whose logs are made if they are not there; without `made`."""
+        ...
+
+    def found(self, setup: BenchmarkFile) -> tuple[BenchmarkFile, int]:
+        """Return the benchmark with the groups if their logs are there, or else how many contacts are to be made."""
+        ...
+
+
+# The sections that a command of their own reads and carries out: groups of logs, and documents of the results.
+SECTIONS = Registry(
+    "section",
+    {
+        "inject": "cdtool.workflows.benchmark.with_injected:InjectedGroups",
+        "protocol": "cdtool.workflows.protocol.of_benchmark:ProtocolOfBenchmark",
+    },
+)
+
+
 @dataclass(frozen=True)
 class BenchmarkFile:
     """A validated benchmark file with resolved globs.
@@ -84,8 +113,9 @@ class BenchmarkFile:
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
     versions were read. `sections` are the parts of scored logs that are used, `learned_sections` those of the logs
     learned from, which end `guard` [s] before their first contact; None: they have no contact. `split`: which runs stay
-    together where runs set a limit for others. `not_injected`: logs and
-    contacts of `inject` that were left out. `force_limits`: the file of the force profiles; None: the shipped ones.
+    together where runs set a limit for others. `made`: the groups that a command
+    makes before they are scored; `not_made`: their logs and contacts that were left out. `force_limits`: the file of
+    the force profiles; None: the shipped ones.
     """
 
     path: Path
@@ -115,9 +145,13 @@ class BenchmarkFile:
     guard: float | None = None
     split: Split = Split.RECORDING
     measures_synchronisation: bool = False
-    inject: InjectSection | None = None
-    not_injected: tuple[Skipped, ...] = ()
+    made: MadeGroups | None = None
+    not_made: tuple[Skipped, ...] = ()
     force_limits: Path | None = None
+
+    def with_made(self, workers: Workers, progress: Progress | None = None) -> BenchmarkFile:
+        """Return the benchmark with the groups that a command makes for it; unchanged without one."""
+        return self if self.made is None else self.made.added(self, workers, progress)
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -261,7 +295,7 @@ def read_benchmark_file(
     """
     file = location(path)
     root = Table(read_toml(file, "a benchmark file"), str(file))
-    root.raw("protocol")  # read by workflows/protocol
+    root.raw("protocol")  # read by its command
     if isinstance(root.raw("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
@@ -288,7 +322,7 @@ def read_benchmark_file(
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
     impacts, sections = _groups(root, found, window, force)
-    inject = _read_inject(root, found, operations, impacts)
+    made = SECTIONS.load("inject").read(root, found, operations, impacts) if "inject" in root else None
     learn = _under_scored_paths(learn, _scored(impacts, impact_free=True))
     onset = root.table("onset")
     migrated = migrated_onset(onset)
@@ -316,7 +350,7 @@ def read_benchmark_file(
         limits=read_limits(
             root.table("limits"),
             [*_names(machine_file, names), *((name, name) for name in also_known)],
-            (*impacts, *(_injected_groups(inject, machine_file) if inject else ())),
+            (*impacts, *(made.names(machine_file) if made else ())),
             [
                 kind_group(name, kind)
                 for name, group in impacts.items()
@@ -331,7 +365,7 @@ def read_benchmark_file(
         learned_sections={path: section for path, section in learn.items() if section},
         guard=guard,
         split=split,
-        inject=inject,
+        made=made,
         force_limits=_force_limits(force, base),
     )
     root.finish()
@@ -342,29 +376,6 @@ def read_benchmark_file(
     if learning:
         _refuse_unknown_locations(benchmark)
     return benchmark
-
-
-def _read_inject(
-    root: Table, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]
-) -> InjectSection | None:
-    if "inject" not in root:
-        return None
-    if found.runs:
-        raise root.fault("inject", f"cannot be used with operations = '{operations}'", "write each run to its own log")
-    section = read_inject_section(
-        root.table("inject"),
-        found,
-        found.machine_file.machine.joints,
-        tuple(name for name, group in groups.items() if not group.is_impact_free and not group.condition),
-    )
-    for name in groups:
-        if name.startswith(f"{INJECTED}_"):
-            raise root.fault("impacts", f"{name} is the name of an injected group", "choose another name")
-    return section
-
-
-def _injected_groups(section: InjectSection, machine_file: MachineFile) -> tuple[str, ...]:
-    return tuple(section.groups(assumptions_of(model_of(section, machine_file))))
 
 
 def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:

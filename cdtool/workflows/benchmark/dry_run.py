@@ -16,7 +16,6 @@ from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisa
 from cdtool.workflows.benchmark.pieces import source_files
 from cdtool.workflows.benchmark.scoring import logs_to_score
 from cdtool.workflows.benchmark.stored_learned import StoreOfRun
-from cdtool.workflows.benchmark.with_injected import made_before, with_groups
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.store.store import read_speed
@@ -75,19 +74,8 @@ def dry_run(
     """
     workers = workers or Workers()
     work = BenchmarkWork.of(file, detectors, false_alarm_budget)
-    work, to_inject = _with_injected(work)
-    return replace(_dry_run(work, workers, store), to_inject=to_inject)
-
-
-def _with_injected(work: BenchmarkWork) -> tuple[BenchmarkWork, int]:
-    """Return the work with the injected recordings that are there, and how many contacts are not."""
-    section = work.setup.inject
-    if section is None:
-        return work, 0
-    made = made_before(work.setup, section)
-    if made is None:
-        return work, len(section.logs) * len(section.positions) * len(section.obstacles)
-    return replace(work, setup=with_groups(work.setup, section, made)), 0
+    setup, to_inject = work.setup.made.found(work.setup) if work.setup.made else (work.setup, 0)
+    return replace(_dry_run(replace(work, setup=setup), workers, store), to_inject=to_inject)
 
 
 def _dry_run(work: BenchmarkWork, workers: Workers, store: StoreUse | None) -> DryRun:

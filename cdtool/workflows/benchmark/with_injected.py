@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from cdtool.detectors import DETECTORS
-from cdtool.errors import OutputError
+from cdtool.errors import ConfigurationError, OutputError
 from cdtool.files import replaced_folder
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.injection.assumption import Assumption, ControllerReaction, assumptions_of
 from cdtool.injection.refusal import refusal
-from cdtool.machine_file import read_machine_file
+from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.remote.remote_path import joined
+from cdtool.tables import Table
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, ImpactGroup
 from cdtool.workflows.execution.workers import Progress, Workers
-from cdtool.workflows.injection.inject_section import InjectSection, NamedObstacle
+from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, NamedObstacle, read_inject_section
 from cdtool.workflows.injection.injected_logs import (
     InjectedCase,
     InjectedLogs,
@@ -26,22 +27,58 @@ from cdtool.workflows.injection.injected_logs import (
     read_injected,
     write_injected,
 )
+from cdtool.workflows.named_logs import LogsOf
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.store.digest import code_version, digest_of
 
 _DIGEST = "digest.txt"
 
 
-def with_injected(setup: BenchmarkFile, workers: Workers, progress: Progress | None = None) -> BenchmarkFile:
-    """Return the benchmark with a group per injected obstacle; unchanged without [inject].
+@dataclass(frozen=True)
+class InjectedGroups:
+    """The groups of [inject], a `MadeGroups` of a benchmark file."""
 
-    The recordings are kept in the folder that [inject] names and used again as long as nothing they depend on has
-    changed. Raises OutputError if that folder holds something else.
-    """
-    if setup.inject is None:
-        return setup
-    injected = injected_logs(setup, setup.inject, workers, progress)
-    return with_groups(setup, setup.inject, injected)
+    section: InjectSection
+
+    @classmethod
+    def read(cls, root: Table, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]) -> InjectedGroups:
+        """Read and check [inject]; raises ConfigurationError."""
+        if found.runs:
+            hint = "write each run to its own log"
+            raise root.fault("inject", f"cannot be used with operations = '{operations}'", hint)
+        real = tuple(name for name, group in groups.items() if not group.is_impact_free and not group.condition)
+        section = read_inject_section(root.table("inject"), found, found.machine_file.machine.joints, real)
+        for name in groups:
+            if name.startswith(f"{INJECTED}_"):
+                raise root.fault("impacts", f"{name} is the name of an injected group", "choose another name")
+        return cls(section)
+
+    def names(self, machine_file: MachineFile) -> tuple[str, ...]:
+        """Return the names of the groups: one per obstacle, and per assumption about the machine."""
+        return tuple(self.section.groups(assumptions_of(model_of(self.section, machine_file))))
+
+    def added(self, setup: BenchmarkFile, workers: Workers, progress: Progress | None) -> BenchmarkFile:
+        """Return the benchmark with a group per injected obstacle.
+
+        The recordings are kept in the folder that [inject] names and used again as long as nothing they depend on has
+        changed. Raises OutputError if that folder holds something else.
+        """
+        return with_groups(setup, self.section, injected_logs(setup, self.section, workers, progress))
+
+    def found(self, setup: BenchmarkFile) -> tuple[BenchmarkFile, int]:
+        """Return the benchmark with the recordings that are there, or else how many contacts are not."""
+        section = self.section
+        made = made_before(setup, section)
+        if made is None:
+            return setup, len(section.logs) * len(section.positions) * len(section.obstacles)
+        return with_groups(setup, section, made), 0
+
+
+def section_of(setup: BenchmarkFile) -> InjectSection:
+    """Return [inject] of a benchmark file; raises ConfigurationError if it has none."""
+    if not isinstance(setup.made, InjectedGroups):
+        raise ConfigurationError(f"{setup.path}: has no section [inject]", "see docs/injection.md for one")
+    return setup.made.section
 
 
 def injected_logs(
@@ -98,7 +135,7 @@ def with_groups(setup: BenchmarkFile, section: InjectSection, injected: Injected
             )
     others = {name: group for name, group in setup.impacts.items() if group.is_impact_free or group.condition}
     real = {name: group for name, group in setup.impacts.items() if name not in others}
-    return replace(setup, impacts={**real, **groups, **others}, inject=None, not_injected=injected.skipped)
+    return replace(setup, impacts={**real, **groups, **others}, made=None, not_made=injected.skipped)
 
 
 def _refused(setup: BenchmarkFile, section: InjectSection, reaction: ControllerReaction) -> dict[str, str]:

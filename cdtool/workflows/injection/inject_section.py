@@ -11,7 +11,7 @@ import numpy as np
 
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.dynamics import Machine, has_links
-from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.errors import UsageError, nearest
 from cdtool.injection.assumption import Assumption
 from cdtool.injection.obstacles import read_obstacle, shipped_obstacles
 from cdtool.injection.robot_contact import StruckPoint
@@ -204,10 +204,3 @@ def _mark(table: Table, name: str, text: str, machine: Machine) -> Mark:
         return JointMark.of_machine(text, machine) if "=" in text else Mark.parse(text)
     except UsageError as fault:
         raise table.fault(name, fault.message, fault.hint or MARK_HINT) from fault
-
-
-def require_section(section: InjectSection | None, file: Path) -> InjectSection:
-    """Return the section; raises ConfigurationError if a benchmark file does not have one."""
-    if section is None:
-        raise ConfigurationError(f"{file}: has no section [inject]", "see docs/injection.md for one")
-    return section

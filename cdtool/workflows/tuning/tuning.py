@@ -53,7 +53,6 @@ from cdtool.workflows.benchmark.benchmark_file import (
     with_detectors,
 )
 from cdtool.workflows.benchmark.determinants import how_logs_are_read
-from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import Runs
@@ -270,7 +269,7 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
         read.runs,
         groups,
         all(item.nested is not None for item in made),
-        tuple(dict.fromkeys((*skipped, *setup.not_injected))),
+        tuple(dict.fromkeys((*skipped, *setup.not_made))),
         read.findings,
     )
 
@@ -287,18 +286,18 @@ def _with_impacts(
 ) -> BenchmarkFile:
     """Return the benchmark with the contacts to tune on; raises UsageError if two kinds would be mixed unasked."""
     real = setup.groups_of_impacts
-    if impacts is None and real and setup.inject is not None:
+    if impacts is None and real and setup.made is not None:
         raise UsageError(
             f"{setup.path} has real contacts ({', '.join(real)}) and injected ones",
             "choose with impacts: real, injected or both",
         )
     if impacts == "real":
-        return replace(setup, inject=None)
-    if impacts == "injected" and setup.inject is None:
+        return replace(setup, made=None)
+    if impacts == "injected" and setup.made is None:
         raise UsageError(
             f"impacts is 'injected', but {setup.path} has no section [inject]", "add one: docs/injection.md"
         )
-    setup = with_injected(setup, workers, progress)
+    setup = setup.with_made(workers, progress)
     if impacts != "injected":
         return setup
     left_out = [name for name in setup.groups_of_impacts if setup.impacts[name].injected is None]

@@ -13,6 +13,7 @@ import cdtool
 from cdtool.errors import ConfigurationError, OutputError, RecordingError, UsageError
 from cdtool.evaluation.agreement import agreements
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from cdtool.workflows.benchmark.with_injected import section_of
 from cdtool.workflows.injection.injected_logs import read_injected
 from tests.command import cdtool as command
 from tests.workflows.injection.known_drive import known_drive
@@ -148,8 +149,7 @@ def test_an_unknown_accelerometer_leaves_the_acceleration_out(gate: Path) -> Non
 def test_positions_and_stiffnesses_may_be_a_grid(gate: Path) -> None:
     grid = '[inject]\nlogs = ["holdout/03.csv"]\npositions = { from = "0.4m", to = "1.0m", count = 4 }\n'
     grid += "stiffnesses_n_per_mm = { from = 5, to = 500, per_decade = 1 }\n"
-    section = read_benchmark_file(write(gate, grid)).inject
-    assert section is not None
+    section = section_of(read_benchmark_file(write(gate, grid)))
     assert [item.value for item in section.positions] == pytest.approx([0.4, 0.6, 0.8, 1.0])
     assert [item.name for item in section.obstacles] == ["5_n_per_mm", "50_n_per_mm", "500_n_per_mm"]
 

@@ -268,7 +268,7 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
         tune(both, QUICK)
     made = tune(both, replace(QUICK, impacts="injected"))
     assert set(made.groups) == {"injected_hard"}
-    injected = with_injected(replace(both, impacts={}), Workers(1))
+    injected = replace(both, impacts={}).with_made(Workers(1))
     read = read_recordings(injected, QUICK.budget, 0, Workers(1)).recordings
     fold_of = {run.operation.recording.source: run.fold for run in read.free}
     assert [log.fold for log in read.struck] == [fold_of[log.made_from] for log in read.struck]
