@@ -20,11 +20,11 @@ import numpy as np
 from scipy.optimize import brentq
 from timing import table
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector
-from cdtool.recording import FloatArray
 from cdtool.thresholds.cusum import Cusum
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 

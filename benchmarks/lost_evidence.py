@@ -25,9 +25,10 @@ from typing import Literal
 import numpy as np
 
 from cdtool.activation import Activation, crossings_of
+from cdtool.arrays import BoolArray
 from cdtool.detection import Status
 from cdtool.pipeline import Detection
-from cdtool.recording import BoolArray, Contact, Recording
+from cdtool.recording import Contact, Recording
 
 # What a fault may cost beyond its own length [s].
 ALLOWED = 0.02

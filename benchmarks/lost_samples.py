@@ -38,6 +38,7 @@ from thresholds import WHITENING, SharedWhitening
 from timing import environment, table
 
 from cdtool.activation import Activation
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError
@@ -47,7 +48,7 @@ from cdtool.evaluation.sweep import critical_factor
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, judge, run_detector
-from cdtool.recording import Contact, FloatArray, Recording
+from cdtool.recording import Contact, Recording
 from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.simulation.gate_recordings import write_gate_recordings
 from cdtool.thresholds import THRESHOLDS

@@ -25,11 +25,12 @@ from dataclasses import dataclass
 import numpy as np
 from timing import environment, table
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import assess_force
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import IMPACT_OF
 

@@ -43,9 +43,12 @@ if TYPE_CHECKING:
     from cdtool.detection import Alarm, Band, Signal, Status, Verdict
     from cdtool.errors import CdtoolError
     from cdtool.machine_file import MachineFile, read_machine_file
-    from cdtool.notebook.benchmark_result import BenchmarkResult, benchmark, read_results, score
+    from cdtool.notebook.benchmark import benchmark
+    from cdtool.notebook.benchmark_result import BenchmarkResult
     from cdtool.notebook.detection_result import DetectionResult, DetectionResults, detect, detect_runs
+    from cdtool.notebook.read_results import read_results
     from cdtool.notebook.reading import read
+    from cdtool.notebook.score import score
     from cdtool.notebook.tuning_result import TuningResult, tune
     from cdtool.pipeline import Detection
     from cdtool.recording import Contact, Recording, Series
@@ -82,8 +85,8 @@ _API = {
     "detect_runs": "cdtool.notebook.detection_result:detect_runs",
     "explain": "cdtool.workflows.explaining:explain",
     "explain_runs": "cdtool.workflows.explaining:explain_runs",
-    "benchmark": "cdtool.notebook.benchmark_result:benchmark",
-    "score": "cdtool.notebook.benchmark_result:score",
+    "benchmark": "cdtool.notebook.benchmark:benchmark",
+    "score": "cdtool.notebook.score:score",
     "convert": "cdtool.workflows.convert.converting:convert",
     "identify": "cdtool.workflows.identification.identifying:identify",
     "inject": "cdtool.workflows.injecting:inject",
@@ -98,7 +101,7 @@ _API = {
     "tune": "cdtool.notebook.tuning_result:tune",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
-    "read_results": "cdtool.notebook.benchmark_result:read_results",
+    "read_results": "cdtool.notebook.read_results:read_results",
     "read_machine_file": "cdtool.machine_file:read_machine_file",
     "previous_value": "cdtool.clock:previous_value",
     "BenchmarkResult": "cdtool.notebook.benchmark_result:BenchmarkResult",

@@ -10,11 +10,11 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Alarm, Band, Signal, Status, StatusArray
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import BoolArray, FloatArray
 
 # Default time outside the band before an alarm [s]: 9 samples at 1 kHz.
 DEBOUNCE_TIME = 9e-3

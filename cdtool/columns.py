@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 from cdtool.short_repr import short_repr
 
 # Codes are integers from -2^52 down by less than 2^48: float64 represents integers down to -2^53 exactly.

@@ -11,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import ConfigurationError, nearest
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 

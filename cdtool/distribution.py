@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 # Number of distinct values (1 MiB); values are collected up to this number, since sorting is the main cost.
 _MOST = 1 << 16

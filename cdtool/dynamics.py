@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import Field, dataclass
 from typing import Any, ClassVar, Protocol, TypeGuard
 
-from cdtool.recording import FloatArray, Recording
+from cdtool.arrays import FloatArray
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 
 # A gain: one number for all joints, or one per joint (the thesis's diagonal gain matrix, 2.13 and 2.19).

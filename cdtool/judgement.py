@@ -12,13 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Band, Signal, Status, StatusArray, contiguous
 from cdtool.kernels import kernel
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, Motion, judging_classes, speed_is_recent
 from cdtool.motion.evident_motion import evident_speed
 from cdtool.motion.strokes import Stroke, strokes_so_far
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold, KnownBand, is_per_run
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor

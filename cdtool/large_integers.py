@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.findings import Finding
-from cdtool.recording import FloatArray
 
 # float64 represents every integer up to the first value; 64-bit integers are below the second.
 _EXACT, _WIDEST = 2.0**53, 2.0**64

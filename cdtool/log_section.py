@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import RecordingError, UsageError
 from cdtool.motion import leading_joint
 from cdtool.plain_text import digits
-from cdtool.recording import Contact, FloatArray, Recording
+from cdtool.recording import Contact, Recording
 from cdtool.units import find_unit
 
 _TEXT = re.compile(r"\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+))\s*(?P<unit>[^\d\s.]\S*)\s*", re.ASCII)

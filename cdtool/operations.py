@@ -17,9 +17,10 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import RecordingError, UsageError, nearest
 from cdtool.motion import MotionClass, leading_joint, motion_class
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 
 HOW_TO_CUT = ("whole", "motion", "trigger")

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.activation import Activation
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import previous_value
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import REASONS, Alarm, Band, Signal, Status, Verdict
@@ -21,7 +22,7 @@ from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD
 from cdtool.motion.speed_course import TOLERANCE
 from cdtool.operations import Operation
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold
 

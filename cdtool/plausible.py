@@ -16,8 +16,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.findings import Finding
-from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
+from cdtool.recording import MEASURED, REFERENCES, Recording, Series
 from cdtool.short_repr import short_repr
 
 # No channel of a machine reaches this value in SI: 1e9 N m, rad/s or rad.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.derived import StoresDerived
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
@@ -21,8 +22,6 @@ from cdtool.short_repr import short_repr
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 MEASURED = ("torque", "speed", "position", "acceleration")
 REFERENCES = ("reference_position", "reference_speed", "reference_torque")

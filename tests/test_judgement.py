@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Band, Signal, Status
 from cdtool.judgement import Judgement, judged
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.base import with_limits
 from tests.bits import assert_same_bits
 from tests.motion.speed_logs import log

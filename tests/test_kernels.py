@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from cdtool import kernels
+from cdtool.arrays import FloatArray
 from cdtool.kernels import fields_of, kernel, read_only
-from cdtool.recording import FloatArray
 
 _PROJECT = Path(__file__).parents[1]
 

@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.derived import StoresDerived
 from cdtool.errors import ConfigurationError
-from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 
 def first_order_low_pass(values: FloatArray, time_constant: float, period: float) -> FloatArray:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model import axis_loop_kernel
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import AxisModel, Drive
 from cdtool.errors import ConfigurationError
-from cdtool.recording import FloatArray
 
 # The classical Runge-Kutta method is stable up to 2.78 and accurate well below [-].
 _LARGEST_STEP = 0.5

@@ -11,10 +11,11 @@ import math
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock.held_samples import HOLD_PERIODS, hold_last, previous_value
 from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import FloatArray, Series
+from cdtool.recording import Series
 
 __all__ = [
     "EPOCH",

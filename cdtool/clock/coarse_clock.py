@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.recent_steps import recent_medians
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import BoolArray, FloatArray
 
 # A stamp step longer than this many usual ones contains a pause.
 _PAUSE = 1.5

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.recent_steps import usual_steps
-from cdtool.recording import BoolArray, FloatArray, Series
+from cdtool.recording import Series
 
 # A held value older than this many periods of its channel is missing.
 HOLD_PERIODS = 5.0

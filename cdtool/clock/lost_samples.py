@@ -7,9 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.held_samples import is_on_clock
 from cdtool.clock.recent_steps import RECENT_STEPS, usual_steps
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 # A channel is late if its newest sample is older than this many times its longest usual step.
 _LATE = 1.5

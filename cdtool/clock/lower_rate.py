@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.recording import BoolArray, FloatArray
+from cdtool.arrays import BoolArray, FloatArray
 
 # Below this number of values a rate is not evident.
 _FEWEST = 3

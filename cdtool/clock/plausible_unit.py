@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 # A clock that counts from 1970 in one of these units lies between the years 2001 and 2100.
 EPOCHS = ((1e9, 4.1e9, "s"), (1e12, 4.1e12, "ms"), (1e15, 4.1e15, "us"), (1e18, 4.1e18, "ns"))

@@ -6,7 +6,7 @@ import weakref
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 RECENT_STEPS = 9
 _BEFORE = RECENT_STEPS - 1

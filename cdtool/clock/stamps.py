@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.coarse_clock import fit_line
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.recording import BoolArray, FloatArray
 
 # A standard deviation of the steps above this share of the period is jitter.
 _JITTER = 0.1

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import previous_value
 from cdtool.clock.held_samples import hold_last
 from cdtool.clock.lost_samples import lost_samples
@@ -15,7 +16,7 @@ from cdtool.detection import Signal, Status, StatusArray
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.kernels import kernel
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.short_repr import short_repr
 
 if TYPE_CHECKING:

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import Detector
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.kernels import kernel
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.value_words import fault_and_place
 
 _HIGHEST_STATUS = int(max(Status))

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import previous_value
 from cdtool.clock.held_samples import hold_last
 from cdtool.detection import Signal, Status
@@ -22,7 +23,7 @@ from cdtool.detectors.base import (
 from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
 from cdtool.detectors.look import GREY, Look
 from cdtool.dynamics import Gain, Machine
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 
 # The rates of the reference are those of a cubic through this many of its last samples.
 _SAMPLES = 21

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
@@ -24,7 +25,7 @@ from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, run
 from cdtool.detectors.look import RED, Look
 from cdtool.dynamics import Gain, JointEquation, Machine
 from cdtool.kernels import read_only
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import HOLD_PERIODS
 from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Signal, Status
@@ -26,7 +27,7 @@ from cdtool.detectors.base import (
 from cdtool.detectors.look import ORANGE, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 
 # The accelerometer's bias is averaged while the axis stands still, over at most this time [s].
 _STANDSTILL_WINDOW = 0.3

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
@@ -21,7 +22,7 @@ from cdtool.detectors.base import (
 from cdtool.detectors.look import NAVY, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 
 # The filter starts with the uncertainty of the contact torque that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 1.0

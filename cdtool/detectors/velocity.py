@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
     BRIDGED,
@@ -22,7 +23,7 @@ from cdtool.detectors.base import (
 from cdtool.detectors.look import SKY, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import kernel
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 
 # Number of steps whose matrices are computed together: they fit into the processor's cache.
 _STEPS = 2048

@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.activation import Activation
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.evaluation.sweep import critical_factors, sweep
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted, digits
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 _FORM = re.compile(

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.results import ContactResult, Results
 from cdtool.evaluation.rows import grouped
 from cdtool.evaluation.statistics.kaplan_meier import Survival, survival
 from cdtool.evaluation.summary import latencies
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 

@@ -12,11 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.activation import Activation, begins_at
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Status, StatusArray
 from cdtool.evaluation.truth.matching import windows
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.pipeline import Detection
-from cdtool.recording import BoolArray, Contact, FloatArray
+from cdtool.recording import Contact
 from cdtool.short_repr import short_repr
 
 _STATUS = "Array(uint8, 1, 'C', readonly=True)"

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import as_float64
 from cdtool.errors import CdtoolError, RecordingError, installing
 from cdtool.findings import Finding
-from cdtool.recording import FloatArray
 
 # A file that unpacks to more than this many bytes and to more than this multiple of its own size is refused.
 _FREE, _RATIO = 256 * 2**20, 200

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.clock import EPOCH
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
 from cdtool.columns import as_float64
 from cdtool.findings import Finding
-from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import AXES
 from cdtool.columns import Column
 from cdtool.errors import UsageError
-from cdtool.recording import FloatArray
 
 # Prefix of the metadata keys in a converted file.
 PREFIX = "cdtool."

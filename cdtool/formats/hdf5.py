@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, as_float64
 from cdtool.errors import RecordingError
@@ -31,7 +32,6 @@ from cdtool.formats.pieces import Pieces, PiecewiseFormat
 from cdtool.formats.slices import SlicedColumn, header_of, interleave
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _KEYS = ("scale_factor", "add_offset")

@@ -30,6 +30,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
@@ -50,7 +51,6 @@ from cdtool.formats.timed_text import (
     number_in_head,
     opened,
 )
-from cdtool.recording import FloatArray
 
 _END, _X, _COMMENT = "***End_of_Header***", "X_Value", "Comment"
 _SEGMENT_KEYS = {"Channels", "Samples", "Delta_X", "X_Dimension"}

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import as_float64
 from cdtool.errors import RecordingError
@@ -29,7 +30,6 @@ from cdtool.formats.groups import Group, Parts, WrittenNames, prefix_keys, requi
 from cdtool.formats.pieces import Pieces, PiecewiseFormat
 from cdtool.formats.slices import SlicedColumn, header_of, interleave
 from cdtool.formats.source import Source
-from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _MAGICS = (b"MDF     ", b"UnFinMF ")

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, Column, Piece
 from cdtool.errors import RecordingError
@@ -19,7 +20,6 @@ from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, s
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
-from cdtool.recording import FloatArray
 
 _PARQUET, _ARROW = b"PAR1", b"ARROW1"
 _UNIT_KEYS = (b"unit", b"units", b"Unit")

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import Column
 from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import library
 from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys, require_clocks
 from cdtool.formats.parquet import OWN_CLOCKS
-from cdtool.recording import FloatArray
 
 # One row group contains this many numbers (8 MiB), but at least this many rows.
 _VALUES, _FEWEST_ROWS = 2**20, 2**14

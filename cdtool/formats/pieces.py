@@ -13,10 +13,10 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.formats.source import Format, Source
-from cdtool.recording import FloatArray
 
 # Size of a piece: 8 MiB of float64, all columns together.
 VALUES_PER_PIECE = 1 << 20

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import Column, Piece
 from cdtool.formats.pieces import VALUES_PER_PIECE
-from cdtool.recording import FloatArray
 
 # Read the rows from `start` to before `end`.
 ReadRows = Callable[[int, int], FloatArray]

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
@@ -28,7 +29,6 @@ from cdtool.formats.pieces import Pieces, PiecewiseFormat
 from cdtool.formats.slices import SlicedColumn, header_of, interleave
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _MAGIC = b"TDSm"

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
@@ -29,7 +30,6 @@ from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text, read_sample, read_small
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.recording import FloatArray
 
 # No recording has more columns; each row may be completed with as many empty cells.
 _MOST_COLUMNS = 1 << 14

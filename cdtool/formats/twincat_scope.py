@@ -22,6 +22,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
@@ -41,7 +42,6 @@ from cdtool.formats.timed_text import (
     opened,
 )
 from cdtool.plain_text import counted
-from cdtool.recording import FloatArray
 
 # The keys of lines about the file: of Scope View in TwinCAT 3 and in TwinCAT 2.
 _FILE_KEYS = ("File", *SCOPE_STARTS, "Endtime of export", "EndRecord")

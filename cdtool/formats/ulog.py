@@ -13,6 +13,7 @@ from typing import Any, BinaryIO, ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
@@ -21,7 +22,6 @@ from cdtool.formats.column_names import requested_keys
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.source import Source
-from cdtool.recording import FloatArray
 
 _MAGIC = b"ULog\x01\x12\x35"
 _CLOCK, _PADDING = "timestamp", "_padding"

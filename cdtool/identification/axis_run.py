@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import RecordingError
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.short_repr import short_repr
 
 # A step longer than this many usual steps of a channel is a gap: nothing is interpolated across it.

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.robot_regressor import Column, Regressor, stacked_torque
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 # A column whose rest, after the projection on the others, is below this share of it is dependent on them; a factor

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import ConfigurationError, UsageError, installing
 from cdtool.identification.estimate import IdentificationError
 from cdtool.identification.robot_dynamics import RobotFit, fitted_robot
 from cdtool.identification.robot_regressor import BODY_PARAMETERS, Column, Group, regressor_of
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray
 
 _PER_BODY = len(BODY_PARAMETERS)
 # The least eigenvalue of a scaled pseudo-inertia, as a share of the robot's mass: the solver ends within 1e-8.

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.parameters import AxisModel, Drive, Friction
 from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.axis_model.simulation import wind_up_at
@@ -31,7 +32,6 @@ from cdtool.identification.estimate import (
     NotIdentifiable,
 )
 from cdtool.identification.load_cell_contact import LoadCellContact
-from cdtool.recording import FloatArray
 
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.3

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.identification.estimate import Estimate, IdentificationError, Identified, Method, Missing, NotIdentifiable
 from cdtool.identification.robot_dynamics import (
@@ -33,7 +34,6 @@ from cdtool.identification.robot_regressor import Group, Regressor, TreeRegresso
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # Directions of the unloaded robot's parameters that are excited less than this, relative to the most, are not fitted.

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.estimate import Missing, NotIdentifiable
 from cdtool.identification.filtered_regression import FilteredRun
 from cdtool.identification.start_ensemble import AFTER, BEFORE
-from cdtool.recording import FloatArray
 
 # A speed is held if this share of the moving time is spent within this relative distance of it.
 _HELD_SHARE, SAME_SPEED = 0.05, 0.1

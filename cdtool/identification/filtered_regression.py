@@ -15,10 +15,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import IdentificationError
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 IntArray = npt.NDArray[np.int64]

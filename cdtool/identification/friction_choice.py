@@ -15,13 +15,13 @@ from enum import Enum
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.estimate import Estimate, Identified, Missing, NotIdentifiable
 from cdtool.identification.robot_dynamics import RobotFit, RobotParameters, identify_robot
 from cdtool.identification.robot_regressor import Group
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray
 
 # With a larger relative standard error viscous friction predicts faster motion wrong, however well that of the logs.
 _WORST_VISCOUS = 0.5

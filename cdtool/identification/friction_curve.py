@@ -9,8 +9,8 @@ from enum import Enum
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.filtered_regression import FilteredRun, IntArray
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 # Knots of the friction spline: shares of the highest speed, closer together where the friction changes fast.

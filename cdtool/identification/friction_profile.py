@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.start_ensemble import StartEnsemble, motor_speed
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 # The motion is settled this long after it reached this share of the nominal speed, while it stays within a band [s, -].

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.axis_model.parameters import AxisModel, Sensors
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import AxisRun, axis_run
-from cdtool.recording import BoolArray, Contact, FloatArray, Recording
+from cdtool.recording import Contact, Recording
 from cdtool.short_repr import short_repr
 
 # What is compared: from this long before the contact, at least, to the separation or this long after the contact [s].

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.axis_run import AxisRun
-from cdtool.recording import FloatArray
 
 # The median of the magnitude of normal noise over its standard deviation.
 _MEDIAN_TO_DEVIATION = 0.6745

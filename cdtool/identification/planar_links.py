@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.estimate import Estimate, IdentificationError, Method
 from cdtool.identification.robot_dynamics import RobotFit
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.recording import FloatArray
 
 _LINKS = 2
 

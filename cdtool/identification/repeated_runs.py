@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.robot_dynamics import Window
 from cdtool.identification.robot_run import RobotRun
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 # Runs are the same motion if their lengths differ by at most this share, and their positions (RMS) by this share of

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import Estimate, IdentificationError, Identified, Method, Missing, NotIdentifiable
 from cdtool.identification.excitation import SAME_SPEED, SPEEDS_NEEDED, Excitation, measure_excitation
@@ -35,7 +36,6 @@ from cdtool.identification.friction_curve import (
 )
 from cdtool.identification.torque_lag import MotionColumns, apparent_lag, best_lag
 from cdtool.plain_text import counted
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # Fewer equations than this identify nothing.

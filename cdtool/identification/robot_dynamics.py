@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import UsageError
 from cdtool.identification.base_parameters import (
     BaseParameterSet,
@@ -42,7 +43,6 @@ from cdtool.identification.robot_regressor import Column, Group, Regressor, regr
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 Index = npt.NDArray[np.int64]

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.identification.excitation import Excitation, excitation_of
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import BoolArray, FloatArray
 
 # A joint moves where this share of the samples within the window's half width [s] is above its stick speed: less is
 # noise of the speed at rest.

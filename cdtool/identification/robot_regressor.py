@@ -16,12 +16,12 @@ from typing import Protocol
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.kinematic_tree import KinematicTree, TreeJoint
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray
 
 # As pinocchio orders them, inertia about the origin of the joint's frame.
 BODY_PARAMETERS = ("mass", "mx", "my", "mz", "ixx", "ixy", "iyy", "ixz", "iyz", "izz")

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import AxisRun, axis_run
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 
 # A derivative is that of the cubic that fits best over this time to either side [s], or this number of samples.

@@ -20,6 +20,7 @@ from enum import Enum
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.axis_model.parameters import Controller
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import (
@@ -32,7 +33,6 @@ from cdtool.identification.estimate import (
 )
 from cdtool.identification.observed_slope import observed_slope
 from cdtool.identification.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 SECTION = "model.controller"

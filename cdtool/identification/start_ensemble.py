@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.identification.axis_run import AxisRun
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # What is averaged: the rest before the start and the motion after it [s].

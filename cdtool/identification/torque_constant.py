@@ -18,11 +18,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import IdentificationError
 from cdtool.identification.load_cell_contact import contact_force
-from cdtool.recording import BoolArray, Contact, FloatArray, Recording
+from cdtool.recording import Contact, Recording
 from cdtool.short_repr import short_repr
 
 # Standard deviation of the low-pass of all channels [s].

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.filtered_regression import (
     FilteredRun,
     IntArray,
@@ -27,7 +28,6 @@ from cdtool.identification.filtered_regression import (
     fit_linear,
     shifted,
 )
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 # A lag is there if it is this many times its standard error, and explains this share of the residual's variance.

@@ -17,6 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
 from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.axis_model.simulation import AxisInputs, AxisMotion, simulate_axis
@@ -34,7 +35,6 @@ from cdtool.identification.filtered_regression import IntArray
 from cdtool.identification.friction_profile import FrictionProfile, friction_profile, friction_shares, random_phases
 from cdtool.identification.start_ensemble import StartEnsemble, start_ensembles
 from cdtool.plain_text import counted
-from cdtool.recording import FloatArray
 
 # In the order of the vector of logarithms.
 _ALWAYS = ("load_mass", "stiffness", "coulomb", "viscous", "static", "onset", "damping", "rise_speed")

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray
 from cdtool.identification.robot_dynamics import RobotFit, RobotParameters, identify_robot
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import BoolArray
 
 # A residual beyond so many robust standard deviations is no friction and no noise.
 _BEYOND = 8.0

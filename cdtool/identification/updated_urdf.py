@@ -11,11 +11,11 @@ from xml.parsers import expat
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.identification.consistent_inertia import body_of, is_consistent, pseudo_inertia
 from cdtool.identification.robot_regressor import body_parameters
 from cdtool.machines.kinematic_tree import KinematicTree, TreeLink
-from cdtool.recording import FloatArray
 
 _ROTATIONAL = ("ixx", "ixy", "iyy", "ixz", "iyz", "izz")
 _LEAST_MASS = 1e-9

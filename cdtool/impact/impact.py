@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.impact.restitution import Restitution, newton, poisson, stronge
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 

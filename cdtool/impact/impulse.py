@@ -17,9 +17,9 @@ from typing import Literal
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_restitution
-from cdtool.recording import FloatArray
 
 Hypothesis = Literal["newton", "poisson", "stronge"]
 Slip = Literal["sticks", "slides", "slides, then sticks", "slides, then back", "slides back"]

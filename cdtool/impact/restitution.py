@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_positive, require_restitution
-from cdtool.recording import FloatArray
 
 # Powers 1, 2, ... of x in e(x) - 1 and of 1 - e in x(e): the exact relation, solved as a power series about x = 0.
 _RESTITUTION_SERIES = (-2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225)

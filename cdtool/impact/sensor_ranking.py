@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError, nearest
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
@@ -20,7 +21,6 @@ from cdtool.impact.rigidity import Rigidity, rigidity
 from cdtool.impact.sensors import QUANTITIES, Sensor
 from cdtool.impact.transmission import ElasticTransmission
 from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 _SAMPLES = 10_000

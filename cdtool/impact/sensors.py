@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.impact.checks import require_not_negative, require_positive
-from cdtool.recording import FloatArray
 
 QUANTITIES = ("contact_force", "drive_force", "load_acceleration", "motor_position", "motor_force")
 """What a sensor may measure: each on the load side [N, N, m/s2, m, N]."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
-from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:
     from scipy.signal import TransferFunction

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.drives import Drive
 from cdtool.impact.effort import bounded
 from cdtool.impact.transmission import Transmission
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 _MOST_CONTACTS = 200

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.impact.checks import require_positive
-from cdtool.recording import FloatArray
 
 # With this ratio and above, a mode keeps at most 4.1 % of its energy at the force's peak.
 QUASI_STATIC_FROM = 5.0

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, previous_value
 from cdtool.clock.lower_rate import sampled_rows
@@ -25,7 +26,7 @@ from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, guessed_units, time_unit_findings, unit_findings
 from cdtool.log_names import log_stem
 from cdtool.plausible import IMPOSSIBLE
-from cdtool.recording import MEASURED, RIG_UNITS, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
+from cdtool.recording import MEASURED, RIG_UNITS, UNITLESS, Recording, Series, TableRows
 from cdtool.remote.remote_path import RemotePath
 
 # A channel of a lower rate has empty cells in these first rows of a table.

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
 from cdtool.clock.stamps import EDGE_ROWS, ClockCleaner, count_leading_strays, gaps_in
 from cdtool.columns import Column
@@ -16,7 +17,6 @@ from cdtool.distribution import Distribution
 from cdtool.findings import Finding
 from cdtool.formats.source import Source
 from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
-from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 # The last part of a name counts: `log.t` of a struct, `Sheet1!time` of a workbook.

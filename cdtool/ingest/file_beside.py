@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap, ChannelSource, OwnFile
 from cdtool.dynamics import Machine
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding, Severity
 from cdtool.formats.source import Source
 from cdtool.ingest.channel_assembly import assemble_recording
-from cdtool.recording import SHOWS_CONTACTS, FloatArray, Recording, Series
+from cdtool.recording import SHOWS_CONTACTS, Recording, Series
 from cdtool.remote.remote_path import location
 
 # A trigger rises where it comes to the upper share of its range after the lower one. It has two levels: at most this

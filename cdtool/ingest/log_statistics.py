@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import Piece
 from cdtool.distribution import Distribution
 from cdtool.formats.pieces import PieceRun, Pieces
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
-from cdtool.recording import FloatArray
 
 
 @dataclass

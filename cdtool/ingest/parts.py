@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.bounded_loading import read_bytes
 from cdtool.clock import GAP_PERIODS
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.formats.source import Source, TopicDetails
-from cdtool.recording import GROUND_TRUTH, FloatArray, Recording, Series
+from cdtool.recording import GROUND_TRUTH, Recording, Series
 from cdtool.remote.remote_path import location
 
 # First and last time [s].

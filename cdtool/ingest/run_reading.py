@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError
@@ -28,7 +29,7 @@ from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.operations import RunCut
 from cdtool.plain_text import counted, first_of
-from cdtool.recording import GROUND_TRUTH, FloatArray
+from cdtool.recording import GROUND_TRUTH
 from cdtool.remote.remote_path import location
 
 # A run with fewer samples than this is left out: too few for a clock's usual step.

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.stamps import GAP_PERIODS, StrayStampMarker
 from cdtool.plain_text import plain, shorten
-from cdtool.recording import BoolArray, FloatArray
 
 # The clock starts again if so many consecutive time stamps are below the highest one; fewer are single stray rows.
 _RESTART_ROWS = 3

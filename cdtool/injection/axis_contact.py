@@ -14,6 +14,7 @@ from enum import Enum
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.axis_model.axis_loop_kernel import ROWS
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import AxisModel, Controller
@@ -23,7 +24,6 @@ from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import USED, AxisRun
 from cdtool.injection.assumption import Assumption, ControllerReaction, DriveBeyond, SlewBeyond
 from cdtool.injection.channel_change import ChannelChange
-from cdtool.recording import BoolArray, FloatArray
 
 # Time after contact [s] at which the model's own error begins to dominate the forces.
 RELIABLE_FOR = 0.2

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

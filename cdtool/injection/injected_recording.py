@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.dynamics import Machine
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.injection.channel_change import ChannelChange
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 # The channels that a contact changes where they are logged; the references do not react.
 _CHANGED = ("torque", "speed", "position", "acceleration", "reference_torque")

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import AxisModel, Controller
 from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
@@ -20,7 +21,6 @@ from cdtool.identification.axis_run import AxisRun
 from cdtool.injection.assumption import Assumption, ControllerReaction, assumptions_of
 from cdtool.injection.axis_contact import RELIABLE_FOR, Doubt, InjectedContact, separation_time
 from cdtool.injection.channel_change import ChannelChange
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.robot_model.parameters import RobotModel, Vector, point_in_joint
 from cdtool.robot_model.simulation import (
     PointContact,

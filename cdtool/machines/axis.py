@@ -15,10 +15,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.dynamics import JointEquation
 from cdtool.errors import ConfigurationError
 from cdtool.machines.joint_machine import JointMachine
-from cdtool.recording import FloatArray
 from cdtool.tables import Table
 
 

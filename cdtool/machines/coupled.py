@@ -12,9 +12,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.dynamics import JointEquation
 from cdtool.machines.joint_machine import JointMachine
-from cdtool.recording import FloatArray
 
 # A singular value of the Jacobian below this share of the largest only contributes noise to a force.
 _HARDLY = 0.05

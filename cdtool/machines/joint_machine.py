@@ -12,9 +12,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock import differentiate, integrate, previous_value
 from cdtool.findings import Finding
-from cdtool.recording import RIG_UNITS, UNITLESS, FloatArray, Recording, Series
+from cdtool.recording import RIG_UNITS, UNITLESS, Recording, Series
 from cdtool.tables import Table
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}

@@ -7,12 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock import previous_value
 from cdtool.dynamics import JointEquation, Pendulum
 from cdtool.errors import ConfigurationError, RecordingError, nearest
 from cdtool.findings import Finding
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.tables import Table
 
 _LINKS = 2

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from cdtool.arrays import FloatArray
 from cdtool.kernels import kernel
 from cdtool.machines.tree_rows import BLOCK, COSINE, OFFSET, ROW, SINE, SLOT
-from cdtool.recording import FloatArray
 
 # Adding and subtracting it rounds to an integer: the spacing of the numbers near it is 1.
 _ROUND = 6755399441055744.0

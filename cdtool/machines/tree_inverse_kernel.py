@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from cdtool.arrays import FloatArray
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.machines.tree_angles import fill_sine_cosine
 from cdtool.machines.tree_rows import (
@@ -59,7 +60,6 @@ from cdtool.machines.tree_rows import (
     vector_of,
     work_space,
 )
-from cdtool.recording import FloatArray
 
 
 @kernel(f"void({READ_ONLY}, {ROW})")

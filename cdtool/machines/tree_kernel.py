@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.machines.tree_angles import fill_sine_cosine
 from cdtool.machines.tree_rows import (
@@ -64,7 +65,6 @@ from cdtool.machines.tree_rows import (
     vector_of,
     work_space,
 )
-from cdtool.recording import FloatArray
 
 _MATRICES = "Array(float64, 3, 'C')"
 

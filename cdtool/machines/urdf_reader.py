@@ -18,10 +18,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, installing, nearest
 from cdtool.machines.kinematic_tree import KinematicTree, TreeJoint, TreeLink
-from cdtool.recording import FloatArray
 
 _STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 _MOVING = ("revolute", "continuous", "prismatic")

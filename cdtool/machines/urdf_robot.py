@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import nearest
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_reader import read_urdf
-from cdtool.recording import FloatArray
 from cdtool.remote.remote_path import joined, location
 from cdtool.tables import Table
 

@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import as_float64
 from cdtool.messages.batch import Batch
 from cdtool.messages.decoded_batch import MOST_FIELDS, ByteArray, Decoder, Group, IntArray
 from cdtool.messages.fields import Field, FieldMissingError
 from cdtool.messages.layout import Schema
-from cdtool.recording import FloatArray
 
 # Layouts that others are compared with: writers have a few, such as one for each length of a varint.
 _MOST_LAYOUTS = 64

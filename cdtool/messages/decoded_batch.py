@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.messages.batch import Batch
 from cdtool.messages.fields import Field, FieldMissingError, stamp_parts
-from cdtool.recording import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 ByteArray = npt.NDArray[np.uint8]

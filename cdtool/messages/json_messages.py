@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.messages.batch import Batch
 from cdtool.messages.decoded_batch import MOST_FIELDS, Decoder, Group, UndecodableError
 from cdtool.messages.fields import (
@@ -25,7 +26,6 @@ from cdtool.messages.fields import (
     numeric_fields,
     parse_field,
 )
-from cdtool.recording import FloatArray
 
 # The longest message that is read [bytes]: its objects may take twenty times as much memory.
 _LONGEST = 16 << 20

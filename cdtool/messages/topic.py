@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError, nearest
@@ -21,7 +22,7 @@ from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch, Fi
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import FieldMissingError, element_names, missing_field, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps
-from cdtool.recording import GROUND_TRUTH, BoolArray, FloatArray
+from cdtool.recording import GROUND_TRUTH
 
 # The messages in which the names of other joints are looked for.
 _FIRST = 10

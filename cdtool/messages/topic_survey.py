@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
@@ -19,7 +20,6 @@ from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import Field, parse_field
 from cdtool.messages.stamp_order import StampOrders
 from cdtool.messages.topic import count_values, sort_times
-from cdtool.recording import FloatArray
 
 _LONGEST_ARRAY = 16
 # Messages of a batch times bytes of the longest one. It bounds the memory: until its length is known, an image is an

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.speed_range import SpeedRange
 from cdtool.motion.strokes import Stroke
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.short_repr import short_repr
 
 # What a threshold was learned for: one class, or several and the speeds between them.

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import FloatArray, Series
+from cdtool.recording import Series
 
 # The speed is averaged over this long [s] back, and over this many samples at least.
 _SECONDS, _SAMPLES = 0.1, 5

@@ -9,8 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.motion.speed_course import SpeedCourse, fitting_samples
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 # The speed is averaged over this long [s], and over this many samples at least, before the usual one is looked for.
 _AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5

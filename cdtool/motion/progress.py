@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import previous_value
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 
 ALIGNMENTS = ("time_then_position", "time", "position")

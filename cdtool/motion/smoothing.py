@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 
 def moving_mean(values: FloatArray, known: Any, reach: int) -> FloatArray:

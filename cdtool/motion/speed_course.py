@@ -10,12 +10,13 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import integrate
 from cdtool.derived import SendsFields
 from cdtool.kernels import READ_ONLY, fields_of, kernel, read_only
 from cdtool.motion.progress import ALIGNMENTS, CONFIRM, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.smoothing import moving_mean
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 
 # A speed fits within this many spreads of the mean.

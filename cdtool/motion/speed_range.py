@@ -21,12 +21,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.derived import SendsFields
 from cdtool.kernels import READ_ONLY, fields_of, kernel, read_only
 from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.progress import CONFIRM, RUNNING_SHARE, START_SHARE
 from cdtool.motion.speed_course import SLOW, SPREADS, TOLERANCE, stroke_progress
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 
 # Age of a sample that is learned from, and time for which nothing is learned after a departure [s].
 GUARD = 0.3

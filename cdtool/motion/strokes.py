@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.progress import START_SHARE
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 # A rest this long [s] ends a stroke; a shorter one is a pause in it.
 SHORTEST_REST = 0.2

@@ -16,16 +16,12 @@ from cdtool.evaluation.summary import FIGURES
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.html_table import html_table
 from cdtool.near_attributes import NearAttributes
-from cdtool.notebook.presenting import described, presented
+from cdtool.notebook.presenting import described
 from cdtool.plain_text import counted, first_of, shorten
 from cdtool.remote.remote_path import location
 from cdtool.same_values import equal_by_values
 from cdtool.workflows.benchmark.benchmark import Benchmark
-from cdtool.workflows.benchmark.benchmark import benchmark as run_benchmark
 from cdtool.workflows.benchmark.stored_outcomes import StoreReport
-from cdtool.workflows.reporting import load_report
-from cdtool.workflows.score_triggers import Score
-from cdtool.workflows.score_triggers import score as run_score
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,10 +75,8 @@ class BenchmarkResult(NearAttributes):
     __eq__ = equal_by_values
 
     @classmethod
-    def of(cls, done: Benchmark | Score) -> BenchmarkResult:
-        """Return the result of a workflow."""
-        if isinstance(done, Score):
-            return cls(done.evaluated, done.traces, done.inputs)
+    def of(cls, done: Benchmark) -> BenchmarkResult:
+        """Return the result of a finished benchmark."""
         return cls(done.evaluated, done.traces, done.inputs, done.seconds, done.stored)
 
     @property
@@ -304,48 +298,3 @@ class BenchmarkPlots(NearAttributes):
 def _names_of(trace: Trace) -> tuple[str, str]:
     """Return the name of an operation, and that of its log."""
     return trace.recording, trace.recording.partition("#")[0]
-
-
-benchmark = presented(
-    run_benchmark,
-    BenchmarkResult.of,
-    "BenchmarkResult\n    DataFrames, figures and reports. Logs that cannot be read or scored are in `skipped`; so is "
-    "a detector\n    without one of its channels, all contacts of which are not assessable.",
-)
-score = presented(
-    run_score,
-    BenchmarkResult.of,
-    "BenchmarkResult\n    As that of `benchmark`. Of the file's limits, those on `*` and on detectors of the trigger "
-    "file are\n    checked.",
-)
-
-
-def read_results(file: str | Path) -> BenchmarkResult:
-    """Read the results of a benchmark from their file.
-
-    Parameters
-    ----------
-    file : str or Path
-        A results.json or results.parquet that `cdtool benchmark -o` or `BenchmarkResult.save` wrote. The curves of the
-        trigger plots are read from the file results.traces.json.gz beside it, if it is there.
-
-    Returns
-    -------
-    BenchmarkResult
-        The results, without the recordings.
-
-    Raises
-    ------
-    RecordingError
-        The file is damaged, or is not a results file.
-
-    Examples
-    --------
-    >>> import cdtool
-    >>> scored = cdtool.score("docs/examples/triggers.csv", "sample_logs/gate/benchmark.toml")
-    >>> _ = scored.save("results.json")
-    >>> cdtool.read_results("results.json").contacts.equals(scored.contacts)
-    True
-    """
-    evaluated, traces, _ = load_report(file)
-    return BenchmarkResult(evaluated, traces, (location(file),))

@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.findings import Finding
 from cdtool.plausibility.check import ChannelCheck
 from cdtool.plausibility.windows import windows_of
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 
 # Compared are changes of both channels above this share of the usual largest, and this multiple of their noise.
 _LARGE, _ABOVE_NOISE = 0.2, 3.0

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.dynamics import Machine
 from cdtool.findings import Finding
 from cdtool.plausibility.check import Answer, ChannelCheck
 from cdtool.plausibility.windows import Windows, windows_of
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 
 # In motion: above this share of the usual largest speed. A joint below the second share of the fastest hardly moves.
 _MOVING, _HARDLY = 0.1, 0.02

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.arrays import FloatArray
+from cdtool.recording import Recording, Series
 from cdtool.short_repr import short_repr
 
 # A window has the first number of samples of the slowest channel and lasts 0.05 s, or the next share of a log that is

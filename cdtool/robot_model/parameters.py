@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.model_table import Bristle, ModelTable, joint_model
 from cdtool.axis_model.parameters import AxisModel
 from cdtool.errors import ConfigurationError, nearest
@@ -16,7 +17,6 @@ from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.kinematic_tree import KinematicTree, TreeJoint, TreeLink
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray
 from cdtool.robot_model import chain_kernel
 from cdtool.robot_model.link_sensors import LinkSensors
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import Drive
 from cdtool.errors import ConfigurationError
-from cdtool.recording import FloatArray
 from cdtool.robot_model import robot_loop_kernel
 from cdtool.robot_model.parameters import RobotModel, Vector, largest_rate
 

@@ -8,10 +8,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock import previous_value
 from cdtool.detection import Band, Signal
 from cdtool.errors import NothingValidError, SignatureError, UsageError
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.first_order import filtered_slope, low_passed

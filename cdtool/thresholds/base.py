@@ -8,8 +8,9 @@ from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Band, Signal, Status, contiguous
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.comparison_kernel import factors_met
 
 

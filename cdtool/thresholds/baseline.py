@@ -9,11 +9,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Band, Signal, Status
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.evident_motion import evident_speed
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.settings import check_above, check_sides
 
 # Below this share of the highest speed so far, a joint rests or starts: that is not its motion.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import FloatArray
 
 
 def filtered_slope(values: FloatArray, step: FloatArray, time_constant: float) -> FloatArray:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.derived import SendsFields
 from cdtool.detection import Band, Signal, Status, StatusArray
 from cdtool.errors import SignatureError, UsageError, nearest
@@ -18,7 +19,7 @@ from cdtool.kernels import READ_ONLY, fields_of, kernel, read_only
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.speed_course import SpeedCourse
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.running_level_kernel import follow_level
 from cdtool.thresholds.signature_curve import Curve, resample

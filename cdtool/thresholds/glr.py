@@ -8,9 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal
 from cdtool.errors import UsageError
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.innovation import check_order
 from cdtool.thresholds.sections import filtered, section_bounds
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Signal
 from cdtool.errors import SignatureError, UsageError
 from cdtool.motion.progress import Progress
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve

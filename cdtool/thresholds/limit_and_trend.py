@@ -8,10 +8,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Band, Signal
 from cdtool.errors import UsageError
 from cdtool.motion import MotionClass
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.common_class import common_class

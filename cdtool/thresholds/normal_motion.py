@@ -13,12 +13,13 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.derived import SendsFields, StoresDerived
 from cdtool.detection import Signal, Status
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
-from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
+from cdtool.recording import MEASURED, REFERENCES, Recording, Series
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.curve_lookup import look_up
 from cdtool.thresholds.signature_curve import Curve, resample

@@ -9,10 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit

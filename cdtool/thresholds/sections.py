@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Signal, Status
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # (values, steps) -> output, all (m,); step: time since the previous sample [s], infinite where a section begins.

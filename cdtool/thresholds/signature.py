@@ -9,10 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal
 from cdtool.errors import NothingValidError, SignatureError, UsageError
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
     RULES,

@@ -10,12 +10,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.derived import SendsFields
 from cdtool.detection import Signal
 from cdtool.kernels import READ_ONLY, kernel, read_only
 from cdtool.motion.progress import Progress
 from cdtool.motion.smoothing import moving_mean
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.curve_lookup import LearnedColumn
 

@@ -25,12 +25,13 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.derived import SendsFields
 from cdtool.detection import Band, Signal, Status
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.progress import Progress
 from cdtool.motion.speed_range import SpeedRange, in_ranges
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.base import KnownBand
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.running_level_kernel import follow_level

@@ -13,11 +13,12 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal, Status
 from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.recent import Recent

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detectors.base import Detector
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.stored import rule_to_dict

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.evaluation.false_alarm_budget import Budget
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # The multiples of a limit for which latencies are known: up to four times, in steps of 3 %.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.activation import Activation
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal, Status
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError
@@ -18,7 +19,7 @@ from cdtool.evaluation.sweep import sweep
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, judge_log, run_detector, signal_of_log
 from cdtool.plain_text import counted
-from cdtool.recording import Contact, FloatArray
+from cdtool.recording import Contact
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.tuning.candidate import Candidate, Measured
 from cdtool.tuning.held_out import MULTIPLIERS, HeldOut

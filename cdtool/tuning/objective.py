@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from cdtool.recording import BoolArray, FloatArray
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.tuning.candidate import Measured
 from cdtool.tuning.recordings import TuningRecordings
 

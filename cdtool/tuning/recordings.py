@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.operations import Operation
-from cdtool.recording import BoolArray, Contact, FloatArray
+from cdtool.recording import Contact
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.tuning.candidate import Candidate, Measured
 from cdtool.tuning.coordinate_search import CoordinateSearch

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_share
 from cdtool.evaluation.statistics.spread import mean_interval
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.tuning.candidate import Candidate
 from cdtool.tuning.held_out import Pooled

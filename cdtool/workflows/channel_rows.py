@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import Column
 from cdtool.formats.groups import Group, Part
 from cdtool.ingest.reading import read_as_logged
 from cdtool.machine_file import MachineFile
-from cdtool.recording import FloatArray, Series
+from cdtool.recording import Series
 
 # Rows of the longest clock per part.
 _ROWS = 1 << 16

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock import previous_value
 from cdtool.detectors import DETECTORS
 from cdtool.dynamics import Machine, has_links
 from cdtool.errors import UsageError
 from cdtool.pipeline import Detection
-from cdtool.recording import FloatArray, Series
+from cdtool.recording import Series
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.evaluation.force.verdict import ForceVerdict
 from cdtool.evaluation.results import (
@@ -24,7 +25,6 @@ from cdtool.evaluation.rows import Rows
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.findings import Finding, remark
-from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.finished_run import TraceKey

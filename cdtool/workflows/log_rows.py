@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.columns import Column, Piece
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.groups import Group, Part
@@ -19,7 +20,6 @@ from cdtool.formats.time_order import by_time, values_of
 from cdtool.ingest.clock_guess import find_clock
 from cdtool.ingest.log_statistics import ClockStatistics, LogStatistics
 from cdtool.ingest.reading import log_pieces, needs_time_order
-from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)

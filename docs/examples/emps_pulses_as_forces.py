@@ -20,10 +20,11 @@ from scipy.io import loadmat
 
 import cdtool
 from cdtool.activation import Activation
+from cdtool.arrays import FloatArray
 from cdtool.machine_file import read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, detect_operation
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.signature.fitting import fit_operations
 

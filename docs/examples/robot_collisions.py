@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 FILES = 34
 JOINTS = 6

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
-from cdtool.recording import FloatArray
 
 
 def test_a_low_pass_answers_a_step_with_its_time_constant() -> None:

@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import HOLD_PERIODS, previous_value
 from cdtool.clock.held_samples import hold_last
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.clock.recent_steps import RECENT_STEPS
 from cdtool.detectors.base import held_on, missing_after_first
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 # Steps [ms]: jitter, lost samples, pauses and bursts.
 STEPS = st.lists(st.sampled_from([1.0, 1.0, 1.01, 0.98, 1.3, 2.0, 3.1, 4.9, 5.0, 9.0, 40.0, 0.001]), max_size=70)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Status
 from cdtool.detectors.base import drive_on_speed_clock
 from cdtool.detectors.friction_ekf import FrictionEkf, JointMeasurements
@@ -15,7 +16,7 @@ from cdtool.detectors.friction_ekf_arm_kernel import predict_covariance, update_
 from cdtool.dynamics import JointEquation
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from tests.synthetic.motions import PERIOD, moving_recording
 from tests.synthetic.robots import six_joint_robot
 

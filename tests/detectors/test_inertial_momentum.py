@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.detectors.inertial_momentum import InertialMomentum
-from cdtool.recording import FloatArray
 
 IGM = InertialMomentum(crossover=10.0)  # k1 = 20, k2 = 100
 TIME = np.arange(10_001) * 1e-3

@@ -14,6 +14,7 @@ from scipy.linalg import expm
 from scipy.signal import lfilter
 
 from cdtool.activation import Activation
+from cdtool.arrays import FloatArray
 from cdtool.detection import WHOLE_MACHINE, Status
 from cdtool.detectors.desired_dynamics import DesiredDynamics
 from cdtool.detectors.direct import Direct
@@ -24,7 +25,6 @@ from cdtool.detectors.momentum import Momentum
 from cdtool.detectors.velocity import Velocity
 from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
-from cdtool.recording import FloatArray
 from cdtool.thresholds.limit import Limit
 from tests.synthetic.machines import ARM, arm_of, machine_of
 from tests.synthetic.motions import PERIOD, moving_recording, resting_recording

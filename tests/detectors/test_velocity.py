@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Status
 from cdtool.detectors.velocity import observe_velocity, relaxations
-from cdtool.recording import FloatArray
 
 
 def random_matrices(seed: int, size: int, count: int, condition: float) -> FloatArray:

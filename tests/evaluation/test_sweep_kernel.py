@@ -11,11 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.activation import Activation, begins_at, crossings_of
+from cdtool.arrays import FloatArray
 from cdtool.detection import Band, Signal, Status, Verdict
 from cdtool.evaluation.sweep import MULTIPLES, Swept, sweep, sweep_operation
 from cdtool.evaluation.truth.matching import belongs, one_an_event, windows
 from cdtool.pipeline import Detection
-from cdtool.recording import Contact, FloatArray
+from cdtool.recording import Contact
 from tests.evaluation.detections import OPERATION, detection
 
 FACTORS = np.array([0.5, 1.0, 1.0, 1.5, 2.0, 4.0])

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import cdtool
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.identification.robot_dynamics import RobotFit
 from cdtool.identification.robot_regressor import regressor_of
 from cdtool.identification.robot_run import RobotRun, robot_run
@@ -19,7 +20,6 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.tables import Table
 from tests.data_folder import UR10E_LOGS
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import axis_run
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 
 @dataclass(frozen=True)

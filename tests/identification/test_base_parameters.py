@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.base_parameters import Range, condition_number, group_columns, independent_norms, random_rows
 from cdtool.identification.robot_regressor import Group, Regressor, regressor_of, stacked_torque
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import FloatArray
 from tests.identification.robot_motion import PANDA_JOINTS, panda, panda_urdf, planar_arm
 from tests.synthetic.robots import six_joint_robot
 

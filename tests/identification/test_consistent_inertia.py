@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.identification.consistent_inertia import (
     ConsistentFit,
@@ -22,7 +23,6 @@ from cdtool.identification.consistent_inertia import (
 from cdtool.identification.robot_dynamics import RobotFit, RobotParameters, identify_robot
 from cdtool.identification.robot_regressor import Group, body_parameters, regressor_of, with_bodies
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray
 from tests.identification.robot_motion import coloured, fourier, planar_arm
 from tests.synthetic.robots import six_joint_robot
 

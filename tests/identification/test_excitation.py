@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.parameters import AxisModel, Controller, Drive, Friction
 from cdtool.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.identification.axis_run import AxisRun
@@ -22,7 +23,6 @@ from cdtool.identification.excitation import (
 )
 from cdtool.identification.filtered_regression import filter_run
 from cdtool.identification.rigid_axis import RigidAxisSettings, identify_rigid_axis
-from cdtool.recording import FloatArray
 
 PERIOD = 2e-3
 

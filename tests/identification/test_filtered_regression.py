@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import IdentificationError
@@ -20,7 +21,6 @@ from cdtool.identification.filtered_regression import (
     fit_linear,
     white_noise,
 )
-from cdtool.recording import FloatArray
 
 PERIOD = 1e-3
 TIME = np.arange(4000) * PERIOD

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import IdentificationError, Method, Missing, NotIdentifiable
 from cdtool.identification.filtered_regression import Loss
@@ -20,7 +21,6 @@ from cdtool.identification.rigid_axis import (
     low_passed_force,
     predict_force,
 )
-from cdtool.recording import FloatArray
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
 from tests.data_folder import data, needs_data

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.identification.estimate import Estimate, IdentificationError, Missing
 from cdtool.identification.robot_dynamics import (
@@ -19,7 +20,6 @@ from cdtool.identification.robot_dynamics import (
 from cdtool.identification.robot_regressor import Group, regressor_of
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import FloatArray
 from tests.identification.robot_motion import (
     Motion,
     coloured,

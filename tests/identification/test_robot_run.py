@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.identification.robot_run import RobotRun, central_derivative, robot_run
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 RATES = np.array([1.0, 2.0])
 

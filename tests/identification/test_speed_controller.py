@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cdtool
+from cdtool.arrays import FloatArray
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import Estimate, IdentificationError, Missing, NotIdentifiable
 from cdtool.identification.speed_controller import (
@@ -22,7 +23,7 @@ from cdtool.identification.speed_controller import (
 )
 from cdtool.identification.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.machine_file import read_machine_file
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
 from tests.data_folder import DATA, needs_data

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.start_ensemble import start_ensembles
-from cdtool.recording import FloatArray
 
 PERIOD = 2e-3
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.estimate import IdentificationError
 from cdtool.identification.torque_constant import identify_torque_scale
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 
 MASS = 1000.0
 STIFFNESS = 2e4

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import ConfigurationError
 from cdtool.identification.robot_regressor import body_parameters, with_bodies
 from cdtool.identification.updated_urdf import updated_urdf
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_reader import read_urdf
-from cdtool.recording import FloatArray
 from tests.data_folder import UR10E_LOGS
 from tests.synthetic.robots import JOINTS, six_joint_urdf
 

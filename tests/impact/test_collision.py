@@ -10,6 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.impact.bodies import Bodies, effective_mass
 from cdtool.impact.collision import collide
@@ -20,7 +21,6 @@ from cdtool.impact.contact_laws.hysteresis_damping import HysteresisDamping
 from cdtool.impact.contact_laws.kelvin_voigt import KelvinVoigt
 from cdtool.impact.contact_laws.lankarani_nikravesh import LankaraniNikravesh
 from cdtool.impact.restitution import coefficients, damping_for_restitution, hunt_crossley_restitution
-from cdtool.recording import FloatArray
 
 # Table 4.1 on the load side: J_t/r^2, d_t/r^2 and tau/r; the machine touches the wall at r tau/d_t.
 EXAMPLE = Bodies(mass_1=2.35e-4 / 0.015**2, speed_1=0.25, push=0.5 / 0.015, friction=0.03 / 0.015**2)

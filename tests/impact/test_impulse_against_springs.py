@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from cdtool.arrays import FloatArray
 from cdtool.impact.impulse import Hypothesis, RigidBody, strike
-from cdtool.recording import FloatArray
 
 FLOOR = RigidBody(math.inf, math.inf, (0.0, 0.0))
 # Angle of a rod of 1 kg and 1 m to the floor [deg], friction, and velocity of its lower end (along, down) [m/s].

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.control_loop import control_by_force, speed_by_reference, torque_by_force
@@ -23,7 +24,6 @@ from cdtool.impact.linearised import (
 from cdtool.impact.transfer import Transfer
 from cdtool.impact.transmission import Transmission
 from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
-from cdtool.recording import FloatArray
 
 DAMPED = replace(example.ELASTIC, damping=0.01, motor_friction=0.02, load_friction=5.0)
 DRIVES: dict[str, Transmission] = {"rigid": example.TRANSMISSION, "elastic": DAMPED}

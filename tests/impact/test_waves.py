@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.impact.waves import QUASI_STATIC_FROM, check_waves, rod_first_frequency, vibration_share
-from cdtool.recording import FloatArray
 
 
 def test_a_rod_rings_with_the_travel_of_a_wave_there_and_back():

@@ -10,13 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.file_beside import rises
 from cdtool.ingest.reading import read_as_logged
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from tests.findings.facts import fact_of
 
 AXIS = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 10.0\n'

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelSource
 from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError
@@ -15,7 +16,7 @@ from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.force_axes import join_axes
 from cdtool.ingest.reading import read_as_logged
 from cdtool.machine_file import read_machine_file
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.workflows.convert.converting import convert
 from tests.findings.facts import fact_of
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.model_table import ModelTable
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import Sensors
@@ -20,7 +21,7 @@ from cdtool.injection.injected_recording import injected_recording
 from cdtool.injection.robot_contact import RobotLog, StruckPoint, least_known_joint, robot_contact
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.robot_model.parameters import RobotModel, robot_model
 from cdtool.simulation.arm_model import Impact, simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters, Trial

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.motion import measured_class, motion_class
 from cdtool.motion.motion_class import MotionClass, averaged
 from cdtool.operations import Operation, operations_of
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
 from cdtool.workflows.signature.grouping import by_class
 from tests.bits import COUNTS, assert_same_bits, clocks, samples

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.clock import previous_value
 from cdtool.errors import RecordingError
 from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.speed_course import TOLERANCE, SpeedCourse, SpeedCurve, fitting_samples, stroke_progress
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from tests.bits import COUNTS, VALUES, assert_same_bits, clocks, samples
 
 

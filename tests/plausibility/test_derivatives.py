@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.findings import Finding
 from cdtool.plausibility import derivatives
 from cdtool.plausibility.derivatives import units_apart
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 TIME = np.arange(0.0, 10.0, 2e-3)
 JOINTS = ("shoulder", "elbow", "wrist")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.machine_file import read_machine_file
 from cdtool.plausibility import check_channels
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 RATE = 500.0
 TIME = np.arange(0.0, 24.0, 1.0 / RATE)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.axis_model.model_table import Bristle, ModelTable
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import Drive
 from cdtool.errors import ConfigurationError
-from cdtool.recording import FloatArray
 from cdtool.robot_model.parameters import RobotModel, point_in_joint, robot_model
 from cdtool.robot_model.simulation import PointContact, RobotInputs, simulate_robot, substeps, wind_up_at
 from cdtool.simulation.arm_model import ArmStroke, integrate_arm

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 ONSET, RATE = 3.0, 1000.0
 MACHINE = """

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 
 
 def rest_to_rest(

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Band, Signal, Status
 from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.momentum import Momentum
 from cdtool.errors import UsageError
-from cdtool.recording import FloatArray
 from cdtool.simulation.changed_machine import ChangedMachine
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Signal, Status
 from cdtool.errors import SignatureError
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import Progress
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve

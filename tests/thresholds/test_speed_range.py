@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Signal, Status
 from cdtool.errors import SignatureError, UsageError
 from cdtool.judgement import judged
 from cdtool.motion.speed_range import GUARD
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.limit import Limit

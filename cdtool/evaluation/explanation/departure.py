@@ -15,10 +15,11 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.transient import Transient
 from cdtool.kernels import READ_ONLY, fields_of, kernel
-from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels_of
 

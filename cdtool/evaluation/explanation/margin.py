@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import REASONS, Status, StatusArray
 from cdtool.kernels import kernel
 from cdtool.pipeline import Detection
-from cdtool.recording import FloatArray
 
 _COLUMN = "Array(float64, 1, 'A', readonly=True)"
 

@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
-from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
+from cdtool.recording import MEASURED, REFERENCES, Recording
 
 IndexArray = npt.NDArray[np.int64]
 

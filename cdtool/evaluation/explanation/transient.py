@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.arrays import FloatArray
+from cdtool.recording import Recording, Series
 
 # The running median spans this time in total [s], and at least this many samples: an event shorter than half of it is a
 # pulse.

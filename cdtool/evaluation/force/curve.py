@@ -11,12 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.truth.force_vector import ForceMagnitude
 from cdtool.evaluation.truth.missing_samples import PERIODS, CellClock, cell_samples, longest_step
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
-from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 from cdtool.short_repr import short_repr
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
 from cdtool.evaluation.force.verdict import ForceVerdict, Outcome, StepVerdict
 from cdtool.evaluation.results import ForceResult, Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.rest_level import rest_before
-from cdtool.recording import Contact, FloatArray
+from cdtool.recording import Contact
 from cdtool.short_repr import short_repr
 
 # Onsets of a trace and of its row are the same number; a file may have rounded one.

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.truth.missing_samples import CellClock
-from cdtool.recording import FloatArray
 
 # One measurement agrees in this share of its samples, apart from those at which exports round the time.
 _AGREEING = 0.9

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 IntArray = npt.NDArray[np.intp]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 
 def correlation(a: FloatArray, b: FloatArray) -> float:

@@ -17,7 +17,7 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.statistics.interval import Interval, check_level
 
 if TYPE_CHECKING:
-    from cdtool.recording import BoolArray, FloatArray
+    from cdtool.arrays import BoolArray, FloatArray
 
 # A level of the curve within this of the one that is sought is hit exactly: the tolerance of R's survival package.
 _EXACT = math.sqrt(np.finfo(np.float64).eps)

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.evaluation.statistics.clusters import MOST_CLUSTERS, Clusters, IntArray, clusters_of
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import check_count
 from cdtool.evaluation.statistics.spread import difference_interval, mean_interval, spread_of
-from cdtool.recording import FloatArray
 
 # Sign patterns or divisions drawn if there are too many to try all.
 RESAMPLES = 9999

@@ -17,8 +17,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
-from cdtool.recording import FloatArray
 
 LEAST_VALUES = 3
 # Nobody makes more runs than this.

@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.recording import FloatArray
 
 # With fewer runs only a very large drift could be distinguished from chance.
 LEAST_RUNS = 10

@@ -13,13 +13,14 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.dynamics import Machine
 from cdtool.evaluation.synchronisation.combination import clock_line
 from cdtool.evaluation.synchronisation.delay import LEAST_POINTS, EventDelay, SmoothSignal, delay_of
 from cdtool.evaluation.synchronisation.latency import ChannelLatency, RestsOn, TimedEvent, latency_from
 from cdtool.evaluation.synchronisation.smoothing import POINTS_PER_WIDTH, REACH, Grid, local_derivative
 from cdtool.plain_text import counted
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 from cdtool.short_repr import short_repr
 
 # Delays up to this are found [s].

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.synchronisation.delay import EventDelay
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # From so many events on, intervals include the scatter between events, and a drift can be estimated.

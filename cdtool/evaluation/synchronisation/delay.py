@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.evaluation.synchronisation.smoothing import Grid
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # Steps of Gauss and Newton; they end when the delay changes by less than this share of the grid's step.

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 
 IntArray = npt.NDArray[np.int_]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import BoolArray, FloatArray
 
 IndexArray = npt.NDArray[np.intp]
 

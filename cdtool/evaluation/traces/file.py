@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results_file import build
 from cdtool.evaluation.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
-from cdtool.recording import Contact, FloatArray
+from cdtool.recording import Contact
 from cdtool.strict_json import finite, strict_json
 
 SCHEMA_VERSION = 3

@@ -9,12 +9,13 @@ from typing import Self
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import StatusArray
 from cdtool.evaluation.traces.decimation import mark_kept
 from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
-from cdtool.recording import Contact, FloatArray
+from cdtool.recording import Contact
 from cdtool.short_repr import short_repr
 
 Span = tuple[float, float]

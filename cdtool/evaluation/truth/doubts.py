@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.statistics.correlation import correlation
 from cdtool.evaluation.truth.force_vector import rest_of_axes
 from cdtool.evaluation.truth.missing_samples import cell_samples, longest_step
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.findings import Finding
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 
 # Above this magnitude of the correlation the force follows the torque.
 _FOLLOWS = 0.95

@@ -17,12 +17,13 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.evaluation.truth.load_cell import BEFORE_ONSET, BURST, ROUNDING, ContactSearch, reading_step
 from cdtool.evaluation.truth.missing_samples import CellClock, CellSamples
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import RunningRest
 from cdtool.evaluation.truth.rest_lines import INTERVAL
-from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 from cdtool.short_repr import short_repr
 
 # The level of an axis after a contact that was in progress at the start is the median of this interval after it [s].

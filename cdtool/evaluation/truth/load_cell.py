@@ -13,11 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.truth.missing_samples import CellSamples, cell_samples, time_to_shoulder
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import RestLine, RunningRest
 from cdtool.evaluation.truth.rest_lines import INTERVAL, IntArray
-from cdtool.recording import Contact, FloatArray, Series
+from cdtool.recording import Contact, Series
 
 # Standard deviation of the error of rounding to steps of 1: uniform between -1/2 and 1/2.
 ROUNDING = 12.0**-0.5

@@ -13,8 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import RecordingError
-from cdtool.recording import FloatArray, Series
+from cdtool.recording import Series
 from cdtool.short_repr import short_repr
 
 CLOSE_ENOUGH = 5e-3

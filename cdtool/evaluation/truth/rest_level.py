@@ -14,6 +14,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.truth.rest_lines import (
     EXTENDED,
     GAP,
@@ -24,7 +25,6 @@ from cdtool.evaluation.truth.rest_lines import (
     medians_of,
     noise_about,
 )
-from cdtool.recording import FloatArray
 
 _Time = TypeVar("_Time", float, FloatArray)
 

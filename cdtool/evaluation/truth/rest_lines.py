@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.recording import BoolArray, FloatArray
+from cdtool.arrays import BoolArray, FloatArray
 
 INTERVAL = 0.05
 GAP = 0.3

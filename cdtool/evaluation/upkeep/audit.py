@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.trends import ChangeOverRuns
 from cdtool.evaluation.upkeep.deviation import Axis
 from cdtool.motion import MotionClass
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
 

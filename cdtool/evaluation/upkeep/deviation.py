@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 
 from cdtool.activation import Activation
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import Status
 from cdtool.evaluation.sweep import critical_factor
 from cdtool.pipeline import Detection
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve

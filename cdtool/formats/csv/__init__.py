@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap, TablePins, TimeSource
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError, UsageError
@@ -23,7 +24,6 @@ from cdtool.formats.csv.gzipped import open_text
 from cdtool.formats.groups import PREFIX
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
-from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:
     from cdtool.formats.csv.dialect import Dialect

@@ -15,12 +15,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock import EPOCH
 from cdtool.columns import Piece
 from cdtool.findings import Finding
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 Table = TypeVar("Table")  # what the reader of a table returns after its last piece

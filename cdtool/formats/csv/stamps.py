@@ -18,8 +18,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.formats.csv.cells import MISSING, STAMP_LIKE
-from cdtool.recording import FloatArray
 
 Integers = npt.NDArray[np.int64]
 MISSING_STAMP = np.int64(-(2**63))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, Piece
 from cdtool.errors import RecordingError
@@ -26,7 +27,6 @@ from cdtool.formats.csv.rows import RowReader, Rows
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, Layout, seconds_since, unwrap
 from cdtool.formats.pieces import PieceRun
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.recording import FloatArray
 
 # A total is of so many rows, and as exact as the written numbers are.
 _FEWEST_SUMMED, _SAME_SUM = 3, 1e-6

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
@@ -28,7 +29,6 @@ from cdtool.formats.mat.layout import Layout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
-from cdtool.recording import FloatArray
 
 # So many single numbers and texts of a file are shown.
 _MOST_DETAILS = 60

@@ -9,10 +9,10 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.impact.checks import require_exponent, require_not_negative, require_positive
 from cdtool.impact.contact_laws.base import spring_energy, spring_force
-from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.impact.checks import require_exponent, require_not_negative, require_positive
 from cdtool.impact.contact_laws.base import pushing, spring_energy, spring_force
 from cdtool.impact.restitution import hunt_crossley_restitution
-from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)

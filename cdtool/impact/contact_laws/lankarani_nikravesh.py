@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.impact.checks import require_exponent, require_positive, require_restitution
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.restitution import lankarani_nikravesh_damping
-from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)

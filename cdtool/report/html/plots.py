@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import REASONS
 from cdtool.evaluation.results import ContactResult, Results, SweepResult
 from cdtool.evaluation.rows import grouped, picked, values_of
@@ -17,7 +18,6 @@ from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary, latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
-from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval, open_end
 from cdtool.report.html.page_tables import short, visible
 from cdtool.report.html.traces import HEIGHTS

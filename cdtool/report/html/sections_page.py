@@ -14,7 +14,7 @@ from cdtool.errors import CdtoolError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.self_contained import content_policy, page_part, page_template
-from cdtool.report.plots.identification_plots import png
+from cdtool.report.plots.figures import png
 from cdtool.report.table import Cell, Column, Table, name_cell
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.amoc import AmocCurve, AmocPoint, amoc_curves
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.summary import Summary
-from cdtool.recording import FloatArray
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import (

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.upkeep.audit import DriftAudit, JointDrift
 from cdtool.evaluation.upkeep.words import verdicts
 from cdtool.plain_text import counted
-from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
 from cdtool.report.plots.style import DEVIATION_COLOURS, LIMIT, NOT_ASSESSED
 

@@ -220,3 +220,14 @@ def slug(name: str, taken: set[str]) -> str:
         found = f"{base}-{number}"
     taken.add(found)
     return found
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as PNG; the same bytes for the same content."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    drawn = BytesIO()
+    canvas: Any = FigureCanvasAgg(figure)
+    with drawing():
+        canvas.print_png(drawn, metadata={"Software": "cdtool"})
+    return drawn.getvalue()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Status
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.traced import TracedForce, force_profiles, traced_forces
@@ -19,7 +20,6 @@ from cdtool.evaluation.force.verdict import ForceVerdict, StepVerdict
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.traces.decimation import kept_samples
 from cdtool.plain_text import counted
-from cdtool.recording import FloatArray
 from cdtool.report.model import AXES
 from cdtool.report.plots.figures import drawing, label, new_figure, save, slug, write
 from cdtool.report.plots.labels import LineLabel, place_labels

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.detectors.look import BLUE, RED
 from cdtool.identification.friction_curve import FrictionCurve
 from cdtool.identification.rigid_axis import CrossValidation, RigidAxisFit
 from cdtool.plain_text import counted
-from cdtool.recording import FloatArray
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure
 from cdtool.workflows.identification.fleet_identification import ParameterSeries
@@ -27,17 +26,6 @@ _WIDTH = 9.0
 _MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RED, "0.85"
 # More points than pixels only make a picture large.
 _MOST_POINTS = 4000
-
-
-def png(figure: Figure) -> bytes:
-    """Return a figure as PNG; the same bytes for the same content."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    drawn = BytesIO()
-    canvas: Any = FigureCanvasAgg(figure)
-    with drawing():
-        canvas.print_png(drawn, metadata={"Software": "cdtool"})
-    return drawn.getvalue()
 
 
 def draw_unseen_run(unseen: UnseenRun, validation: CrossValidation | None, unit: str) -> Figure:

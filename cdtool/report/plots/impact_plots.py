@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.file_locks import is_temporary
 from cdtool.files import replaced_folder
@@ -19,7 +20,6 @@ from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.impact import Impact
 from cdtool.impact.sensor_ranking import rank_sensors
 from cdtool.plain_text import plain
-from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, new_figure, save
 from cdtool.report.plots.sensor_plot import plot_ranking
 from cdtool.report.plots.transmission_plots import plot_elastic_bode, plot_impact, plot_rigid_bode

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
-from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval, grouped, open_end
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, with_interval

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanation
 from cdtool.evaluation.explanation.margin import joint_margins
 from cdtool.evaluation.explanation.movement import Movement
@@ -17,7 +18,7 @@ from cdtool.evaluation.traces.decimation import decimate
 from cdtool.evaluation.traces.trace import Span, StatisticCurve
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import Legend, count_from, draw_alarm, draw_force, draw_onset, draw_signal, frame_signal
 from cdtool.report.plots.style import BAND, look_of

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.detection import REASONS, Alarm, Status
 from cdtool.evaluation.traces.decimation import decimate, kept_samples
 from cdtool.evaluation.traces.trace import Span, StatisticCurve
 from cdtool.pipeline import Detection
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT, NOT_ASSESSED, ONSET_DASHES, look_of
 
 if TYPE_CHECKING:

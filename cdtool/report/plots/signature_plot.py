@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.evaluation.traces.decimation import decimate
-from cdtool.recording import BoolArray, FloatArray
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label
 from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
 from cdtool.thresholds.fitted_signature import FittedSignature

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.linearised import (
     linearised_contact,
@@ -21,7 +22,6 @@ from cdtool.impact.transfer import Transfer, second_order
 from cdtool.impact.transmission import ElasticTransmission, RigidTransmission
 from cdtool.impact.transmission_simulation import SimulatedMotion
 from cdtool.plain_text import counted
-from cdtool.recording import FloatArray
 from cdtool.report.plots.figures import drawing, new_figure, save
 
 if TYPE_CHECKING:

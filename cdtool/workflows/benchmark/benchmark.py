@@ -11,6 +11,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from cdtool.arrays import FloatArray
 from cdtool.detectors.base import Detector
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
@@ -21,7 +22,6 @@ from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges
-from cdtool.recording import FloatArray
 from cdtool.registry import plugin_packages
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold

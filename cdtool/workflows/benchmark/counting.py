@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.results import ExposureResult, SweepResult
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.workflows.benchmark.log_outcome import OperationOutcome
 

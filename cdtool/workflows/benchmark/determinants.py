@@ -13,12 +13,12 @@ from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.ingest.run_reading import split_run
 from cdtool.log_section import LogSection
 from cdtool.motion.applicable import HOLD
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, ImpactGroup

@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import CdtoolError, RecordingError, is_lasting
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.verdict import ForceVerdict, assess_force
@@ -26,7 +27,7 @@ from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import LearnedRanges, PlausibleRanges
-from cdtool.recording import Contact, FloatArray, Recording
+from cdtool.recording import Contact, Recording
 from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.determinants import Determinants, learned_key
 from cdtool.workflows.benchmark.known_sources import KnownSources

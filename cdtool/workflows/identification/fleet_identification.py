@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.identification.estimate import IdentificationError
 from cdtool.log_names import log_stem
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.recording import FloatArray
 from cdtool.remote.remote_path import location
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification, identify

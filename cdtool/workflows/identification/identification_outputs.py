@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import BoolArray, FloatArray
 from cdtool.axis_model.parameters import AxisModel, Controller
 from cdtool.axis_model.sensor_filters import second_order_low_pass
 from cdtool.axis_model.simulation import AxisInputs, simulate_axis
@@ -34,7 +35,7 @@ from cdtool.identification.start_ensemble import StartEnsemble
 from cdtool.identification.two_mass import TwoMassFit
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.short_repr import short_repr
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification, read_until

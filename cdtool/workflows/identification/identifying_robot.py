@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.bounded_loading import read_text
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.identification.base_parameters import BaseParameterSet
@@ -33,7 +34,7 @@ from cdtool.identification.updated_urdf import updated_urdf
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray, Recording
+from cdtool.recording import Recording
 from cdtool.remote.remote_path import joined
 from cdtool.short_repr import short_repr
 

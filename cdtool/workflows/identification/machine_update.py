@@ -14,6 +14,7 @@ from cdtool.machines.joint_machine import JointMachine
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.plain_text import counted, digits
 from cdtool.remote.remote_path import joined, relative_name
+from cdtool.toml_text import opened_table
 
 # Keys of whole numbers.
 _WHOLE = ("speed_filter_order",)
@@ -118,25 +119,6 @@ def robot_files(text: str, urdf: str, source: Path, target: Path) -> tuple[tuple
 def _free_name(target: Path) -> Path:
     names = (target.with_name(f"{target.stem}{part}.urdf") for part in ("", *(f"_{i}" for i in range(2, 10_000))))
     return next(name for name in names if not name.exists())
-
-
-def opened_table(document: Any, section: str) -> Any:
-    """Return a section of a TOML document; one on a single line in braces is spread first: it cannot hold comments."""
-    import tomlkit
-    from tomlkit.items import InlineTable
-
-    table = document
-    for name in section.split("."):
-        if name not in table:
-            table[name] = tomlkit.table(is_super_table=name in ("model", "detectors"))
-        elif isinstance(table[name], InlineTable):
-            content, comment = table[name].unwrap(), table[name].trivia.comment.strip("# ")
-            table.remove(name)
-            table.append(name, tomlkit.item(content))  # last: keys below it would become its own
-            if comment:
-                table[name].comment(comment)
-        table = table[name]
-    return table
 
 
 def _comment(change: MachineChange, before: Any, origin: str) -> str:

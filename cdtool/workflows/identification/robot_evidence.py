@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.identification.estimate import Missing, NotIdentifiable
 from cdtool.identification.friction_choice import FrictionForm, JointFriction
 from cdtool.identification.friction_curve import FrictionCurve, friction_curve, speed_edges
@@ -35,7 +36,6 @@ from cdtool.identification.robot_run import RobotRun
 from cdtool.identification.unexplained_torque import without_unexplained
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.workflows.identification.identifying import IdentifiedMachine
 

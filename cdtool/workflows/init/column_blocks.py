@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.plausibility.drive import explained
-from cdtool.recording import FloatArray
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.streams import Stream, joined
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 from cdtool.workflows.init.streams import Channels, Stream
 
 # The default of the machine file [Hz], and the lowest corner that is proposed.

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from cdtool.recording import FloatArray
+from cdtool.arrays import FloatArray
 from cdtool.workflows.init.streams import Stream
 
 _WINDOWS = 400

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.clock.lower_rate import sampled_rows
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
-from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.workflows.init.joint_names import families_by_name
 

@@ -8,12 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.results import Skipped
 from cdtool.motion import MotionClass, measured_class
 from cdtool.motion.motion_class import averaged
 from cdtool.motion.speed_course import stroke_progress
 from cdtool.operations import Operation
-from cdtool.recording import FloatArray
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 
 # Nominal speeds that differ from the next one by more than this share belong to two classes.

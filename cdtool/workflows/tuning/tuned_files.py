@@ -16,10 +16,10 @@ from cdtool.plain_text import digits
 from cdtool.remote.remote_path import is_remote, joined, location, relative_name
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.stored import rule_to_dict
+from cdtool.toml_text import opened_table
 from cdtool.tuning.candidate import Candidate
 from cdtool.tuning.tuned import ChoiceResults, TunedDetector
 from cdtool.version import __version__
-from cdtool.workflows.identification.machine_update import opened_table
 from cdtool.workflows.signature.learning import Learned, Setting, learned_from_runs
 from cdtool.workflows.tuning.tuning import Tuning
 

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.force.curve import force_at, force_time_curve
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 
 MASS, STIFFNESS, SPEED, ONSET = 620.0, 500e3, 0.2, 2.0
 RATE = float(np.sqrt(STIFFNESS / MASS))

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
 from cdtool.evaluation.force.verdict import ForceVerdict, assess_force, averaged
-from cdtool.recording import FloatArray
 
 GAP = profile_of(read_force_limits(), "en_12453_reducing_gap")
 WIDE = profile_of(read_force_limits(), "en_12453_wide_gap")

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.force.limits import ForceProfile, PressureLimit, read_force_limits
 from cdtool.evaluation.protocol.plan import Instrument, MeasuringPoint
 from cdtool.evaluation.protocol.pressure import PressureAssessment, PressureRecord, pressure_record
 from cdtool.evaluation.protocol.pressure_reasons import pressure_reasons
 from cdtool.evaluation.protocol.reasons import ReasonKind, Verdict
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 
 CHEST = read_force_limits()["iso_ts_15066_chest"]
 TIME = np.arange(4000) * 1e-3

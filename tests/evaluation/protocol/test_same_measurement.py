@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.protocol.same_measurement import hold_same_measurement
-from cdtool.recording import FloatArray
 
 
 def curve(time: FloatArray, force: FloatArray) -> ForceTimeCurve:

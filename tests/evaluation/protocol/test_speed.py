@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.arrays import FloatArray
 from cdtool.clock import differentiate
 from cdtool.errors import UsageError
 from cdtool.evaluation.protocol.plan import MeasuringPoint
 from cdtool.evaluation.protocol.speed import speed_before
 from cdtool.evaluation.protocol.speed_reasons import speed_reasons
 from cdtool.findings import Finding
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 
 CONTACT = Contact(start=2.0, end=2.5, uncertainty=0.0)
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.evaluation.traces.decimation import decimate, kept_samples
-from cdtool.recording import FloatArray
 
 numbers = st.one_of(st.floats(-1e6, 1e6), st.just(float("nan")))
 series = st.integers(1, 600).flatmap(lambda n: arrays(np.float64, n, elements=numbers, fill=st.floats(-1.0, 1.0)))

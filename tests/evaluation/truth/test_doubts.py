@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.truth.doubts import follows_torque, truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import Recording, Series
 from tests.data_folder import UR10E_LOGS
 from tests.findings.facts import fact_of
 

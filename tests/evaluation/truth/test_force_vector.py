@@ -10,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import RecordingError
 from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.force_vector import ForceMagnitude, force_magnitude, quiet_level, with_scalar_force
 from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 from tests.findings.facts import fact_of
 
 GATE = OnsetRule(above=20.0, back_to=8.0)

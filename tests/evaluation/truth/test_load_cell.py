@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 
 GATE = OnsetRule(above=20.0, back_to=8.0)
 SPEED, STIFFNESS = 0.2, 22e3  # a soft impact of the gate: 4.4 N in the first millisecond

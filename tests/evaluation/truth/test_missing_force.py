@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.detection import Alarm, Signal, Status, Verdict
 from cdtool.evaluation.force.curve import force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
@@ -12,7 +13,7 @@ from cdtool.evaluation.force.verdict import assess_force
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.matching import match
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.recording import Contact, Recording, Series
 from tests.findings.facts import fact_of
 
 RULE = OnsetRule(above=20.0, back_to=8.0)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+from cdtool.arrays import FloatArray
 from cdtool.errors import UsageError
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
 from cdtool.evaluation.force.verdict import assess_force
-from cdtool.recording import FloatArray
 from cdtool.report.plots import force_plot
 from cdtool.report.plots.figures import SUFFIXES, drawing
 from cdtool.report.plots.force_plot import ForceCurve, ForcePanel, plot_forces

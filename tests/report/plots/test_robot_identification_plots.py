@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.identification.friction_choice import FrictionForm
 from cdtool.identification.friction_curve import FrictionCurve
-from cdtool.report.plots.identification_plots import png
+from cdtool.report.plots.figures import png
 from cdtool.report.plots.robot_identification_plots import JointPanel, draw_joint_frictions, draw_unseen_torques
 from cdtool.workflows.identification.robot_evidence import (
     FrictionAnswer,

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from cdtool.arrays import FloatArray
 from cdtool.evaluation.protocol.protocol import Protocol
-from cdtool.recording import FloatArray
 from cdtool.report.protocol.blocks import Document
 from cdtool.report.protocol.document import protocol_document
 from cdtool.workflows.benchmark.benchmark import benchmark

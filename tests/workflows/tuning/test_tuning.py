@@ -22,7 +22,6 @@ from cdtool.report.tuning_files import open_folder, write_tuning
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.log_groups import Split
 from cdtool.workflows.tuning import tuning as module
