@@ -22,8 +22,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.errors import RecordingError, UsageError, installing
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
-from cdtool.evaluation.results_file import build
 from cdtool.evaluation.rows import Rows, picked, values_of
+from cdtool.evaluation.typed_rows import build
 from cdtool.strict_json import strict_json
 
 PROVENANCE = "provenance.json"

@@ -20,8 +20,8 @@ import numpy.typing as npt
 from cdtool.arrays import FloatArray
 from cdtool.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.errors import RecordingError
-from cdtool.evaluation.results_file import build
 from cdtool.evaluation.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
+from cdtool.evaluation.typed_rows import build
 from cdtool.recording import Contact
 from cdtool.strict_json import finite, strict_json
 

@@ -16,7 +16,8 @@ from cdtool.pipeline import run_detector
 from cdtool.thresholds.base import FittedThreshold, is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.left_out import LeftOut
-from cdtool.workflows.execution.workers import Workers, in_order, shares_memory
+from cdtool.workflows.execution.forking import shares_memory
+from cdtool.workflows.execution.workers import Workers, in_order
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import NoUsableRunError, Pair, fitting, signals_of, with_left_out

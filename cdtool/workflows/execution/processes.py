@@ -21,9 +21,9 @@ from time import monotonic, monotonic_ns
 from typing import Any
 
 from cdtool.errors import WorkerError
+from cdtool.workflows.execution.forking import shares_memory
 from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, ended_words, limit_words
 from cdtool.workflows.execution.interruption import without_interruption
-from cdtool.workflows.execution.workers import shares_memory
 
 # On Windows, a process is ended in one way only.
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)

@@ -9,8 +9,6 @@ worker; the items that were under way beside it are repeated without being count
 from __future__ import annotations
 
 import gc
-import sys
-import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, wait
@@ -115,14 +113,6 @@ class Pool(Protocol):
     def __call__(self) -> AbstractContextManager[Any]:
         """Return the context."""
         ...
-
-
-def shares_memory() -> bool:
-    """Return whether processes that are started now are forked and share the memory of this one.
-
-    A fork with other threads could keep a lock for ever.
-    """
-    return sys.platform == "linux" and threading.active_count() == 1
 
 
 def in_order(

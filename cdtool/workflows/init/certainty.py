@@ -6,7 +6,8 @@ import dataclasses
 
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.quantity_words import is_reference
-from cdtool.workflows.init.streams import Channels, Found, Stream
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import Channels, Found
 
 # Correlations above which a position's derivative is the speed, and a set value that of the measured channel.
 _FITS, _FOLLOWS = 0.9, 0.9

@@ -27,7 +27,8 @@ from cdtool.workflows.init.quantity_words import (
     word_for,
     words,
 )
-from cdtool.workflows.init.streams import Channels, Found, Stream
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import Channels, Found
 from cdtool.workflows.init.units_in_names import label, may_be, pressure_unit, quantity_of_unit
 
 # Above this correlation one column is treated as another's derivative; above the second one without any name.

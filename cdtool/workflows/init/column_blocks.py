@@ -12,7 +12,8 @@ import numpy as np
 from cdtool.arrays import FloatArray
 from cdtool.plausibility.drive import explained
 from cdtool.workflows.init import motion_evidence as motion
-from cdtool.workflows.init.streams import Stream, joined
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import joined
 
 _FITS, _ALIKE = 0.9, 0.97
 # A single pair must fit better: of a tool on a circle one coordinate is nearly the derivative of the other.

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.arrays import FloatArray
-from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import Channels
 
 # The default of the machine file [Hz], and the lowest corner that is proposed.
 _DEFAULT, _LOWEST = 50.0, 1.0

@@ -14,7 +14,8 @@ from cdtool.findings import Finding
 from cdtool.recording import CONTACT_PRESSURE, RIG_UNITS, UNITLESS
 from cdtool.workflows.init.derived_speed import LowPass
 from cdtool.workflows.init.machine_side import Side
-from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import Channels
 from cdtool.workflows.init.units import Evidence, Logged
 from cdtool.workflows.init.unmapped import Unmapped
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from cdtool.arrays import FloatArray
-from cdtool.workflows.init.streams import Stream
+from cdtool.workflows.init.stream import Stream
 
 _WINDOWS = 400
 _SURE = 0.9

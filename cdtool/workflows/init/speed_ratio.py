@@ -14,7 +14,8 @@ import numpy as np
 from cdtool.units import find_unit
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.quantity_words import is_twist, motion_of, words
-from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import Channels
 from cdtool.workflows.init.table_clock import TableClock
 from cdtool.workflows.init.units_in_names import factor_of, label, own_name, si_of, unit_in_name
 

@@ -12,7 +12,8 @@ from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.machine_side import Side
 from cdtool.workflows.init.quantity_words import is_current, word_for, words
 from cdtool.workflows.init.speed_ratio import Ratio, implausible, motion_kind, rotation_unit, stated, whole_numbers
-from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import Channels
 from cdtool.workflows.init.units_in_names import label
 
 _RAW = ("A", "V", "1", "count")

@@ -13,7 +13,7 @@ from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
 
 if TYPE_CHECKING:
-    from cdtool.workflows.init.streams import Stream
+    from cdtool.workflows.init.stream import Stream
 
 _QUANTITIES = (*MEASURED, "force")
 # Possible logged units of a quantity on any machine: SI units, and those that a scale converts.

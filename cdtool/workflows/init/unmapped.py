@@ -10,7 +10,8 @@ from cdtool.recording import MEASURED
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.channel_guess import force_strength, name_strength
 from cdtool.workflows.init.quantity_words import is_clock, is_reference, what_else
-from cdtool.workflows.init.streams import Channels, Stream
+from cdtool.workflows.init.stream import Stream
+from cdtool.workflows.init.streams import Channels
 from cdtool.workflows.init.units_in_names import is_foreign, label
 
 _FOLLOWS = 0.97

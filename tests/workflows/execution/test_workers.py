@@ -20,7 +20,8 @@ from hypothesis import strategies as st
 from cdtool import errors
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import Recording, Series
-from cdtool.workflows.execution.workers import Workers, in_order, shares_memory
+from cdtool.workflows.execution.forking import shares_memory
+from cdtool.workflows.execution.workers import Workers, in_order
 
 
 def doubled(number):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.workflows.init.column_blocks import find_blocks
-from cdtool.workflows.init.streams import Stream
+from cdtool.workflows.init.stream import Stream
 from tests.workflows.init.layouts.motion import arm_motion, stroke_motion
 
 QUANTITIES = {

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cdtool import init, init_study
 from cdtool.workflows.init import motion_evidence as motion
-from cdtool.workflows.init.streams import Stream
+from cdtool.workflows.init.stream import Stream
 from tests.data_folder import data, needs_data
 from tests.workflows.init.drafts import drafted, drafted_columns, stroke
 from tests.workflows.init.layouts.motion import arm_motion
