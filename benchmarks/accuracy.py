@@ -13,15 +13,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import mean, stdev
 
-from cdtool.errors import NothingValidError
-from cdtool.evaluation.truth.matching import match
-from cdtool.evaluation.truth.onset import find_contacts
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import detect_operation
-from cdtool.recording import Recording
+from cdtool.alarms.pipeline import detect_operation
+from cdtool.base.errors import NothingValidError
+from cdtool.commands.learning.fitting import fit_operations
+from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
-from cdtool.workflows.signature.fitting import fit_operations
+from cdtool.truth.matching import match
+from cdtool.truth.onset import find_contacts
 
 IMPACTS = ("stiff", "soft")
 HEADS = ("missed", "false", "reference", "worst seed")

@@ -25,16 +25,16 @@ import emps_pulses
 from timing import environment, table
 
 from cdtool import benchmark, simulate_arm, simulate_gate
-from cdtool.activation import Activation
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.judgement import judged
+from cdtool.commands.learning.fitting import fitting
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file
+from cdtool.commands.simulate.arm_parameters import ArmParameters
+from cdtool.commands.simulate.changed_machine import ChangedMachine
+from cdtool.commands.simulate.gate_model import GateParameters
 from cdtool.detectors.momentum import Momentum
-from cdtool.judgement import judged
-from cdtool.operations import operations_of
-from cdtool.simulation.arm_parameters import ArmParameters
-from cdtool.simulation.changed_machine import ChangedMachine
-from cdtool.simulation.gate_model import GateParameters
+from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
-from cdtool.workflows.signature.fitting import fitting
 
 FIRST_SEED = 601
 REACH = 6.0  # spreads

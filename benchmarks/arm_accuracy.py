@@ -38,12 +38,12 @@ from accuracy import (
 )
 from timing import environment, table
 
+from cdtool.commands.simulate.arm_model import simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
+from cdtool.commands.simulate.arm_recordings import as_recording, write_arm_recordings
+from cdtool.commands.simulate.recording_folder import GROUPS, IMPACT_OF
 from cdtool.detectors import DETECTORS
-from cdtool.recording import Recording
-from cdtool.simulation.arm_model import simulate_arm_run
-from cdtool.simulation.arm_parameters import ArmParameters, Trial
-from cdtool.simulation.arm_recordings import as_recording, write_arm_recordings
-from cdtool.simulation.recording_folder import GROUPS, IMPACT_OF
+from cdtool.recordings.recording import Recording
 
 SEEDS = (801, 802, 803, 804, 805)
 COUNTS = {"free": 14, "holdout": 30, "stiff": 30, "soft": 30}

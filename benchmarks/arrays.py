@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.base.tables import Table
 from cdtool.machines.linear_axis import LinearAxis
-from cdtool.recording import Recording, Series
-from cdtool.tables import Table
+from cdtool.recordings.recording import Recording, Series
 
 Array = npt.NDArray[np.float64]
 

@@ -24,9 +24,9 @@ import numpy as np
 from timing import environment
 
 from cdtool import benchmark, compare, simulate_gate
-from cdtool.activation import Activation
-from cdtool.evaluation.results import Results
-from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from cdtool.alarms.activation import Activation
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file
+from cdtool.results.results import Results
 
 SEEDS = (901, 902, 903, 904, 905)
 IMPACTS = 30

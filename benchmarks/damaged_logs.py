@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.clock import clean_time
-from cdtool.recording import MEASURED, Recording, Series
+from cdtool.recordings.clock import clean_time
+from cdtool.recordings.recording import MEASURED, Recording, Series
 
 LONGEST = 50
 KINDS = ("lost rows", "repeated stamps", "NaN", "lost samples")

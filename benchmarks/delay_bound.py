@@ -20,13 +20,13 @@ import numpy as np
 from scipy.optimize import brentq
 from timing import table
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal
-from cdtool.evaluation.truth.onset import find_contacts
-from cdtool.operations import Operation
-from cdtool.pipeline import run_detector
+from cdtool.alarms.pipeline import run_detector
+from cdtool.base.arrays import FloatArray
+from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.operations import Operation
 from cdtool.thresholds.cusum import Cusum
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.truth.onset import find_contacts
 
 # Bounds [ms] by machine and group over all channels with a VAR(80) noise model, at 1 false alarm in 1000 operations:
 # quoted from the specification (quickest_detection.md), not measured here.

@@ -27,12 +27,12 @@ import numpy as np
 from arrays import PERIOD, Array, gate
 from timing import Spread, main, ratio, table, verdict
 
-from cdtool.detection import Signal
+from cdtool.base.tables import Table
 from cdtool.detectors import DETECTORS
+from cdtool.detectors.detection import Signal
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_robot import UrdfRobot
-from cdtool.recording import Recording, Series
-from cdtool.tables import Table
+from cdtool.recordings.recording import Recording, Series
 
 # Samples of the log of each machine: the slowest detector on it takes a quarter of a second.
 SAMPLES = {"gate": 300_000, "arm": 200_000, "robot": 40_000}

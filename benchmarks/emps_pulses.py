@@ -30,18 +30,18 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 import cdtool  # noqa: E402
-from cdtool.axis_model.model_table import axis_model  # noqa: E402
-from cdtool.axis_model.parameters import AxisModel  # noqa: E402
-from cdtool.axis_model.simulation import AxisInputs, simulate_axis  # noqa: E402
+from cdtool.commands.inject.channel_change import ChannelChange  # noqa: E402
+from cdtool.commands.inject.injected_recording import injected_recording  # noqa: E402
 from cdtool.detectors.momentum import Momentum  # noqa: E402
-from cdtool.identification.axis_run import AxisRun, axis_run  # noqa: E402
-from cdtool.ingest.reading import read_as_logged  # noqa: E402
-from cdtool.injection.channel_change import ChannelChange  # noqa: E402
-from cdtool.injection.injected_recording import injected_recording  # noqa: E402
-from cdtool.logged_recording import LoggedRecording  # noqa: E402
-from cdtool.machine_file import MachineFile, read_machine_file  # noqa: E402
+from cdtool.formats.channels.logged_recording import LoggedRecording  # noqa: E402
+from cdtool.formats.channels.reading import read_as_logged  # noqa: E402
+from cdtool.formats.machine_file import MachineFile, read_machine_file  # noqa: E402
 from cdtool.machines.axis import Axis  # noqa: E402
-from cdtool.recording import Recording  # noqa: E402
+from cdtool.machines.axis_model.axis_run import AxisRun, axis_run  # noqa: E402
+from cdtool.machines.axis_model.model_table import axis_model  # noqa: E402
+from cdtool.machines.axis_model.parameters import AxisModel  # noqa: E402
+from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis  # noqa: E402
+from cdtool.recordings.recording import Recording  # noqa: E402
 
 Array = npt.NDArray[np.float64]
 

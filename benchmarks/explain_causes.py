@@ -33,24 +33,24 @@ import numpy as np
 from accuracy import written_setup
 from timing import environment, table
 
-from cdtool.activation import Activation
-from cdtool.axis_model.sensor_filters import first_order_low_pass
-from cdtool.detection import Signal
-from cdtool.errors import CdtoolError
-from cdtool.evaluation.explanation.explanation import AlarmExplanation, explain_alarm
-from cdtool.evaluation.explanation.normal_choice import NormalMotions
-from cdtool.machine_file import MachineFile
-from cdtool.motion import motion_class
-from cdtool.operations import Operation
-from cdtool.pipeline import Detection, judge, run_detector
-from cdtool.recording import MEASURED, Recording, Series
-from cdtool.simulation import arm_recordings, gate_recordings
-from cdtool.simulation.arm_model import simulate_arm_run
-from cdtool.simulation.arm_parameters import ArmParameters
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, judge, run_detector
+from cdtool.base.errors import CdtoolError
+from cdtool.commands.learning.fitting import fit_operations
+from cdtool.commands.simulate import arm_recordings, gate_recordings
+from cdtool.commands.simulate.arm_model import simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.detectors.detection import Signal
+from cdtool.formats.machine_file import MachineFile
+from cdtool.machines.axis_model.sensor_filters import first_order_low_pass
+from cdtool.recordings.motion import motion_class
+from cdtool.recordings.operations import Operation
+from cdtool.recordings.recording import MEASURED, Recording, Series
+from cdtool.results.explanation.explanation import AlarmExplanation, explain_alarm
 from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.normal_choice import NormalMotions
 from cdtool.thresholds.normal_motion import NormalMotion, learn_normal_motion, levels
-from cdtool.workflows.signature.fitting import fit_operations
 
 SEEDS = (911, 912)
 ALARMS = 100

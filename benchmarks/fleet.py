@@ -44,11 +44,11 @@ def child(file: str, store: str, jobs: str, output: str, *flags: str) -> None:
     from time import perf_counter, process_time
 
     begin = perf_counter()
+    from cdtool.commands.scoring.benchmark import benchmark
+    from cdtool.execution.store.use import StoreUse
+    from cdtool.execution.workers import Workers
     from cdtool.report.outputs import write_outputs
     from cdtool.report.writers.base import Report
-    from cdtool.workflows.benchmark.benchmark import benchmark
-    from cdtool.workflows.execution.workers import Workers
-    from cdtool.workflows.store.use import StoreUse
 
     times: list[float] = []
 
@@ -184,8 +184,8 @@ def _planned(file: Path, store: Path) -> dict[str, int]:
     """Return how many recordings would be computed by the detectors that would run."""
     from collections import Counter
 
-    from cdtool.workflows.benchmark.dry_run import dry_run
-    from cdtool.workflows.store.use import StoreUse
+    from cdtool.commands.scoring.dry_run import dry_run
+    from cdtool.execution.store.use import StoreUse
 
     return dict(Counter(", ".join(item.detectors) for item in dry_run(file, store=StoreUse(store)).logs))
 

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from cdtool.simulation.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
 
 # What is simulated; each scored one is copied with another last digit, since recordings of equal content are refused.
 _SIMULATED = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}

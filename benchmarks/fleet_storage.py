@@ -25,9 +25,9 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 import cdtool  # noqa: E402
-from cdtool.remote import transferred  # noqa: E402
-from tests.remote.s3_server import S3Server  # noqa: E402
-from tests.workflows.execution.dask_cluster import environment, site_with_plugin  # noqa: E402
+from cdtool.base.remote import transferred  # noqa: E402
+from tests.base.remote.s3_server import S3Server  # noqa: E402
+from tests.execution.dask_cluster import environment, site_with_plugin  # noqa: E402
 
 RECORDINGS, GIGABYTES = 1000, 2.0
 DAMAGED, DELETED, FATAL = 30, 10, 5

@@ -21,7 +21,7 @@ from timing import interleaved, main, ratio, table, verdict
 
 from cdtool.detectors import friction_ekf as detector_module
 from cdtool.detectors.friction_ekf import FrictionEkf, JointMeasurements
-from cdtool.dynamics import JointEquation
+from cdtool.machines.dynamics import JointEquation
 from cdtool.machines.linear_axis import LinearAxis
 
 SAMPLES = 1_000_000

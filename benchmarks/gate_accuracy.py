@@ -34,11 +34,11 @@ from accuracy import (
 )
 from timing import environment, table
 
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import GROUPS, as_recording, write_gate_recordings
+from cdtool.commands.simulate.recording_folder import IMPACT_OF
 from cdtool.detectors import DETECTORS
-from cdtool.recording import Recording
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
-from cdtool.simulation.gate_recordings import GROUPS, as_recording, write_gate_recordings
-from cdtool.simulation.recording_folder import IMPACT_OF
+from cdtool.recordings.recording import Recording
 
 SEEDS = (401, 402, 403, 404, 405)
 COUNTS = {"free": 14, "holdout": 40, "stiff": 30, "soft": 30}

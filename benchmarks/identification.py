@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 import cdtool  # noqa: E402
-from tests.identification.robot_coverage import (  # noqa: E402
+from tests.commands.identify.robot_coverage import (  # noqa: E402
     Value,
     friction_values,
     gain_values,

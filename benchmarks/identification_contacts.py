@@ -19,17 +19,17 @@ from timing import main
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from cdtool.axis_model.parameters import Sensors  # noqa: E402
-from cdtool.evaluation.truth.onset import find_contacts  # noqa: E402
-from cdtool.evaluation.truth.onset_rule import OnsetRule  # noqa: E402
-from cdtool.identification.contact_fit import ContactFit, ContactSettings, identify_contacts  # noqa: E402
-from cdtool.identification.load_cell_contact import load_cell_contact  # noqa: E402
-from cdtool.identification.torque_constant import identify_torque_scale  # noqa: E402
-from cdtool.identification.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
-from cdtool.recording import Recording, Series  # noqa: E402
-from cdtool.simulation import sensors  # noqa: E402
-from cdtool.simulation.gate_model import GateParameters, integrate_gate, simulate_gate_run  # noqa: E402
-from cdtool.simulation.gate_recordings import as_recording  # noqa: E402
+from cdtool.commands.identify.axis.torque_constant import identify_torque_scale  # noqa: E402
+from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
+from cdtool.commands.identify.contact.contact_fit import ContactFit, ContactSettings, identify_contacts  # noqa: E402
+from cdtool.commands.identify.contact.load_cell_contact import load_cell_contact  # noqa: E402
+from cdtool.commands.simulate import sensors  # noqa: E402
+from cdtool.commands.simulate.gate_model import GateParameters, integrate_gate, simulate_gate_run  # noqa: E402
+from cdtool.commands.simulate.gate_recordings import as_recording  # noqa: E402
+from cdtool.machines.axis_model.parameters import Sensors  # noqa: E402
+from cdtool.recordings.recording import Recording, Series  # noqa: E402
+from cdtool.truth.onset import find_contacts  # noqa: E402
+from cdtool.truth.onset_rule import OnsetRule  # noqa: E402
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, free_runs, on_any_track  # noqa: E402
 
 SETS, RUNS, CONTACTS, FIRST_SEED = 30, 14, 3, 3000

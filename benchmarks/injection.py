@@ -31,35 +31,35 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 import cdtool  # noqa: E402
-from cdtool.activation import Activation  # noqa: E402
-from cdtool.axis_model.model_table import axis_model  # noqa: E402
-from cdtool.axis_model.obstacle import Obstacle  # noqa: E402
-from cdtool.axis_model.parameters import AxisModel, Drive, Sensors  # noqa: E402
+from cdtool.alarms.activation import Activation  # noqa: E402
+from cdtool.alarms.pipeline import detect_operation, run_detector  # noqa: E402
+from cdtool.base.tables import Table  # noqa: E402
+from cdtool.commands.identify.axis.speed_controller import identify_controller  # noqa: E402
+from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
+from cdtool.commands.identify.contact.contact_fit import ContactSettings, identify_contacts, with_contacts  # noqa: E402
+from cdtool.commands.identify.contact.load_cell_contact import load_cell_contact  # noqa: E402
+from cdtool.commands.identify.identifying import IdentifiedMachine  # noqa: E402
+from cdtool.commands.inject.assumption import ControllerReaction, assumptions_of  # noqa: E402
+from cdtool.commands.inject.axis_contact import axis_contact  # noqa: E402
+from cdtool.commands.inject.injected_recording import injected_recording  # noqa: E402
+from cdtool.commands.inject.refusal import refusal  # noqa: E402
+from cdtool.commands.simulate.gate_model import Impact, simulate_gate_run  # noqa: E402
+from cdtool.commands.simulate.gate_recordings import as_recording  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402
-from cdtool.evaluation.agreement import with_model_error  # noqa: E402
-from cdtool.evaluation.truth.onset import find_contacts  # noqa: E402
-from cdtool.evaluation.truth.onset_rule import OnsetRule  # noqa: E402
-from cdtool.identification.axis_run import axis_run  # noqa: E402
-from cdtool.identification.contact_fit import ContactSettings, identify_contacts, with_contacts  # noqa: E402
-from cdtool.identification.load_cell_contact import load_cell_contact  # noqa: E402
-from cdtool.identification.speed_controller import identify_controller  # noqa: E402
-from cdtool.identification.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
-from cdtool.injection.assumption import ControllerReaction, assumptions_of  # noqa: E402
-from cdtool.injection.axis_contact import axis_contact  # noqa: E402
-from cdtool.injection.injected_recording import injected_recording  # noqa: E402
-from cdtool.injection.refusal import refusal  # noqa: E402
-from cdtool.machine_file import read_machine_file  # noqa: E402
+from cdtool.formats.machine_file import read_machine_file  # noqa: E402
 from cdtool.machines.axis import Axis  # noqa: E402
+from cdtool.machines.axis_model.axis_run import axis_run  # noqa: E402
+from cdtool.machines.axis_model.model_table import axis_model  # noqa: E402
+from cdtool.machines.axis_model.obstacle import Obstacle  # noqa: E402
+from cdtool.machines.axis_model.parameters import AxisModel, Drive, Sensors  # noqa: E402
 from cdtool.machines.linear_axis import LinearAxis  # noqa: E402
-from cdtool.operations import operations_of  # noqa: E402
-from cdtool.pipeline import detect_operation, run_detector  # noqa: E402
-from cdtool.recording import Recording  # noqa: E402
-from cdtool.simulation.gate_model import Impact, simulate_gate_run  # noqa: E402
-from cdtool.simulation.gate_recordings import as_recording  # noqa: E402
-from cdtool.tables import Table  # noqa: E402
+from cdtool.recordings.operations import operations_of  # noqa: E402
+from cdtool.recordings.recording import Recording  # noqa: E402
+from cdtool.results.agreement import with_model_error  # noqa: E402
 from cdtool.thresholds.signature import Signature  # noqa: E402
-from cdtool.workflows.identification.identifying import IdentifiedMachine  # noqa: E402
-from tests.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle  # noqa: E402
+from cdtool.truth.onset import find_contacts  # noqa: E402
+from cdtool.truth.onset_rule import OnsetRule  # noqa: E402
+from tests.machines.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle  # noqa: E402
 from tests.synthetic import plain_gate  # noqa: E402
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, free_recording, without_references  # noqa: E402
 

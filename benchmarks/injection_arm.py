@@ -28,23 +28,23 @@ from timing import main
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from cdtool.alarms.pipeline import detect_operation  # noqa: E402
+from cdtool.base.errors import CdtoolError  # noqa: E402
+from cdtool.commands.inject.injected_recording import injected_recording  # noqa: E402
+from cdtool.commands.inject.robot_contact import RobotLog, robot_contact  # noqa: E402
+from cdtool.commands.learning.fitting import fit_operations  # noqa: E402
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile  # noqa: E402
+from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run  # noqa: E402
+from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial  # noqa: E402
+from cdtool.commands.simulate.arm_recordings import as_recording, write_arm_recordings  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402
 from cdtool.detectors.base import Detector  # noqa: E402
-from cdtool.errors import CdtoolError  # noqa: E402
-from cdtool.identification.axis_run import axis_run  # noqa: E402
-from cdtool.injection.injected_recording import injected_recording  # noqa: E402
-from cdtool.injection.robot_contact import RobotLog, robot_contact  # noqa: E402
+from cdtool.machines.axis_model.axis_run import axis_run  # noqa: E402
 from cdtool.machines.planar_arm import PlanarArm  # noqa: E402
-from cdtool.operations import operations_of  # noqa: E402
-from cdtool.pipeline import detect_operation  # noqa: E402
-from cdtool.recording import Recording  # noqa: E402
-from cdtool.simulation.arm_model import Impact, simulate_arm_run  # noqa: E402
-from cdtool.simulation.arm_parameters import ArmParameters, Trial  # noqa: E402
-from cdtool.simulation.arm_recordings import as_recording, write_arm_recordings  # noqa: E402
+from cdtool.recordings.operations import operations_of  # noqa: E402
+from cdtool.recordings.recording import Recording  # noqa: E402
 from cdtool.thresholds.base import FittedThreshold  # noqa: E402
-from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile  # noqa: E402
-from cdtool.workflows.signature.fitting import fit_operations  # noqa: E402
-from tests.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point  # noqa: E402
+from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point  # noqa: E402
 
 SEEDS, PAIRS, LEARNED = 5, 8, 14
 FIRST_SEED = 7100

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 from timing import environment, table
 
-from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.kaplan_meier import latency_quantile
-from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
-from cdtool.evaluation.statistics.small_sample import FEWEST, median_of, p95_of
-from cdtool.evaluation.statistics.spread import mean_interval
+from cdtool.statistics.interval import Interval
+from cdtool.statistics.kaplan_meier import latency_quantile
+from cdtool.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
+from cdtool.statistics.small_sample import FEWEST, median_of, p95_of
+from cdtool.statistics.spread import mean_interval
 
 REPETITIONS = 1000
 NOMINAL = 0.95

@@ -164,7 +164,7 @@ def _run_once(inputs: Path) -> None:
 
 
 def _cdtool(words: Sequence[str]) -> int:
-    from cdtool.cli.app import main as cdtool
+    from cdtool.commands.app import main as cdtool
 
     sys.argv = ["cdtool", *words]
     try:
@@ -284,7 +284,7 @@ def _try(case: Case, known: Known, strike: Strike, out: Path, calls: Any) -> tup
 
 def _hard_kill(known: Known, left: Snapshot, out: Path) -> str:
     """After SIGKILL: each file or folder old or new; hidden temporaries may be left until the next write."""
-    from cdtool.files import write_text
+    from cdtool.base.files.writing import write_text
 
     whole = {name: value for name, value in left.items() if ".cdtool-" not in name}
     for unit in sorted({_unit(name) for name in {*whole, *known.old_files, *known.new_files}}):
@@ -393,7 +393,7 @@ def run(words: Sequence[str], calls: Any, strike: Strike, out: Path) -> Outcome:
 
 
 def _child(words: Sequence[str], calls: Any, strike: Strike, out: Path, begun: int, told: int) -> None:
-    from cdtool.files import clean_up
+    from cdtool.base.files.writing import clean_up
 
     # As in a terminal: what runs in the background of a script ignores SIGINT, and its children with it.
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -29,19 +29,13 @@ sys.path.insert(0, str(ROOT))
 
 from timing import environment, table  # noqa: E402
 
-from cdtool.evaluation.evaluated import evaluate  # noqa: E402
-from cdtool.evaluation.sweep import MULTIPLES, Swept  # noqa: E402
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file  # noqa: E402
+from cdtool.commands.scoring.gathering import Gathering  # noqa: E402
+from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, LogRows, OperationOutcome, Wanted  # noqa: E402
 from cdtool.report.outputs import write_outputs  # noqa: E402
 from cdtool.report.writers.base import Report  # noqa: E402
-from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file  # noqa: E402
-from cdtool.workflows.benchmark.log_outcome import (  # noqa: E402
-    DetectorOutcome,
-    LogOutcome,
-    LogRows,
-    OperationOutcome,
-    Wanted,
-)
-from cdtool.workflows.gathering import Gathering  # noqa: E402
+from cdtool.results.curves.sweep import MULTIPLES, Swept  # noqa: E402
+from cdtool.results.evaluated import evaluate  # noqa: E402
 from tests.report.html.html_case import trace_of  # noqa: E402
 from tests.synthetic.many_results import DETECTORS, RowsOfLog, rows_of_logs  # noqa: E402
 

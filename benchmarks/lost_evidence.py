@@ -24,11 +24,11 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.activation import Activation, crossings_of
-from cdtool.arrays import BoolArray
-from cdtool.detection import Status
-from cdtool.pipeline import Detection
-from cdtool.recording import Contact, Recording
+from cdtool.alarms.activation import Activation, crossings_of
+from cdtool.alarms.pipeline import Detection
+from cdtool.base.arrays import BoolArray
+from cdtool.detectors.detection import Status
+from cdtool.recordings.recording import Contact, Recording
 
 # What a fault may cost beyond its own length [s].
 ALLOWED = 0.02

@@ -37,26 +37,26 @@ from scipy.stats import binomtest
 from thresholds import WHITENING, SharedWhitening
 from timing import environment, table
 
-from cdtool.activation import Activation
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, judge, run_detector
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import CdtoolError
+from cdtool.commands.learning.fitting import Fit, Pair, fitting
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
 from cdtool.detectors import DETECTORS
-from cdtool.errors import CdtoolError
-from cdtool.evaluation.false_alarm_budget import Budget, set_factor
-from cdtool.evaluation.statistics.paired import holm
-from cdtool.evaluation.sweep import critical_factor
-from cdtool.evaluation.truth.onset import find_contacts
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import Detection, judge, run_detector
-from cdtool.recording import Contact, Recording
-from cdtool.simulation.arm_recordings import write_arm_recordings
-from cdtool.simulation.gate_recordings import write_gate_recordings
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Contact, Recording
+from cdtool.results.curves.false_alarm_budget import Budget, set_factor
+from cdtool.results.curves.sweep import critical_factor
+from cdtool.statistics.paired import holm
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.sequential import FittedSequential
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.whitening import Whitening
-from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
-from cdtool.workflows.signature.fitting import Fit, Pair, fitting
+from cdtool.truth.onset import find_contacts
 
 SEED, FAULTS, SIGNIFICANT = 1501, 10, 0.05
 MACHINES: Mapping[str, tuple[Any, Any]] = {

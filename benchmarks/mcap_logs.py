@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 from mcap.writer import CompressionType, Writer
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.messages.schemas import DEFINITIONS, Definition
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.messages.schemas import DEFINITIONS, Definition
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 10**9

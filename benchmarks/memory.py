@@ -22,17 +22,17 @@ from memory_logs import MACHINE_CHANNELS, write_log
 from timing import main, table
 
 import cdtool
-from cdtool.ingest.channel_assembly import assemble_recording
-from cdtool.ingest.reading import mapped_source
-from cdtool.machine_file import read_machine_file
-from cdtool.recording import Recording
+from cdtool.formats.channels.channel_assembly import assemble_recording
+from cdtool.formats.channels.reading import mapped_source
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.recording import Recording
 
 GIGABYTES = 2.0
 HOUR_S, SHORT_S = 3600.0, 600.0
 DETECT_AT_MOST_MB, GROWTH_AT_MOST_MB = 1000, 50
 GATE = Path(__file__).parents[1] / "sample_logs" / "gate"
 DETECTORS = ("gm", "feekf")
-_COMMAND = "import sys; sys.argv[0] = 'cdtool'; from cdtool.cli.app import main; main()"
+_COMMAND = "import sys; sys.argv[0] = 'cdtool'; from cdtool.commands.app import main; main()"
 _EVERY_S = 0.005
 _FIGURES = ("VmHWM", "RssAnon", "RssFile")
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from cdtool.messages.schemas import DEFINITIONS
-from cdtool.recording import Recording
+from cdtool.formats.messages.schemas import DEFINITIONS
+from cdtool.recordings.recording import Recording
 
 START_NS, STEP_NS, SECOND_NS = 1_700_000_000 * 10**9, 10**6, 10**9
 IMAGE_EVERY = 100  # samples

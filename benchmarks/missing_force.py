@@ -25,14 +25,14 @@ from dataclasses import dataclass
 import numpy as np
 from timing import environment, table
 
-from cdtool.arrays import FloatArray
-from cdtool.evaluation.force.curve import force_time_curve
-from cdtool.evaluation.force.limits import ForceProfile, ForceStep
-from cdtool.evaluation.force.verdict import assess_force
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.recording import Contact, Recording, Series
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
-from cdtool.simulation.gate_recordings import IMPACT_OF
+from cdtool.base.arrays import FloatArray
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import IMPACT_OF
+from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.truth.force.curve import force_time_curve
+from cdtool.truth.force.limits import ForceProfile, ForceStep
+from cdtool.truth.force.verdict import assess_force
+from cdtool.truth.onset import OnsetRule, find_contacts
 
 SEEDS = (921, 922)
 CONTACTS, FAULTS = 100, 40

@@ -22,7 +22,7 @@ import numpy as np
 from mcap_logs import FLAT, JOINTS, write_log
 from timing import Spread, main, ratio, table, verdict
 
-from cdtool.simulation.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
 
 HERE = Path(__file__).resolve().parent
 SAMPLES = HERE.parent / "sample_logs" / "gate"
@@ -47,8 +47,8 @@ for line in sys.stdin:
 READERS = {
     "cdtool": (
         f"""
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.ingest.reading import choose_format
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.channels.reading import choose_format
 fields = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in {FLAT.wanted!r})
 wanted = ChannelMap(TimeSource(clock="log"), fields, {JOINTS!r}, topics=True)
 """,

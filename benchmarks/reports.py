@@ -18,12 +18,12 @@ from time import perf_counter
 import numpy as np
 from timing import environment, table
 
-from cdtool.evaluation.evaluated import evaluate
-from cdtool.evaluation.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
-from cdtool.evaluation.traces.choice import MOST_KEPT
+from cdtool.commands.scoring.benchmark import Benchmark, benchmark
 from cdtool.report.outputs import write_outputs
 from cdtool.report.writers.base import Report
-from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
+from cdtool.results.evaluated import evaluate
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
+from cdtool.results.traces.choice import MOST_KEPT
 
 DETECTORS = ("pure_inertia", "friction_ekf", "momentum", "inertial_momentum", "pure_torque")
 GROUPS = ("stiff", "soft", "holdout")

@@ -24,16 +24,16 @@ import numpy as np
 from accuracy import written_setup
 from timing import environment, table
 
-from cdtool.evaluation.statistics.prediction import GUMBEL_SHARE, prediction_of
-from cdtool.evaluation.sweep import critical_factor
-from cdtool.evaluation.upkeep.coverage import check_coverage
-from cdtool.operations import operations_of
-from cdtool.pipeline import judge, run_detector
-from cdtool.recording import Recording
-from cdtool.simulation.arm_recordings import write_arm_recordings
-from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
-from cdtool.workflows.signature.fitting import Pair
+from cdtool.alarms.pipeline import judge, run_detector
+from cdtool.commands.learning.fitting import Pair
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile
+from cdtool.commands.signature.coverage import check_coverage
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.recordings.operations import operations_of
+from cdtool.recordings.recording import Recording
+from cdtool.results.curves.sweep import critical_factor
+from cdtool.statistics.prediction import GUMBEL_SHARE, prediction_of
 
 SEEDS = (701, 702, 703, 704)
 LEARNED, OTHERS = 200, 200

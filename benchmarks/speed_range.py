@@ -26,22 +26,22 @@ from typing import Any
 import numpy as np
 from timing import environment, table
 
-from cdtool.activation import Activation
-from cdtool.detection import Signal, Status
-from cdtool.evaluation.truth.onset import find_contacts
-from cdtool.evaluation.truth.onset_rule import OnsetRule
-from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.motion import motion_class
-from cdtool.operations import Operation
-from cdtool.pipeline import judge, run_detector
-from cdtool.recording import Recording
-from cdtool.simulation import arm_recordings, gate_recordings
-from cdtool.simulation.arm_model import simulate_arm_run
-from cdtool.simulation.arm_parameters import ArmParameters
-from cdtool.simulation.changed_machine import ChangedMachine
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import judge, run_detector
+from cdtool.commands.simulate import arm_recordings, gate_recordings
+from cdtool.commands.simulate.arm_model import simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters
+from cdtool.commands.simulate.changed_machine import ChangedMachine
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.detectors.detection import Signal, Status
+from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.recordings.motion import motion_class
+from cdtool.recordings.operations import Operation
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.signature import Signature
+from cdtool.truth.onset import find_contacts
+from cdtool.truth.onset_rule import OnsetRule
 
 FIRST_SEED = 601
 LEARNED = (0.8, 1.2)

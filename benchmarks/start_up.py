@@ -22,7 +22,7 @@ from typing import Any
 from timing import Spread, interleaved, main, ratio, table, verdict
 
 import cdtool
-from cdtool.simulation.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
 
 HELP_ROUNDS = 25
 COMMAND_ROUNDS = 7
@@ -34,7 +34,7 @@ DETECT_AT_MOST_CPU_S = 0.9
 DETECT_AT_MOST_S = 2.0
 SAMPLES = Path(cdtool.__file__).parents[1] / "sample_logs" / "gate"
 
-_CDTOOL = "from cdtool.cli.app import main\n\nmain()\n"
+_CDTOOL = "from cdtool.commands.app import main\n\nmain()\n"
 _BARE = "from bare_app import app\n\napp()\n"
 
 
@@ -190,7 +190,7 @@ def _bare_app() -> tuple[str, int, int]:
     """Source of a typer app shaped like cdtool's, how many commands it has, and how many options and arguments."""
     import typer.main
 
-    from cdtool.cli.app import app
+    from cdtool.commands.app import app
 
     lines = [
         "from __future__ import annotations",

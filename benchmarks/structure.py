@@ -55,18 +55,18 @@ GOAL_LINES = 52_000  # what the package is to have at most once its files are in
 MOST_COMPLEX, MOST_ARGUMENTS = 10, 7
 # Modules whose calls are no step of a recording's walk, and why.
 UTILITIES: Mapping[str, str] = {
-    "cdtool.errors": "how any module reports an error",
-    "cdtool.plain_text": "how any module writes a number",
-    "cdtool.units": "a table of units that is looked up",
-    "cdtool.registry": "a table of names that is looked up",
-    "cdtool.kernels": "how a compiled loop is called",
-    "cdtool.channels": "a value: what the machine file maps",
-    "cdtool.recording": "a value: what has been read so far",
+    "cdtool.base.errors": "how any module reports an error",
+    "cdtool.base.plain_text": "how any module writes a number",
+    "cdtool.recordings.units": "a table of units that is looked up",
+    "cdtool.base.registry": "a table of names that is looked up",
+    "cdtool.base.kernels": "how a compiled loop is called",
+    "cdtool.formats.channels.channel_map": "a value: what the machine file maps",
+    "cdtool.recordings.recording": "a value: what has been read so far",
 }
 # Packages whose modules are each a format, the one by which they decode messages, and where a walk ends: the channels
 # are there, the method begins.
 FORMATS = "cdtool.formats"
-MESSAGES = "cdtool.messages"
+MESSAGES = "cdtool.formats.messages"
 METHOD = "cdtool.machines"
 
 
@@ -505,7 +505,7 @@ def write_logs(folder: Path) -> dict[str, Path]:
 def recorded() -> dict[str, list[Call]]:
     """The calls with which each log is read, by its kind; modules and kernels are loaded before."""
     import cdtool
-    from cdtool.machine_file import read_machine_file
+    from cdtool.formats.machine_file import read_machine_file
 
     if not Path(cdtool.__file__).samefile(PACKAGE / "__init__.py"):
         raise SystemExit(f"cdtool is imported from {cdtool.__file__}, not from this checkout; pip install -e .")

@@ -21,8 +21,8 @@ from timing import environment, table
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from cdtool.evaluation.synchronisation.audit import audit
-from cdtool.evaluation.synchronisation.latency import ChannelLatency, preferred
+from cdtool.truth.synchronisation.audit import audit
+from cdtool.truth.synchronisation.latency import ChannelLatency, preferred
 from tests.synthetic.shifted_clocks import Clocks, Sensors, axis, collisions
 
 SETS = 300

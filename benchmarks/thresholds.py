@@ -28,20 +28,20 @@ from delay_bound import Limit, limit_of, print_bounds, print_whiteness
 from scipy.stats import betabinom, binomtest
 from timing import environment, table
 
-from cdtool.detection import Signal
-from cdtool.evaluation.false_alarm_budget import Budget
-from cdtool.evaluation.truth.matching import match
-from cdtool.evaluation.truth.onset import find_contacts
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import detect_operation
-from cdtool.recording import Recording
-from cdtool.simulation.arm_recordings import write_arm_recordings
-from cdtool.simulation.gate_recordings import write_gate_recordings
+from cdtool.alarms.pipeline import detect_operation
+from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.commands.scoring.learned_thresholds import learn_thresholds
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Recording
+from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.sequential import FittedSequential
 from cdtool.thresholds.settings import with_context
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
-from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds
+from cdtool.truth.matching import match
+from cdtool.truth.onset import find_contacts
 
 SEED = 901
 COUNTS = {"free": 1000, HOLDOUT: 300, "stiff": 100, "soft": 100}

@@ -21,9 +21,9 @@ from time import perf_counter
 from timing import environment, table
 
 from cdtool import benchmark, simulate_gate, tune
-from cdtool.report.tuning_files import open_folder, write_tuning
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, ImpactGroup, read_benchmark_file
-from cdtool.workflows.execution.workers import Workers
+from cdtool.commands.scoring.benchmark_file import HOLDOUT, ImpactGroup, read_benchmark_file
+from cdtool.commands.tune.files import open_folder, write_tuning
+from cdtool.execution.workers import Workers
 
 SEEDS, FRESH = (801, 802, 803, 804, 805), 100_000
 DETECTORS = ("friction_ekf", "inertial_momentum")

@@ -25,8 +25,8 @@ from time import perf_counter, process_time
 
 from timing import Spread, main, ratio, table, verdict
 
-from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark.benchmark import benchmark
+from cdtool.commands.scoring.benchmark import benchmark
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
 
 COUNTS = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
 COPIES = 10

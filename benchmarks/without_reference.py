@@ -20,11 +20,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from cdtool.evaluation.results import Results
-from cdtool.simulation.arm_recordings import write_arm_recordings
-from cdtool.simulation.gate_model import GateParameters
-from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark.benchmark import benchmark
+from cdtool.commands.scoring.benchmark import benchmark
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.gate_model import GateParameters
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.results.results import Results
 
 DETECTORS = ("pi", "feekf", "gm", "igm", "pt", "vo", "eo", "dd", "kmo")
 EARLY = (0.05, 0.1, 0.15, 0.2, 0.3)

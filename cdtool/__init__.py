@@ -39,89 +39,89 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cdtool.clock import previous_value
-    from cdtool.detection import Alarm, Band, Signal, Status, Verdict
-    from cdtool.errors import CdtoolError
-    from cdtool.machine_file import MachineFile, read_machine_file
-    from cdtool.notebook.benchmark import benchmark
-    from cdtool.notebook.benchmark_result import BenchmarkResult
-    from cdtool.notebook.detection_result import DetectionResult, DetectionResults, detect, detect_runs
-    from cdtool.notebook.read_results import read_results
-    from cdtool.notebook.reading import read
-    from cdtool.notebook.score import score
-    from cdtool.notebook.tuning_result import TuningResult, tune
-    from cdtool.pipeline import Detection
-    from cdtool.recording import Contact, Recording, Series
-    from cdtool.simulation.arm_recordings import write_arm_recordings as simulate_arm
-    from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
+    from cdtool.alarms.pipeline import Detection
+    from cdtool.base.errors import CdtoolError
+    from cdtool.base.version import __version__
+    from cdtool.commands.benchmark.api import benchmark
+    from cdtool.commands.compare.comparing import compare
+    from cdtool.commands.compare.planning import plan
+    from cdtool.commands.convert.converting import convert
+    from cdtool.commands.convert.recovering import recover
+    from cdtool.commands.detect.result import DetectionResult, DetectionResults, detect, detect_runs
+    from cdtool.commands.explain.explaining import explain, explain_runs
+    from cdtool.commands.identify.identifying import identify
+    from cdtool.commands.init.drafting import init, init_study
+    from cdtool.commands.inject.coverage.coverage import coverage
+    from cdtool.commands.inject.injecting import inject
+    from cdtool.commands.judging.information import info
+    from cdtool.commands.judging.reading import read
+    from cdtool.commands.learning.learning import learn_signature
+    from cdtool.commands.protocol.making import protocol
+    from cdtool.commands.report.read_results import read_results
+    from cdtool.commands.score.api import score
+    from cdtool.commands.scoring.benchmark_result import BenchmarkResult
+    from cdtool.commands.signature.upkeep import check_signature
+    from cdtool.commands.signature.upkeep import update_with_runs as update_signature
+    from cdtool.commands.simulate.arm_recordings import write_arm_recordings as simulate_arm
+    from cdtool.commands.simulate.gate_recordings import write_gate_recordings as simulate_gate
+    from cdtool.commands.study.study import study_sensors
+    from cdtool.commands.tune.result import TuningResult, tune
+    from cdtool.detectors.detection import Alarm, Band, Signal, Status, Verdict
+    from cdtool.formats.machine_file import MachineFile, read_machine_file
+    from cdtool.recordings.clock import previous_value
+    from cdtool.recordings.recording import Contact, Recording, Series
     from cdtool.thresholds.cusum import Cusum
     from cdtool.thresholds.limit import Limit
     from cdtool.thresholds.signature import Signature
-    from cdtool.version import __version__
-    from cdtool.workflows.comparing import compare
-    from cdtool.workflows.convert.converting import convert
-    from cdtool.workflows.coverage import coverage
-    from cdtool.workflows.explaining import explain, explain_runs
-    from cdtool.workflows.identification.identifying import identify
-    from cdtool.workflows.information import info
-    from cdtool.workflows.init.drafting import init, init_study
-    from cdtool.workflows.injecting import inject
-    from cdtool.workflows.planning import plan
-    from cdtool.workflows.protocol.making import protocol
-    from cdtool.workflows.recovering import recover
-    from cdtool.workflows.signature.learning import learn_signature
-    from cdtool.workflows.signature.upkeep import check_signature
-    from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
-    from cdtool.workflows.study.study import study_sensors
 
 _API = {
-    "__version__": "cdtool.version:__version__",
-    "read": "cdtool.notebook.reading:read",
-    "learn_signature": "cdtool.workflows.signature.learning:learn_signature",
-    "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
-    "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
-    "coverage": "cdtool.workflows.coverage:coverage",
-    "detect": "cdtool.notebook.detection_result:detect",
-    "detect_runs": "cdtool.notebook.detection_result:detect_runs",
-    "explain": "cdtool.workflows.explaining:explain",
-    "explain_runs": "cdtool.workflows.explaining:explain_runs",
-    "benchmark": "cdtool.notebook.benchmark:benchmark",
-    "score": "cdtool.notebook.score:score",
-    "convert": "cdtool.workflows.convert.converting:convert",
-    "identify": "cdtool.workflows.identification.identifying:identify",
-    "inject": "cdtool.workflows.injecting:inject",
-    "init": "cdtool.workflows.init.drafting:init",
-    "init_study": "cdtool.workflows.init.drafting:init_study",
-    "protocol": "cdtool.workflows.protocol.making:protocol",
-    "recover": "cdtool.workflows.recovering:recover",
-    "compare": "cdtool.workflows.comparing:compare",
-    "plan": "cdtool.workflows.planning:plan",
-    "info": "cdtool.workflows.information:info",
-    "study_sensors": "cdtool.workflows.study.study:study_sensors",
-    "tune": "cdtool.notebook.tuning_result:tune",
-    "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
-    "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
-    "read_results": "cdtool.notebook.read_results:read_results",
-    "read_machine_file": "cdtool.machine_file:read_machine_file",
-    "previous_value": "cdtool.clock:previous_value",
-    "BenchmarkResult": "cdtool.notebook.benchmark_result:BenchmarkResult",
-    "DetectionResult": "cdtool.notebook.detection_result:DetectionResult",
-    "DetectionResults": "cdtool.notebook.detection_result:DetectionResults",
-    "TuningResult": "cdtool.notebook.tuning_result:TuningResult",
-    "Recording": "cdtool.recording:Recording",
-    "Series": "cdtool.recording:Series",
-    "Contact": "cdtool.recording:Contact",
-    "Signal": "cdtool.detection:Signal",
-    "Status": "cdtool.detection:Status",
-    "Band": "cdtool.detection:Band",
-    "Alarm": "cdtool.detection:Alarm",
-    "Verdict": "cdtool.detection:Verdict",
-    "Detection": "cdtool.pipeline:Detection",
-    "MachineFile": "cdtool.machine_file:MachineFile",
+    "__version__": "cdtool.base.version:__version__",
+    "read": "cdtool.commands.judging.reading:read",
+    "learn_signature": "cdtool.commands.learning.learning:learn_signature",
+    "check_signature": "cdtool.commands.signature.upkeep:check_signature",
+    "update_signature": "cdtool.commands.signature.upkeep:update_with_runs",
+    "coverage": "cdtool.commands.inject.coverage.coverage:coverage",
+    "detect": "cdtool.commands.detect.result:detect",
+    "detect_runs": "cdtool.commands.detect.result:detect_runs",
+    "explain": "cdtool.commands.explain.explaining:explain",
+    "explain_runs": "cdtool.commands.explain.explaining:explain_runs",
+    "benchmark": "cdtool.commands.benchmark.api:benchmark",
+    "score": "cdtool.commands.score.api:score",
+    "convert": "cdtool.commands.convert.converting:convert",
+    "identify": "cdtool.commands.identify.identifying:identify",
+    "inject": "cdtool.commands.inject.injecting:inject",
+    "init": "cdtool.commands.init.drafting:init",
+    "init_study": "cdtool.commands.init.drafting:init_study",
+    "protocol": "cdtool.commands.protocol.making:protocol",
+    "recover": "cdtool.commands.convert.recovering:recover",
+    "compare": "cdtool.commands.compare.comparing:compare",
+    "plan": "cdtool.commands.compare.planning:plan",
+    "info": "cdtool.commands.judging.information:info",
+    "study_sensors": "cdtool.commands.study.study:study_sensors",
+    "tune": "cdtool.commands.tune.result:tune",
+    "simulate_arm": "cdtool.commands.simulate.arm_recordings:write_arm_recordings",
+    "simulate_gate": "cdtool.commands.simulate.gate_recordings:write_gate_recordings",
+    "read_results": "cdtool.commands.report.read_results:read_results",
+    "read_machine_file": "cdtool.formats.machine_file:read_machine_file",
+    "previous_value": "cdtool.recordings.clock:previous_value",
+    "BenchmarkResult": "cdtool.commands.scoring.benchmark_result:BenchmarkResult",
+    "DetectionResult": "cdtool.commands.detect.result:DetectionResult",
+    "DetectionResults": "cdtool.commands.detect.result:DetectionResults",
+    "TuningResult": "cdtool.commands.tune.result:TuningResult",
+    "Recording": "cdtool.recordings.recording:Recording",
+    "Series": "cdtool.recordings.recording:Series",
+    "Contact": "cdtool.recordings.recording:Contact",
+    "Signal": "cdtool.detectors.detection:Signal",
+    "Status": "cdtool.detectors.detection:Status",
+    "Band": "cdtool.detectors.detection:Band",
+    "Alarm": "cdtool.detectors.detection:Alarm",
+    "Verdict": "cdtool.detectors.detection:Verdict",
+    "Detection": "cdtool.alarms.pipeline:Detection",
+    "MachineFile": "cdtool.formats.machine_file:MachineFile",
     "Signature": "cdtool.thresholds.signature:Signature",
     "Limit": "cdtool.thresholds.limit:Limit",
     "Cusum": "cdtool.thresholds.cusum:Cusum",
-    "CdtoolError": "cdtool.errors:CdtoolError",
+    "CdtoolError": "cdtool.base.errors:CdtoolError",
 }
 
 __all__ = [

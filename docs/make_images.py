@@ -37,7 +37,7 @@ def cdtool(*arguments: object, folder: Path) -> None:
     for image in arguments:
         if isinstance(image, Path) and image.parent == IMAGES:
             image.unlink(missing_ok=True)
-    code = "import sys; sys.argv[0] = 'cdtool'; from cdtool.cli.app import main; main()"
+    code = "import sys; sys.argv[0] = 'cdtool'; from cdtool.commands.app import main; main()"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", code, *map(str, arguments)]
     subprocess.run(command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)

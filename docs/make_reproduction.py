@@ -15,19 +15,19 @@ from pathlib import Path
 import numpy as np
 
 import cdtool
-from cdtool.activation import ActivationSettings
-from cdtool.evaluation.summary import Summary
-from cdtool.evaluation.traces.decimation import decimate
-from cdtool.machine_file import read_machine_file
-from cdtool.recording import Recording
-from cdtool.report.plots.detection_plot import plot_detected
+from cdtool.alarms.activation import ActivationSettings
+from cdtool.commands.detect.plot import plot_detected
+from cdtool.commands.scoring.benchmark import Benchmark
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.formats.signature_store import write_signature
+from cdtool.recordings.recording import Recording
 from cdtool.report.plots.figures import drawing, new_figure, save
 from cdtool.report.plots.trigger_plot import most_informative, plot_triggers
-from cdtool.signature_store import write_signature
-from cdtool.simulation.arm_recordings import write_arm_recordings
-from cdtool.simulation.gate_recordings import write_gate_recordings
+from cdtool.results.summary import Summary
+from cdtool.results.traces.decimation import decimate
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.benchmark.benchmark import Benchmark
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "reproduction.md"

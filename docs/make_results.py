@@ -25,7 +25,7 @@ def with_rows(page: str, printed: str) -> str:
 
 
 if __name__ == "__main__":
-    command = (sys.executable, "-c", "from cdtool.cli.app import main; main()")
+    command = (sys.executable, "-c", "from cdtool.commands.app import main; main()")
     arguments = ("benchmark", "sample_logs/gate/benchmark.toml")
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=True, cwd=ROOT)
     README.write_text(with_rows(README.read_text(encoding="utf-8"), done.stdout), encoding="utf-8")

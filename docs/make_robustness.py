@@ -23,11 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from cdtool import benchmark, simulate_arm, simulate_gate
+from cdtool.base.plain_text import counted
+from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.detectors import DETECTORS
-from cdtool.evaluation.changed_conditions import OnMachine, condition_rows
-from cdtool.evaluation.statistics.rates import binomial_share
-from cdtool.plain_text import counted
-from cdtool.simulation.changed_machine import ChangedMachine
+from cdtool.results.changed_conditions import OnMachine, condition_rows
+from cdtool.statistics.rates import binomial_share
 from cdtool.thresholds import THRESHOLDS
 
 DOCS = Path(__file__).resolve().parent

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from cdtool.evaluation.results_file import results_schema
+from cdtool.results.files.results_file import results_schema
 
 FILE = Path(__file__).with_name("results.schema.json")
 

@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.activation import Activation
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.machine_file import read_machine_file
-from cdtool.operations import operations_of
-from cdtool.pipeline import Detection, judge, run_detector
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, judge, run_detector
+from cdtool.commands.judging.runs import read_named
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.operations import operations_of
 from cdtool.report.plots.figures import drawing, new_figure, save, unit_label
 from cdtool.report.plots.style import BAND, LIMIT, ONSET_DASHES, look_of
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.runs import read_named
+from cdtool.truth.onset import OnsetRule, find_contacts
 
 ROOT = Path(__file__).resolve().parents[1]
 LOGS = ROOT / "sample_logs" / "gate"

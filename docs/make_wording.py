@@ -54,7 +54,7 @@ _HUNK = re.compile(r"^@@ -(\d+)(?:,(\d+))? \+(\d+)(?:,(\d+))? @@")
 
 _LIST_COMMANDS = """
 import typer
-from cdtool.cli.app import app
+from cdtool.commands.app import app
 def show(command, path):
     for name in command.commands:
         print(" ".join([*path, name]))
@@ -62,7 +62,7 @@ def show(command, path):
             show(command.commands[name], [*path, name])
 show(typer.main.get_command(app), [])
 """
-_RUN = "import sys; sys.argv[0] = 'cdtool'; from cdtool.cli.app import main; main()"
+_RUN = "import sys; sys.argv[0] = 'cdtool'; from cdtool.commands.app import main; main()"
 
 _HEAD = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Wording before and after</title><style>

@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass
 from unittest import mock
 
-from cdtool.cli.app import main
+from cdtool.commands.app import main
 
 
 @dataclass(frozen=True)

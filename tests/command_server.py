@@ -126,7 +126,7 @@ def _serve(modules: Sequence[str]) -> None:
         os.dup2(nothing, stream)
     for name in modules:
         importlib.import_module(name)
-    from cdtool.cli.app import main
+    from cdtool.commands.app import main
 
     while line := requests.readline():
         request = json.loads(line)

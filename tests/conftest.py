@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.recording import Recording
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
-from cdtool.simulation.gate_recordings import as_recording
+from cdtool.recordings.recording import Recording
 from tests import markers
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 

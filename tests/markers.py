@@ -44,7 +44,7 @@ def mark(items: Iterable[pytest.Item]) -> None:
 
 
 def slow_tests(path: Path = SLOW_TESTS) -> list[str]:
-    """Return the functions listed as slow, `tests/test_files.py::test_a_link_stays`."""
+    """Return the functions listed as slow, `tests/base/files/test_files.py::test_a_link_stays`."""
     return [line for line in path.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
 
 

@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from cdtool import file_locks
+from cdtool.base.files import locks as file_locks
 
 # A name is looked up and removed in one step there: no other thread opens the file in between.
 _one_step = threading.RLock()

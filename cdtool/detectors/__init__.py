@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from cdtool.base.registry import Registry
 from cdtool.detectors.look import Look
-from cdtool.registry import Registry
 
 # Name: (short name, class). The short name is repeated here so that `-d kmo` imports one detector, not all: the
 # kernels of every imported module are compiled before work begins.

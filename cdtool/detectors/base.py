@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.clock import previous_value
-from cdtool.clock.held_samples import hold_last
-from cdtool.clock.lost_samples import lost_samples
-from cdtool.detection import Signal, Status, StatusArray
-from cdtool.dynamics import Gain, Machine
-from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.kernels import kernel
-from cdtool.recording import Recording, Series
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.kernels import kernel
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Signal, Status, StatusArray
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.clock import previous_value
+from cdtool.recordings.clock.held_samples import hold_last
+from cdtool.recordings.clock.lost_samples import lost_samples
+from cdtool.recordings.recording import Recording, Series
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -109,7 +109,7 @@ def gain(default: float, unit: str, meaning: str, *, searched: bool = True) -> A
     Examples
     --------
     >>> from dataclasses import dataclass, fields
-    >>> from cdtool.dynamics import Gain
+    >>> from cdtool.machines.dynamics import Gain
     >>> @dataclass(frozen=True)
     ... class TorqueRate:
     ...     cutoff: Gain = gain(2.0, "Hz", "cut-off frequency of the low-pass")
@@ -263,12 +263,12 @@ def require_channels(detector: Detector, recording: Recording, *more: str) -> No
     Examples
     --------
     >>> from cdtool.detectors.pure_torque import PureTorque
-    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.recordings.recording import Recording, Series
     >>> recording = Recording("run.csv", "run.csv", ("axis",), {"torque": Series([0.0, 0.1], [5.0, 5.0], "N")})
     >>> require_channels(PureTorque(), recording)
     >>> require_channels(PureTorque(), recording, "speed")
     Traceback (most recent call last):
-    cdtool.errors.RecordingError: run.csv: pure_torque needs the channel 'speed'...
+    cdtool.base.errors.RecordingError: run.csv: pure_torque needs the channel 'speed'...
     """
     for channel in (*detector.needs, *more):
         if channel not in recording:
@@ -343,8 +343,8 @@ def drive_of(detector: Detector, recording: Recording, machine: Machine) -> Driv
     --------
     >>> from cdtool.detectors.momentum import Momentum
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> torque, speed = Series([0.0, 0.3], [5.0, 7.0], "N"), Series([0.1, 0.2, 0.3], [0.2, 0.2, 0.2], "m/s")
     >>> drive = drive_of(Momentum(), Recording("run", "", ("axis",), {"torque": torque, "speed": speed}), axis)
@@ -412,12 +412,12 @@ def held_on(clock: FloatArray, series: Series) -> tuple[FloatArray, BoolArray]:
     held : ndarray of float, shape (n, J)
         The values at these times, in the unit of the channel; 0 before the first one.
     missing : ndarray of bool, shape (n, J)
-        Where the channel has no sample, or one that is too old (see `cdtool.clock.previous_value`).
+        Where the channel has no sample, or one that is too old (see `cdtool.recordings.clock.previous_value`).
 
     Examples
     --------
     >>> import numpy as np
-    >>> from cdtool.recording import Series
+    >>> from cdtool.recordings.recording import Series
     >>> torque = Series([0.1, 0.2, 0.3], [5.0, np.nan, 7.0], "N")
     >>> held, missing = held_on(np.array([0.0, 0.15, 0.25, 0.35]), torque)
     >>> held[:, 0].tolist(), missing[:, 0].tolist()

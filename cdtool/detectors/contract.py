@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal, Status, StatusArray
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import CdtoolError, RecordingError
+from cdtool.base.kernels import kernel
+from cdtool.base.value_words import fault_and_place
 from cdtool.detectors.base import Detector
-from cdtool.dynamics import Machine
-from cdtool.errors import CdtoolError, RecordingError
-from cdtool.kernels import kernel
-from cdtool.recording import Recording
-from cdtool.value_words import fault_and_place
+from cdtool.detectors.detection import Signal, Status, StatusArray
+from cdtool.machines.dynamics import Machine
+from cdtool.recordings.recording import Recording
 
 _HIGHEST_STATUS = int(max(Status))
 
@@ -46,8 +46,8 @@ def checked_signal(detector: Detector, recording: Recording, machine: Machine) -
     --------
     >>> from cdtool.detectors.pure_torque import PureTorque
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
     >>> recording = Recording("run.csv", "run.csv", ("axis",), {"torque": Series([0.0, 0.1], [5.0, 6.0], "N")})
     >>> checked_signal(PureTorque(), recording, axis).values[:, 0].tolist()

@@ -7,10 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.clock import previous_value
-from cdtool.clock.held_samples import hold_last
-from cdtool.detection import Signal, Status
+from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.detectors.base import (
     for_every_joint,
     gain,
@@ -20,10 +17,13 @@ from cdtool.detectors.base import (
     require_channels,
     require_positive,
 )
+from cdtool.detectors.detection import Signal, Status
 from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
 from cdtool.detectors.look import GREY, Look
-from cdtool.dynamics import Gain, Machine
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.clock import previous_value
+from cdtool.recordings.clock.held_samples import hold_last
+from cdtool.recordings.recording import Recording
 
 # The rates of the reference are those of a cubic through this many of its last samples.
 _SAMPLES = 21
@@ -62,8 +62,8 @@ class DesiredDynamics:
     --------
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> torque, travel = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, 0.2 * time, "m")

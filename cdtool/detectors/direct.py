@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
     drive_of,
     for_every_joint,
@@ -15,10 +14,11 @@ from cdtool.detectors.base import (
     per_joint,
     require_positive,
 )
+from cdtool.detectors.detection import Signal, Status
 from cdtool.detectors.filters import longest_gap, low_pass, settling_time, started_at
 from cdtool.detectors.look import BROWN, Look
-from cdtool.dynamics import Gain, Machine
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class Direct:
     --------
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")

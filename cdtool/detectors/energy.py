@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import WHOLE_MACHINE, Signal, Status
 from cdtool.detectors.base import (
     Drive,
     drive_of,
@@ -17,10 +16,11 @@ from cdtool.detectors.base import (
     per_joint,
     require_positive,
 )
+from cdtool.detectors.detection import WHOLE_MACHINE, Signal, Status
 from cdtool.detectors.filters import unsettled
 from cdtool.detectors.look import OLIVE, Look
-from cdtool.dynamics import Gain, Machine
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.recording import Recording
 
 # A gap as long as a period of the drive's vibration hides its power; by then the estimate has mostly decayed [s].
 _LONGEST_UNSETTLED = 0.015
@@ -63,8 +63,8 @@ class Energy:
 
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.clock import GAP_PERIODS, HOLD_PERIODS
-from cdtool.clock.recent_steps import usual_steps
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.detectors.base import BRIDGED
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.recordings.clock import GAP_PERIODS, HOLD_PERIODS
+from cdtool.recordings.clock.recent_steps import usual_steps
 
 # Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
 _SETTLE = 3.0 * math.sqrt(2.0)

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.clock.lost_samples import lost_samples
-from cdtool.detection import Signal, Status, StatusArray
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import read_only
+from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.base import (
     drive_of,
     for_every_joint,
@@ -20,13 +20,13 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
+from cdtool.detectors.detection import Signal, Status, StatusArray
 from cdtool.detectors.filters import unsettled
 from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, run_filter
 from cdtool.detectors.look import RED, Look
-from cdtool.dynamics import Gain, JointEquation, Machine
-from cdtool.kernels import read_only
-from cdtool.recording import Recording
-from cdtool.short_repr import short_repr
+from cdtool.machines.dynamics import Gain, JointEquation, Machine
+from cdtool.recordings.clock.lost_samples import lost_samples
+from cdtool.recordings.recording import Recording
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 10.0
@@ -108,8 +108,8 @@ class FrictionEkf:
 
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> torque, speed = Series(time, np.where(time < 1.0, 30.0, 90.0), "N"), Series(time, np.full(2001, 0.2), "m/s")

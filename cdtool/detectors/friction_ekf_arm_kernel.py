@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status, StatusArray
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import fields_of, kernel
+from cdtool.detectors.detection import Status, StatusArray
 from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, progress_of_settling
-from cdtool.kernels import fields_of, kernel
 
 State = tuple[float, float, float, float]
 Covariance = tuple[float, float, float, float, float, float, float, float, float, float]

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status, StatusArray
-from cdtool.kernels import READ_ONLY, fields_of, kernel
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import READ_ONLY, fields_of, kernel
+from cdtool.detectors.detection import Status, StatusArray
 
 Covariance = tuple[float, float, float, float, float, float]
 

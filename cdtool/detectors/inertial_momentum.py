@@ -9,10 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.clock import HOLD_PERIODS
-from cdtool.clock.recent_steps import usual_steps
-from cdtool.detection import Signal, Status
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.detectors.base import (
     drive_of,
     for_every_joint,
@@ -24,10 +22,12 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
+from cdtool.detectors.detection import Signal, Status
 from cdtool.detectors.look import ORANGE, Look
-from cdtool.dynamics import Gain, Machine
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.clock import HOLD_PERIODS
+from cdtool.recordings.clock.recent_steps import usual_steps
+from cdtool.recordings.recording import Recording
 
 # The accelerometer's bias is averaged while the axis stands still, over at most this time [s].
 _STANDSTILL_WINDOW = 0.3
@@ -74,8 +74,8 @@ class InertialMomentum:
 
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")

@@ -8,9 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.clock.recent_steps import usual_steps
-from cdtool.detection import Signal, Status, StatusArray
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.detectors.base import (
     BRIDGED,
     drive_of,
@@ -19,10 +18,11 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
+from cdtool.detectors.detection import Signal, Status, StatusArray
 from cdtool.detectors.look import NAVY, Look
-from cdtool.dynamics import Gain, Machine
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.clock.recent_steps import usual_steps
+from cdtool.recordings.recording import Recording
 
 # The filter starts with the uncertainty of the contact torque that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 1.0
@@ -68,8 +68,8 @@ class KalmanMomentum:
     --------
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from cdtool.errors import ConfigurationError, nearest
+from cdtool.base.errors import ConfigurationError, nearest
 
 # The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8, and four more.
 RED, GREEN, BLUE, VIOLET = "#D55E00", "#009E73", "#0072B2", "#B0569B"

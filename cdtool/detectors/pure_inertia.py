@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import Signal, Status
 from cdtool.detectors.base import require_channels
+from cdtool.detectors.detection import Signal, Status
 from cdtool.detectors.look import GREEN, Look
-from cdtool.dynamics import Machine
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Machine
+from cdtool.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class PureInertia:
     --------
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> acceleration = Series(time, np.where(time < 1.0, 0.5, -1.5), "m/s2")

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import Signal, Status
 from cdtool.detectors.base import require_channels
+from cdtool.detectors.detection import Signal, Status
 from cdtool.detectors.look import BLUE, Look
-from cdtool.dynamics import Machine
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Machine
+from cdtool.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class PureTorque:
     A motor torque of 0.4 N m on a drive with 10 mm per radian is 40 N at the load.
 
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"transmission_ratio": 0.01}, "machine.toml"))
     >>> logged = Recording("run", "", ("axis",), {"torque": Series([0.0, 0.001], [0.4, 0.4], "N m")})
     >>> signal = PureTorque().signal(axis.referred_to_load(logged), axis)

@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.clock import previous_value
-from cdtool.detection import Signal, Status
 from cdtool.detectors.base import require_channels
+from cdtool.detectors.detection import Signal, Status
 from cdtool.detectors.look import Look
-from cdtool.dynamics import Machine
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Machine
+from cdtool.recordings.clock import previous_value
+from cdtool.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class TorqueDeviation:
     The controller expects 0.4 N m on a drive with 10 mm per radian; 0.1 N m more are 10 N at the load.
 
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"transmission_ratio": 0.01}, "machine.toml"))
     >>> torque, expected = (Series([0.0, 0.001], values, "N m") for values in ([0.4, 0.5], [0.4, 0.4]))
     >>> logged = Recording("run", "", ("axis",), {"torque": torque, "reference_torque": expected})

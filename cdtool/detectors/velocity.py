@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.detection import Signal, Status, StatusArray
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.kernels import kernel
 from cdtool.detectors.base import (
     BRIDGED,
     drive_of,
@@ -20,10 +20,10 @@ from cdtool.detectors.base import (
     per_joint,
     require_positive,
 )
+from cdtool.detectors.detection import Signal, Status, StatusArray
 from cdtool.detectors.look import SKY, Look
-from cdtool.dynamics import Gain, Machine
-from cdtool.kernels import kernel
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.recording import Recording
 
 # Number of steps whose matrices are computed together: they fit into the processor's cache.
 _STEPS = 2048
@@ -71,8 +71,8 @@ class Velocity:
 
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
     >>> time = np.arange(2001) * 1e-3
     >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")

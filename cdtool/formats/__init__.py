@@ -1,4 +1,4 @@
-"""Formats of recordings, by name; `cdtool/ingest/reading.py` chooses one by suffix and content.
+"""Formats of recordings, by name; `cdtool/formats/channels/reading.py` chooses one by suffix and content.
 
 A format is a class that implements `source.Format`: `name`, `suffixes`, `sniff(path)` and `columns(path, wanted)`.
 Optional attributes:
@@ -10,32 +10,32 @@ Optional attributes:
 * `sniffs_any_text`: True if `sniff` accepts almost any text file.
 
 Anything that the user should know about a file is added to `Source.findings`: by a plug-in as `remark("...", column,
-severity)`, here as `Finding(kind, column, numbers)` with a kind in `cdtool/findings/kinds.toml`.
+severity)`, here as `Finding(kind, column, numbers)` with a kind in `cdtool/base/findings/kinds.toml`.
 
-The meaning of a column (channel, unit, scale) is assigned in `cdtool/ingest/channel_assembly.py`, in the same way for
-all formats. Writers are functions that implement `groups.Writer`.
+The meaning of a column (channel, unit, scale) is assigned in `cdtool/formats/channels/channel_assembly.py`, in the same
+way for all formats. Writers are functions that implement `groups.Writer`.
 """
 
 from __future__ import annotations
 
-from cdtool.registry import Registry
+from cdtool.base.registry import Registry
 
 FORMATS = Registry(
     kind="format",
     table={
         "csv": "cdtool.formats.csv:Csv",
-        "twincat_scope": "cdtool.formats.twincat_scope:TwincatScope",
-        "lvm": "cdtool.formats.lvm:Lvm",
+        "twincat_scope": "cdtool.formats.exports.twincat_scope:TwincatScope",
+        "lvm": "cdtool.formats.exports.lvm:Lvm",
         "mcap": "cdtool.formats.mcap:Mcap",
         "mat": "cdtool.formats.mat:Mat",
-        "parquet": "cdtool.formats.parquet:Parquet",
-        "hdf5": "cdtool.formats.hdf5:Hdf5",
-        "mdf": "cdtool.formats.mdf:Mdf",
-        "tdms": "cdtool.formats.tdms:Tdms",
-        "rosbag": "cdtool.formats.rosbag:Rosbag",
-        "rosbag2": "cdtool.formats.rosbag2:Rosbag2",
-        "ulog": "cdtool.formats.ulog:Ulog",
-        "xlsx": "cdtool.formats.xlsx:Xlsx",
+        "parquet": "cdtool.formats.containers.parquet:Parquet",
+        "hdf5": "cdtool.formats.containers.hdf5:Hdf5",
+        "mdf": "cdtool.formats.containers.mdf:Mdf",
+        "tdms": "cdtool.formats.containers.tdms:Tdms",
+        "rosbag": "cdtool.formats.bags.rosbag:Rosbag",
+        "rosbag2": "cdtool.formats.bags.rosbag2:Rosbag2",
+        "ulog": "cdtool.formats.containers.ulog:Ulog",
+        "xlsx": "cdtool.formats.containers.xlsx:Xlsx",
     },
     contract=("name", "suffixes", "sniff", "columns"),
 )

@@ -9,11 +9,11 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.errors import RecordingError, nearest
-from cdtool.findings import Finding
+from cdtool.base.errors import RecordingError, nearest
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.source import Source
-from cdtool.recording import GROUND_TRUTH
+from cdtool.recordings.recording import GROUND_TRUTH
 
 # In [channels], the name of the clock that the container itself provides: `time = { column = "time", unit = "s" }`.
 OWN_CLOCK = "time"

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
-from cdtool.clock import EPOCH
-from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
-from cdtool.columns import as_float64
-from cdtool.findings import Finding
+from cdtool.base.arrays import FloatArray
+from cdtool.base.findings import Finding
+from cdtool.formats.columns import as_float64
+from cdtool.recordings.clock import EPOCH
+from cdtool.recordings.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.channels import AXES
-from cdtool.columns import Column
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.formats.channels.channel_map import AXES
+from cdtool.formats.columns import Column
 
 # Prefix of the metadata keys in a converted file.
 PREFIX = "cdtool."

@@ -13,9 +13,9 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.channels import ChannelMap
-from cdtool.columns import Column, Piece
+from cdtool.base.arrays import FloatArray
+from cdtool.formats.channels.channel_map import ChannelMap
+from cdtool.formats.columns import Column, Piece
 from cdtool.formats.source import Format, Source
 
 # Size of a piece: 8 MiB of float64, all columns together.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.columns import Column, Piece
+from cdtool.base.arrays import FloatArray
+from cdtool.formats.columns import Column, Piece
 from cdtool.formats.pieces import VALUES_PER_PIECE
 
 # Read the rows from `start` to before `end`.

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Protocol
 
-from cdtool.channels import ChannelMap
-from cdtool.columns import Column
-from cdtool.findings import Finding
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.channel_map import ChannelMap
+from cdtool.formats.columns import Column
 
 
 @dataclass(frozen=True)

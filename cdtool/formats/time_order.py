@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.columns import Column, Piece
+from cdtool.base.arrays import FloatArray
+from cdtool.formats.columns import Column, Piece
 
 # Rows are yielded when this many are buffered, or twice as many as remained in the buffer the last time.
 _ROWS = 1 << 15

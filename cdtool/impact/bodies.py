@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_positive
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 
 
 def require_positive(name: str, value: float, unit: str = "") -> None:

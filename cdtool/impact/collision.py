@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.base import ContactLaw, KeepsIndentation, StoresEnergy
 from cdtool.impact.effort import bounded
 from cdtool.impact.impact import Collision, Impact
-from cdtool.short_repr import short_repr
 
 # The state: penetration, V_1, V_2, impulse, contact work, friction loss.
 _DEPTH, _SPEED_1, _SPEED_2, _IMPULSE, _WORK, _FRICTION = range(6)

@@ -16,8 +16,8 @@ import numpy as np
 
 from cdtool.impact.drives import SpeedController
 from cdtool.impact.linearised import NO_CONTACT, ContactStiffness, load_by_torque, motor_by_torque
-from cdtool.impact.transfer import Transfer
-from cdtool.impact.transmission import Transmission
+from cdtool.impact.transmissions.transfer import Transfer
+from cdtool.impact.transmissions.transmission import Transmission
 
 
 def torque_by_force(transmission: Transmission, controller: SpeedController) -> Transfer:

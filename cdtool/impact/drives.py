@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_positive
-from cdtool.impact.transfer import Transfer
+from cdtool.impact.transmissions.transfer import Transfer
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 
 MOST_EVALUATIONS = 500_000
 """Some 10 s of work; an impact takes a few thousand, a window of many swings or contacts a hundred thousand."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
+from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.restitution import Restitution, newton, poisson, stronge
-from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_restitution
 
 Hypothesis = Literal["newton", "poisson", "stronge"]

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_positive
 from cdtool.impact.contact_laws.base import ContactLaw
-from cdtool.impact.transfer import Transfer
-from cdtool.impact.transmission import ElasticTransmission, RigidTransmission, Transmission
+from cdtool.impact.transmissions.transfer import Transfer
+from cdtool.impact.transmissions.transmission import ElasticTransmission, RigidTransmission, Transmission
 
 Polynomial = tuple[float, ...]
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 from cdtool.impact.checks import require_not_negative, require_positive, require_restitution
 
 # Powers 1, 2, ... of x in e(x) - 1 and of 1 - e in x(e): the exact relation, solved as a power series about x = 0.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cdtool.impact.linearised import resonances
-from cdtool.impact.transmission import ElasticTransmission
+from cdtool.impact.transmissions.transmission import ElasticTransmission
 
 RIGID_SHARE = 0.1
 """Up to this share of the limit 4.36 the motor's motion differs from the load's by some 10 %."""

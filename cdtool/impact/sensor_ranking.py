@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError, nearest
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError, nearest
+from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import SpeedController
 from cdtool.impact.rigidity import Rigidity, rigidity
 from cdtool.impact.sensors import QUANTITIES, Sensor
-from cdtool.impact.transmission import ElasticTransmission
-from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
-from cdtool.short_repr import short_repr
+from cdtool.impact.transmissions.transmission import ElasticTransmission
+from cdtool.impact.transmissions.transmission_simulation import SimulatedMotion, Start, simulate_impact
 
 _SAMPLES = 10_000
 # A change that saves less than this share of the time is not a remedy.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.impact.checks import require_not_negative, require_positive
 
 QUANTITIES = ("contact_force", "drive_force", "load_acceleration", "motor_position", "motor_force")

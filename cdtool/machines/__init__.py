@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdtool.registry import Registry
+from cdtool.base.registry import Registry
 
 MACHINES = Registry(
     kind="machine",

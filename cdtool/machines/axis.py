@@ -15,11 +15,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.dynamics import JointEquation
-from cdtool.errors import ConfigurationError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import ConfigurationError
+from cdtool.base.tables import Table
+from cdtool.machines.dynamics import JointEquation
 from cdtool.machines.joint_machine import JointMachine
-from cdtool.tables import Table
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.dynamics import JointEquation
+from cdtool.base.arrays import FloatArray
+from cdtool.machines.dynamics import JointEquation
 from cdtool.machines.joint_machine import JointMachine
 
 # A singular value of the Jacobian below this share of the largest only contributes noise to a force.

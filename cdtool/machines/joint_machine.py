@@ -12,11 +12,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.clock import differentiate, integrate, previous_value
-from cdtool.findings import Finding
-from cdtool.recording import RIG_UNITS, UNITLESS, Recording, Series
-from cdtool.tables import Table
+from cdtool.base.arrays import FloatArray
+from cdtool.base.findings import Finding
+from cdtool.base.tables import Table
+from cdtool.recordings.clock import differentiate, integrate, previous_value
+from cdtool.recordings.recording import RIG_UNITS, UNITLESS, Recording, Series
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
 ROTARY_UNITS = {"torque": "N m", "speed": "rad/s", "position": "rad", "acceleration": "rad/s2"}

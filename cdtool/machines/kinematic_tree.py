@@ -17,8 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.machines import tree_rows as rows
 from cdtool.machines.tree_inverse_kernel import sweep_inverse_dynamics, sweep_jacobian
 from cdtool.machines.tree_kernel import sweep_energies, sweep_inertia, sweep_inertia_times, sweep_momentum

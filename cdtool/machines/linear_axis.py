@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from cdtool.base.notebook.short_repr import short_repr
 from cdtool.machines.axis import Axis
 from cdtool.machines.joint_machine import LINEAR_UNITS
-from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)

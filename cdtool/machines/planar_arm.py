@@ -7,14 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.clock import previous_value
-from cdtool.dynamics import JointEquation, Pendulum
-from cdtool.errors import ConfigurationError, RecordingError, nearest
-from cdtool.findings import Finding
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import ConfigurationError, RecordingError, nearest
+from cdtool.base.findings import Finding
+from cdtool.base.tables import Table
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import Recording, Series
-from cdtool.tables import Table
+from cdtool.machines.dynamics import JointEquation, Pendulum
+from cdtool.recordings.clock import previous_value
+from cdtool.recordings.recording import Recording, Series
 
 _LINKS = 2
 

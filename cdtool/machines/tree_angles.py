@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from cdtool.arrays import FloatArray
-from cdtool.kernels import kernel
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import kernel
 from cdtool.machines.tree_rows import BLOCK, COSINE, OFFSET, ROW, SINE, SLOT
 
 # Adding and subtracting it rounds to an integer: the spacing of the numbers near it is 1.

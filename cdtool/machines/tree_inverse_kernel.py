@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from cdtool.arrays import FloatArray
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.machines.tree_angles import fill_sine_cosine
 from cdtool.machines.tree_rows import (
     BEFORE,

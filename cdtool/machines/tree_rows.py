@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
 
 IndexArray = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]

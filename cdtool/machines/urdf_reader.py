@@ -18,9 +18,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.bounded_loading import read_bytes
-from cdtool.errors import ConfigurationError, installing, nearest
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import ConfigurationError, installing, nearest
+from cdtool.base.files.bounded_loading import read_bytes
 from cdtool.machines.kinematic_tree import KinematicTree, TreeJoint, TreeLink
 
 _STANDARD_GRAVITY = (0.0, 0.0, -9.81)

@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import nearest
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import nearest
+from cdtool.base.remote.remote_path import joined, location
+from cdtool.base.tables import Table
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_reader import read_urdf
-from cdtool.remote.remote_path import joined, location
-from cdtool.tables import Table
 
 # Joints of both kinds: a channel has one unit for all of them, so that each is in its own SI unit.
 _MIXED_UNITS = dict.fromkeys(ROTARY_UNITS, "SI")

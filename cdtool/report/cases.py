@@ -12,16 +12,16 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, groupby, islice
 
-from cdtool.evaluation.changed_conditions import ConditionRow, condition_rows
-from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
-from cdtool.evaluation.results import DAMAGED, ContactResult, LimitResult, RecordingFinding
-from cdtool.evaluation.summary import Summary, later_ms
-from cdtool.plain_text import counted
+from cdtool.base.plain_text import counted
 from cdtool.report.number_text import number, spoken
 from cdtool.report.tables.conditions import condition_words
 from cdtool.report.tables.results import required, value_of
+from cdtool.results.changed_conditions import ConditionRow, condition_rows
+from cdtool.results.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.recording_outcomes import RecordingOutcome, recording_outcomes
+from cdtool.results.results import DAMAGED, ContactResult, LimitResult, RecordingFinding
+from cdtool.results.summary import Summary, later_ms
 
 # A CI system keeps every case in memory and in its database: of more cases than this a suite has those that did not
 # pass, so many of each kind, and one that counts the others.

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
 
-from cdtool.plain_text import plain
+from cdtool.base.plain_text import plain
 
 # A spreadsheet runs a cell that begins with one of these (the last four are their full-width forms). If its list
 # separator is a semicolon, a cell begins after each of them, in quotation marks or not.

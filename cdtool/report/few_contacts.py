@@ -9,10 +9,10 @@ import math
 from collections.abc import Iterable
 from typing import Final, Literal
 
-from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.small_sample import FEWEST
-from cdtool.evaluation.summary import Summary
 from cdtool.report.number_text import number
+from cdtool.results.summary import Summary
+from cdtool.statistics.interval import Interval
+from cdtool.statistics.small_sample import FEWEST
 
 LatencyColumn = Literal["mean", "std", "median", "range", "P95"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.results import Results
-from cdtool.evaluation.summary import Summary
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.results import Results
+from cdtool.results.summary import Summary
 
 # A page with every recording of five detectors then has less than 15 MB.
 MOST_RECORDINGS, MOST_CONTACTS = 5000, 30_000

@@ -8,11 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.results import ContactResult, Results, onset_words
-from cdtool.evaluation.rows import picked, values_of
-from cdtool.plain_text import counted, shorten
-from cdtool.registry import Registry
+from cdtool.base.plain_text import counted, shorten
+from cdtool.base.registry import Registry
 from cdtool.report.few_contacts import explained
 from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
@@ -34,9 +31,12 @@ from cdtool.report.tables.results import (
     too_few_note,
 )
 from cdtool.report.tables.worst_cases import worst_cases_table
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.results import ContactResult, Results, onset_words
+from cdtool.results.rows import picked, values_of
 
 # The tables of a command's own section of a benchmark file, and their lines on a terminal: `table` and `lines`.
-SECTIONS = Registry("section of a report", {"injected": "cdtool.report.tables.injected:InjectedSection"})
+SECTIONS = Registry("section of a report", {"injected": "cdtool.commands.inject.report_table:InjectedSection"})
 
 NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
 UNCHECKED = "Values to be checked against the standard."

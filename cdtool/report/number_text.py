@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from cdtool.evaluation.statistics.interval import Interval
-from cdtool.plain_text import digits as plain_digits
+from cdtool.base.plain_text import digits as plain_digits
+from cdtool.statistics.interval import Interval
 
 NOTHING = "–"
 NOT_REACHED = "not reached"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from cdtool.errors import UsageError
-from cdtool.files import resolved
-from cdtool.plain_text import plain
-from cdtool.remote.remote_path import is_remote
+from cdtool.base.errors import UsageError
+from cdtool.base.files.writing import resolved
+from cdtool.base.plain_text import plain
+from cdtool.base.remote.remote_path import is_remote
 
 
 def check_output_names(targets: Sequence[Path], suffixes: Sequence[str]) -> None:

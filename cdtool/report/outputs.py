@@ -9,17 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import CdtoolError, OutputError, UsageError
-from cdtool.evaluation.traces.file import as_read
-from cdtool.file_locks import is_temporary
-from cdtool.files import replaced_folder, resolved
-from cdtool.foreign_files import FIGURES, Kind, refuse_inputs, refuse_other_kind
-from cdtool.plain_text import plain
-from cdtool.remote.remote_path import is_remote
-from cdtool.remote.uploads import check_place
+from cdtool.base.errors import CdtoolError, OutputError, UsageError
+from cdtool.base.files.foreign import FIGURES, Kind, refuse_inputs, refuse_other_kind
+from cdtool.base.files.locks import is_temporary
+from cdtool.base.files.writing import replaced_folder, resolved
+from cdtool.base.plain_text import plain
+from cdtool.base.remote.remote_path import is_remote
+from cdtool.base.remote.uploads import check_place
+from cdtool.base.value_words import fault_and_place
 from cdtool.report.writers import WRITERS, known_suffixes, own_writers, writer_of
 from cdtool.report.writers.base import Report, Subject, Writer
-from cdtool.value_words import fault_and_place
+from cdtool.results.traces.file import as_read
 
 _FIGURES_IN_FOLDER = re.compile(r"(latency|survival|amoc|forces|(forces|triggers)_[a-z0-9-]+)\.png")
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from cdtool.evaluation.statistics.interval import Interval
 from cdtool.report.number_text import NOTHING, number, spoken, value_and_interval
+from cdtool.statistics.interval import Interval
 
 Item = TypeVar("Item")
 # A recording's group and name.

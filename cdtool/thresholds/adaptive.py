@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.clock import previous_value
-from cdtool.detection import Band, Signal
-from cdtool.errors import NothingValidError, SignatureError, UsageError
-from cdtool.recording import Recording, Series
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import NothingValidError, SignatureError, UsageError
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Band, Signal
+from cdtool.recordings.clock import previous_value
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.first_order import filtered_slope, low_passed
 from cdtool.thresholds.sections import sections

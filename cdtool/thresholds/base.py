@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Band, Signal, Status, contiguous
-from cdtool.recording import Recording
+from cdtool.base.arrays import FloatArray
+from cdtool.detectors.detection import Band, Signal, Status, contiguous
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.comparison_kernel import factors_met
 
 
@@ -181,7 +181,7 @@ def exceedance(
     With |i| < 400 N at factor 1, a sample of 600 N meets its limit at factor 1.5.
 
     >>> import numpy as np
-    >>> from cdtool.recording import Recording
+    >>> from cdtool.recordings.recording import Recording
     >>> from cdtool.thresholds.limit import Limit
     >>> signal = Signal(np.arange(2.0), np.array([[100.0], [600.0]]), np.zeros((2, 1), dtype=np.uint8), "N")
     >>> _, met_at = exceedance(Limit.given([400.0]), Recording("run", "", ("axis",), {}), signal)

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.detection import Band, Signal, Status
-from cdtool.errors import UsageError
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.motion.evident_motion import evident_speed
-from cdtool.recording import Recording
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.detectors.detection import Band, Signal, Status
+from cdtool.recordings.motion.evident_motion import evident_speed
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.settings import check_above, check_sides
 
 # Below this share of the highest speed so far, a joint rests or starts: that is not its motion.
@@ -48,7 +48,7 @@ class FittedBaseline:
 
     Examples
     --------
-    >>> from cdtool.recording import Series
+    >>> from cdtool.recordings.recording import Series
     >>> time = 0.01 * np.arange(300)
     >>> run = Recording("run", "", ("axis",), {"speed": Series(time, np.full(300, 0.5), "m/s")})
     >>> values = np.where(np.arange(300) % 2 == 0, 9.0, 11.0)[:, np.newaxis]

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from cdtool.detection import Band, Signal, Status
-from cdtool.errors import UsageError
-from cdtool.motion import MotionClass
-from cdtool.recording import Recording
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Band, Signal, Status
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.adaptive import Adaptive
 from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance
 from cdtool.thresholds.cusum import Cusum

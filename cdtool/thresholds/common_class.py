@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdtool.errors import SignatureError
-from cdtool.motion import MotionClass, measured_class
-from cdtool.motion.speed_course import learn_course
-from cdtool.recording import Recording
+from cdtool.base.errors import SignatureError
+from cdtool.recordings.motion import MotionClass, measured_class
+from cdtool.recordings.motion.speed_course import learn_course
+from cdtool.recordings.recording import Recording
 
 # Nominal speeds of one class differ by at most this share.
 SPEED_TOLERANCE = 0.1

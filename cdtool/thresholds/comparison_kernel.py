@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status, StatusArray
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.detectors.detection import Status, StatusArray
 
 _STATUS = "Array(uint8, 1, 'C', readonly=True)"
 

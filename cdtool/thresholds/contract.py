@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Band, Signal, contiguous
-from cdtool.errors import CdtoolError, RecordingError, SignatureError
-from cdtool.recording import Recording
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import CdtoolError, RecordingError, SignatureError
+from cdtool.base.value_words import fault_and_place
+from cdtool.detectors.detection import Band, Signal, contiguous
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import FittedThreshold, KnownBand, Threshold, exceedance
 from cdtool.thresholds.comparison_kernel import unknown_but_valid
-from cdtool.value_words import fault_and_place
 
 _HINT = "an error in the threshold: see docs/own-detector.md"
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.kernels import READ_ONLY, fields_of, kernel
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.kernels import READ_ONLY, fields_of, kernel
 
 # More grid steps than a number holds exactly: the nearest grid point is then the first.
 _TOO_MANY_STEPS = 2.0**53

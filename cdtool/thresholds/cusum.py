@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal
-from cdtool.recording import Recording
+from cdtool.base.arrays import FloatArray
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.innovation import check_order
 from cdtool.thresholds.sections import filtered, section_bounds
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
 
 
 def filtered_slope(values: FloatArray, step: FloatArray, time_constant: float) -> FloatArray:

@@ -11,19 +11,19 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.derived import SendsFields
-from cdtool.detection import Band, Signal, Status, StatusArray
-from cdtool.errors import SignatureError, UsageError, nearest
-from cdtool.kernels import READ_ONLY, fields_of, kernel, read_only
-from cdtool.motion import MotionClass
-from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
-from cdtool.motion.speed_course import SpeedCourse
-from cdtool.recording import Recording
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.derived import SendsFields
+from cdtool.base.errors import SignatureError, UsageError, nearest
+from cdtool.base.kernels import READ_ONLY, fields_of, kernel, read_only
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.value_words import value_in_words
+from cdtool.detectors.detection import Band, Signal, Status, StatusArray
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
+from cdtool.recordings.motion.speed_course import SpeedCourse
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.running_level_kernel import follow_level
 from cdtool.thresholds.signature_curve import Curve, resample
-from cdtool.value_words import value_in_words
 
 PlaceArray = npt.NDArray[np.int32]
 # A location of so many grid steps, 2^63, has no number that an int64 can represent.

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.detection import Signal
-from cdtool.errors import SignatureError, UsageError
-from cdtool.motion.progress import Progress
-from cdtool.recording import Recording
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.motion.progress import Progress
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve
 

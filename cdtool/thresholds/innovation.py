@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cdtool.detection import Signal
-from cdtool.errors import UsageError
-from cdtool.recording import Recording
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.sequential import LARGEST_ORDER, FittedSequential, fit_sequential
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.signature import Signature
@@ -50,7 +50,7 @@ class Innovation:
     The innovations of impact-free strokes have a standard deviation of 1.
 
     >>> import numpy as np
-    >>> from cdtool.recording import Series
+    >>> from cdtool.recordings.recording import Series
     >>> time, valid = np.arange(2001) * 1e-3, np.zeros((2001, 1), dtype=np.uint8)
     >>> channels = {"speed": Series(time, np.full(2001, 0.2), "m/s"), "position": Series(time, 0.2 * time, "m")}
     >>> strokes = [Recording(f"{i}", "", ("axis",), channels) for i in range(10)]

@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from cdtool.detection import Band, Signal
-from cdtool.errors import NothingValidError, SignatureError, UsageError
-from cdtool.recording import Recording
+from cdtool.base.errors import NothingValidError, SignatureError, UsageError
+from cdtool.detectors.detection import Band, Signal
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import with_limits
 
 

@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.detection import Band, Signal
-from cdtool.errors import UsageError
-from cdtool.motion import MotionClass
-from cdtool.recording import Recording
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Band, Signal
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import known

@@ -13,14 +13,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.derived import SendsFields, StoresDerived
-from cdtool.detection import Signal, Status
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.motion import MotionClass
-from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
-from cdtool.recording import MEASURED, REFERENCES, Recording, Series
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.derived import SendsFields, StoresDerived
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Signal, Status
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
+from cdtool.recordings.recording import MEASURED, REFERENCES, Recording, Series
 from cdtool.thresholds.curve_lookup import look_up
 from cdtool.thresholds.signature_curve import Curve, resample
 
@@ -198,11 +198,11 @@ def learn_normal_motion(recordings: Sequence[Recording], motion: MotionClass) ->
     Examples
     --------
     >>> import numpy as np
-    >>> from cdtool.recording import Series
+    >>> from cdtool.recordings.recording import Series
     >>> time, valid = np.arange(2001) * 1e-3, np.zeros((2001, 1), dtype=np.uint8)
     >>> channels = {"speed": Series(time, np.full(2001, 0.2), "m/s"), "position": Series(time, 0.2 * time, "m")}
     >>> strokes = [Recording(f"{i}", "", ("axis",), channels) for i in range(10)]
-    >>> from cdtool.motion import measured_class
+    >>> from cdtool.recordings.motion import measured_class
     >>> normal = learn_normal_motion(strokes, measured_class(strokes[0]))
     >>> normal.runs, sorted(normal.channels)
     (10, ['position', 'speed'])

@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal
-from cdtool.errors import UsageError
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import Recording
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import check_sides
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit

@@ -22,7 +22,7 @@ class Recent:
     Examples
     --------
     >>> import numpy as np
-    >>> from cdtool.detection import Signal
+    >>> from cdtool.detectors.detection import Signal
     >>> runs = [Signal(np.zeros(2), np.zeros((2, 1)), np.zeros((2, 1), dtype=np.uint8), "N") for _ in range(3)]
     >>> recent = Recent(2)
     >>> recent.value("sum", runs, lambda: "learned"), recent.value("sum", runs, lambda: "learned again")

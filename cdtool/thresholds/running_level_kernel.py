@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status, StatusArray
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.detectors.detection import Status, StatusArray
 
 # Age of a sample that is learned from, and time for which nothing is learned after a departure [s].
 GUARD = 0.3

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.detection import Signal, Status
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Signal, Status
 
 # (values, steps) -> output, all (m,); step: time since the previous sample [s], infinite where a section begins.
 ColumnFilter = Callable[[FloatArray, FloatArray], FloatArray]

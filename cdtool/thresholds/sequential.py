@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self
 
-from cdtool.detection import Band, Signal
-from cdtool.motion import MotionClass
-from cdtool.recording import Recording
+from cdtool.detectors.detection import Band, Signal
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.limit import FittedLimit, Limit
 from cdtool.thresholds.settings import on_side, watched_side

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import TypeVar
 
-from cdtool.errors import UsageError
-from cdtool.motion import MotionClass
+from cdtool.base.errors import UsageError
+from cdtool.recordings.motion import MotionClass
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.fitted_signature import SIDES, known
 from cdtool.thresholds.limit import FittedLimit

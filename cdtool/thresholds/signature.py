@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal
-from cdtool.errors import NothingValidError, SignatureError, UsageError
-from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
-from cdtool.recording import Recording
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import NothingValidError, SignatureError, UsageError
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
     RULES,
@@ -77,7 +77,7 @@ class Signature:
     Ten strokes at 0.2 m/s with 19 N and 21 N in turn: mean 20 N, standard deviation 1.05 N.
 
     >>> import numpy as np
-    >>> from cdtool.recording import Series
+    >>> from cdtool.recordings.recording import Series
     >>> time, valid = np.arange(2001) * 1e-3, np.zeros((2001, 1), dtype=np.uint8)
     >>> channels = {"speed": Series(time, np.full(2001, 0.2), "m/s"), "position": Series(time, 0.2 * time, "m")}
     >>> strokes = [Recording(f"{i}", "", ("axis",), channels) for i in range(10)]

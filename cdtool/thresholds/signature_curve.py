@@ -10,13 +10,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.derived import SendsFields
-from cdtool.detection import Signal
-from cdtool.kernels import READ_ONLY, kernel, read_only
-from cdtool.motion.progress import Progress
-from cdtool.motion.smoothing import moving_mean
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.derived import SendsFields
+from cdtool.base.kernels import READ_ONLY, kernel, read_only
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.motion.progress import Progress
+from cdtool.recordings.motion.smoothing import moving_mean
 from cdtool.thresholds.curve_lookup import LearnedColumn
 
 # A grid point has a limit once this share of the runs has been there.

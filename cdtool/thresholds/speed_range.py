@@ -1,7 +1,7 @@
 """A signature for all speeds between those learned: the bands of neighbouring classes, interpolated over speed.
 
-At the speed v that the run has had so far (see `motion.speed_range`), between classes with nominal speeds n_1 and n_2,
-at the same location of the stroke::
+At the speed v that the run has had so far (see `recordings.motion.speed_range`), between classes with nominal speeds
+n_1 and n_2, at the same location of the stroke::
 
     w = (v - n_1) / (n_2 - n_1)
     mean = (1 - w) m_1 + w m_2
@@ -25,13 +25,13 @@ from functools import cached_property
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.derived import SendsFields
-from cdtool.detection import Band, Signal, Status
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.motion.progress import Progress
-from cdtool.motion.speed_range import SpeedRange, in_ranges
-from cdtool.recording import Recording
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.derived import SendsFields
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.detectors.detection import Band, Signal, Status
+from cdtool.recordings.motion.progress import Progress
+from cdtool.recordings.motion.speed_range import SpeedRange, in_ranges
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import KnownBand
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.running_level_kernel import follow_level

@@ -8,10 +8,10 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from cdtool.detection import Band, Signal
-from cdtool.errors import SignatureError
-from cdtool.motion import MotionClass
-from cdtool.recording import Recording
+from cdtool.base.errors import SignatureError
+from cdtool.detectors.detection import Band, Signal
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.limit import FittedLimit, Limit

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from cdtool.errors import SignatureError
+from cdtool.base.errors import SignatureError
 from cdtool.thresholds.base import Threshold
 
 

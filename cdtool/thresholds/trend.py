@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal
-from cdtool.recording import Recording
+from cdtool.base.arrays import FloatArray
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.first_order import filtered_slope
 from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import check_above, check_sides

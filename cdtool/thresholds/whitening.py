@@ -13,13 +13,13 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.clock.lost_samples import lost_samples
-from cdtool.detection import Signal, Status
-from cdtool.errors import NothingValidError
-from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import Recording
-from cdtool.short_repr import short_repr
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import NothingValidError
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Signal, Status
+from cdtool.recordings.clock.lost_samples import lost_samples
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.recent import Recent
 from cdtool.thresholds.sections import filtered, section_bounds, sections

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 import cdtool
-from cdtool.activation import Activation
-from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import Detection, detect_operation
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, detect_operation
+from cdtool.commands.learning.fitting import fit_operations
+from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.recordings.operations import Operation, operations_of
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.signature.fitting import fit_operations
 
 DETECTORS = ("gm", "pt")
 RULE = Signature(force=True)

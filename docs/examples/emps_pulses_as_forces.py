@@ -19,14 +19,14 @@ import numpy as np
 from scipy.io import loadmat
 
 import cdtool
-from cdtool.activation import Activation
-from cdtool.arrays import FloatArray
-from cdtool.machine_file import read_machine_file
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import Detection, detect_operation
-from cdtool.recording import Recording
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, detect_operation
+from cdtool.base.arrays import FloatArray
+from cdtool.commands.learning.fitting import fit_operations
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.signature.fitting import fit_operations
 
 DETECTORS = ("gm", "pt")
 RULE = Signature(sides="one", force=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import cdtool
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 HEAD = "Zeit [ms];Motorstrom [A];Drehzahl [U/min];Motorwinkel [rad];Beschleunigung [g];Trigger"
 # The force meter starts 1.7 s before the control, and keeps every second sample.

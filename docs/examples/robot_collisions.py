@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 FILES = 34
 JOINTS = 6

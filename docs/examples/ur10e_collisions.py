@@ -20,14 +20,14 @@ from typing import Any
 import numpy as np
 
 import cdtool
-from cdtool.activation import Activation
-from cdtool.detection import Alarm
-from cdtool.evaluation.truth.matching import Matching, match
-from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import Detection, detect_operation, run_detector
-from cdtool.recording import Contact, Recording
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, detect_operation, run_detector
+from cdtool.detectors.detection import Alarm
+from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Contact, Recording
 from cdtool.thresholds.limit import Limit
+from cdtool.truth.matching import Matching, match
 
 FOLDER = Path(__file__).resolve().parents[2] / "sample_logs" / "ur10e"
 DETECTORS = ("momentum", "kalman_momentum", "velocity", "direct", "energy")

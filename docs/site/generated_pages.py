@@ -14,9 +14,9 @@ from typing import Any, get_args, get_origin
 from typer.main import get_command
 
 from cdtool import _API
-from cdtool.cli.app import COMMANDS, app
+from cdtool.base.exit_status import STATUSES, STATUSES_OF
+from cdtool.commands.app import COMMANDS, app
 from cdtool.detectors import DETECTORS
-from cdtool.exit_status import STATUSES, STATUSES_OF
 from cdtool.machines import MACHINES
 from cdtool.thresholds import THRESHOLDS
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.detection import Signal, Status
+from cdtool.detectors.detection import Signal, Status
 from cdtool.thresholds.cusum import Cusum
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from cdtool.cli.app import app
+from cdtool.commands.app import app
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 # Names of parameters of commands for output files.

@@ -40,7 +40,7 @@ def test_the_time_nearest_to_its_bound_counts_and_the_worst_is_first(script):
 
 def test_every_file_that_notes_times_is_run(script):
     files = script.files_that_note()
-    assert "tests/cli/test_hostile_input.py" in files
+    assert "tests/commands/console/test_hostile_input.py" in files
     assert all((BENCHMARKS.parent / name).is_file() for name in files)
 
 

@@ -19,18 +19,18 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.activation import Activation
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, detect_operations, run_detector_on_each
+from cdtool.base.errors import CdtoolError
+from cdtool.base.tables import Table
+from cdtool.commands.learning.fitting import Fitted, fitting, for_machine
 from cdtool.detectors import DETECTORS
-from cdtool.errors import CdtoolError
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.motion import motion_class
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import Detection, detect_operations, run_detector_on_each
-from cdtool.recording import Recording, Series
-from cdtool.tables import Table
+from cdtool.recordings.motion import motion_class
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds import THRESHOLDS
-from cdtool.workflows.signature.fitting import Fitted, fitting, for_machine
 from tests.synthetic.robots import six_joint_robot
 
 PERIOD = 2e-3

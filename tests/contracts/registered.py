@@ -7,7 +7,7 @@ import pkgutil
 from importlib import import_module
 from types import ModuleType
 
-from cdtool.registry import Registry
+from cdtool.base.registry import Registry
 
 
 def targets_in(package: ModuleType, registry: Registry) -> set[str]:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdtool.detection import WHOLE_MACHINE, Status
+from cdtool.base.errors import CdtoolError, RecordingError
 from cdtool.detectors import DETECTORS
-from cdtool.errors import CdtoolError, RecordingError
-from cdtool.recording import CHANNELS, GROUND_TRUTH, Recording, Series
+from cdtool.detectors.detection import WHOLE_MACHINE, Status
+from cdtool.recordings.recording import CHANNELS, GROUND_TRUTH, Recording, Series
 from cdtool.report.plots.style import look_of
 from tests.synthetic.motions import moving_recording
 from tests.synthetic.robots import JOINTS as ROBOT_JOINTS

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.base.errors import CdtoolError, UsageError
+from cdtool.base.registry import Registry
 from cdtool.detectors import DETECTORS
-from cdtool.errors import CdtoolError, UsageError
 from cdtool.formats import FORMATS
-from cdtool.ingest.reading import has_topics
+from cdtool.formats.channels.reading import has_topics
 from cdtool.machines import MACHINES
-from cdtool.registry import Registry
 
 REGISTRIES = (FORMATS, MACHINES, DETECTORS)
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -36,7 +36,7 @@ def test_a_format_whose_library_is_absent_says_how_to_install_it(name, tmp_path,
     def absent(module: str) -> None:
         raise ImportError(module)
 
-    monkeypatch.setattr("cdtool.formats.container_checks.import_module", absent)
+    monkeypatch.setattr("cdtool.formats.containers.container_checks.import_module", absent)
     found = FORMATS.load(name)()
     path = tmp_path / f"x{found.suffixes[0]}"
     path.write_bytes(b"no recording")
@@ -71,7 +71,7 @@ def test_a_plugin_is_looked_for_only_when_an_unknown_name_is_asked_for(monkeypat
             EntryPoint("broken", "no_such_package.detector:X", group),
         ]
 
-    monkeypatch.setattr("cdtool.registry.entry_points", found)
+    monkeypatch.setattr("cdtool.base.registry.entry_points", found)
     registry = Registry("detector", dict(DETECTORS.table))
     registry.load("momentum")
     assert asked == []

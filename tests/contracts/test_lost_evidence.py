@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.activation import Activation
-from cdtool.detection import Signal, Status
-from cdtool.operations import operations_of
-from cdtool.pipeline import Detection, judge
-from cdtool.recording import Contact, Series
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, judge
+from cdtool.detectors.detection import Signal, Status
+from cdtool.recordings.operations import operations_of
+from cdtool.recordings.recording import Contact, Series
 from cdtool.thresholds.limit import Limit
 from tests.thresholds.strokes import TIME, N, noise_runs, stroke
 

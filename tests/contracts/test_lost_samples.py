@@ -16,20 +16,20 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from cdtool.activation import Activation
-from cdtool.clock.lost_samples import lost_samples
-from cdtool.detection import Signal
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, judge, run_detector
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.detectors import DETECTORS
-from cdtool.evaluation.sweep import critical_factor
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.ingest.reading import read_as_logged
-from cdtool.machine_file import read_machine_file
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import Detection, judge, run_detector
-from cdtool.recording import Recording, Series
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
-from cdtool.simulation.gate_recordings import as_recording
+from cdtool.detectors.detection import Signal
+from cdtool.formats.channels.reading import read_as_logged
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.clock.lost_samples import lost_samples
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Recording, Series
+from cdtool.results.curves.sweep import critical_factor
 from cdtool.thresholds import THRESHOLDS
+from cdtool.truth.onset import OnsetRule, find_contacts
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 from tests.synthetic.motions import moving_recording
 from tests.synthetic.robots import six_joint_robot

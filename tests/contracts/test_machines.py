@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdtool.dynamics import Machine
-from cdtool.machine_file import fingerprint, read_machine_file
+from cdtool.base.tables import Table
+from cdtool.commands.simulate.arm_model import simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters
+from cdtool.commands.simulate.arm_recordings import as_recording
+from cdtool.formats.machine_file import fingerprint, read_machine_file
 from cdtool.machines import MACHINES
+from cdtool.machines.dynamics import Machine
 from cdtool.machines.rotary_axis import RotaryAxis
-from cdtool.recording import Recording, Series
-from cdtool.simulation.arm_model import simulate_arm_run
-from cdtool.simulation.arm_parameters import ArmParameters
-from cdtool.simulation.arm_recordings import as_recording
-from cdtool.tables import Table
+from cdtool.recordings.recording import Recording, Series
 from tests.project.pages import machine_files
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 from tests.synthetic.motions import moving_recording

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.activation import Activation
-from cdtool.detection import WHOLE_MACHINE, Alarm, Status
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, detect_operations
 from cdtool.detectors import DETECTORS
-from cdtool.motion import motion_class
-from cdtool.operations import Operation
-from cdtool.pipeline import Detection, detect_operations
-from cdtool.recording import Recording, Series
+from cdtool.detectors.detection import WHOLE_MACHINE, Alarm, Status
+from cdtool.recordings.motion import motion_class
+from cdtool.recordings.operations import Operation
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds import THRESHOLDS
 from tests.contracts.prefixes import PERIOD, Combination, learned, log, machine_of, on_own_clocks
 

@@ -8,12 +8,12 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pytest
 
-from cdtool.activation import Activation
+from cdtool.alarms.activation import Activation
+from cdtool.base.errors import SignatureError
 from cdtool.detectors.momentum import Momentum
-from cdtool.errors import SignatureError
-from cdtool.recording import CHANNELS, GROUND_TRUTH
-from cdtool.signature_file import FactorOrigin, SignatureFile
-from cdtool.signature_store import read_signature, write_signature
+from cdtool.formats.signature_file import FactorOrigin, SignatureFile
+from cdtool.formats.signature_store import read_signature, write_signature
+from cdtool.recordings.recording import CHANNELS, GROUND_TRUTH
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import exceedance, is_per_run
 

@@ -7,14 +7,14 @@ from typing import get_args
 
 import pytest
 
-from cdtool.errors import UsageError
-from cdtool.evaluation.builds.comparison import compare_builds
-from cdtool.evaluation.protocol.assessment import assess_point, judge
-from cdtool.evaluation.protocol.plan import MachineParticulars, MeasuringPoint, TestPlan
-from cdtool.evaluation.protocol.protocol import FileDigest, Protocol
-from cdtool.foreign_files import refuse_other_kind
+from cdtool.base.errors import UsageError
+from cdtool.base.files.foreign import refuse_other_kind
+from cdtool.commands.compare.comparison import compare_builds
+from cdtool.commands.protocol.assessment.assessment import assess_point, judge
+from cdtool.commands.protocol.assessment.plan import MachineParticulars, MeasuringPoint, TestPlan
+from cdtool.commands.protocol.assessment.protocol import FileDigest, Protocol
+from cdtool.commands.protocol.document.document import ProtocolReport
 from cdtool.report.outputs import check_outputs, write_outputs
-from cdtool.report.protocol.document import ProtocolReport
 from cdtool.report.writers import WRITERS, known_suffixes, writer_of
 from cdtool.report.writers.base import Report, Subject
 from tests.report.hostile import HOSTILE

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.detectors.base import drive_on_speed_clock, observe_momentum
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 from tests.synthetic.machines import arm_of
 
 ARM = arm_of(

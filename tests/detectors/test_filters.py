@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy.signal import bilinear, butter, lfilter, lfilter_zi
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.clock.recent_steps import usual_steps
-from cdtool.detection import Status
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.kernels import kernel
 from cdtool.detectors.desired_dynamics import DesiredDynamics
+from cdtool.detectors.detection import Status
 from cdtool.detectors.direct import Direct
 from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at, unsettled
-from cdtool.kernels import kernel
-from cdtool.recording import Recording, Series
+from cdtool.recordings.clock.recent_steps import usual_steps
+from cdtool.recordings.recording import Recording, Series
 from tests.synthetic.machines import machine_of
 
 TIME = np.arange(4000) * 1e-3

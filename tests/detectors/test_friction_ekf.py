@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status
+from cdtool.base.arrays import FloatArray
+from cdtool.detectors.detection import Status
 from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.friction_ekf_kernel import predict_covariance, update_second, update_third
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 
 # The filter of the closed-form case, on the motor side.
 INERTIA, SPEED, FRICTION, PERIOD = 2e-3, 150.0, 1e-4, 1e-3

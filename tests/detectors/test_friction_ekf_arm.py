@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status
+from cdtool.base.arrays import FloatArray
 from cdtool.detectors.base import drive_on_speed_clock
+from cdtool.detectors.detection import Status
 from cdtool.detectors.friction_ekf import FrictionEkf, JointMeasurements
 from cdtool.detectors.friction_ekf_arm_kernel import predict_covariance, update_covariance
-from cdtool.dynamics import JointEquation
 from cdtool.machines.coupled import CoupledMachine
+from cdtool.machines.dynamics import JointEquation
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.recording import Recording
+from cdtool.recordings.recording import Recording
 from tests.synthetic.motions import PERIOD, moving_recording
 from tests.synthetic.robots import six_joint_robot
 

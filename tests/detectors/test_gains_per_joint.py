@@ -7,15 +7,15 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from cdtool.activation import Activation
+from cdtool.alarms.activation import Activation
+from cdtool.base.errors import ConfigurationError, SignatureError
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import of_joint, single
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
-from cdtool.errors import ConfigurationError, SignatureError
-from cdtool.machine_file import fingerprint, read_machine_file
-from cdtool.signature_file import FactorOrigin, SignatureFile
-from cdtool.signature_store import read_signature, write_signature
+from cdtool.formats.machine_file import fingerprint, read_machine_file
+from cdtool.formats.signature_file import FactorOrigin, SignatureFile
+from cdtool.formats.signature_store import read_signature, write_signature
 from cdtool.thresholds.signature import Signature
 from tests.synthetic.machines import GATE, machine_of
 from tests.synthetic.motions import moving_recording

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.detectors.inertial_momentum import InertialMomentum
 
 IGM = InertialMomentum(crossover=10.0)  # k1 = 20, k2 = 100

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status
+from cdtool.base.arrays import FloatArray
+from cdtool.detectors.detection import Status
 from cdtool.detectors.kalman_momentum import KalmanMomentum
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 from tests.synthetic.machines import machine_of
 
 PERIOD, MASS = 1e-3, 12.0

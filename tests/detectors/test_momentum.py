@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status
+from cdtool.base.arrays import FloatArray
+from cdtool.detectors.detection import Status
 from cdtool.detectors.momentum import Momentum
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 from tests.synthetic.machines import machine_of
 
 # One kilogram on the load side without friction: force and momentum in plain numbers.

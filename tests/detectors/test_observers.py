@@ -13,18 +13,18 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
-from cdtool.activation import Activation
-from cdtool.arrays import FloatArray
-from cdtool.detection import WHOLE_MACHINE, Status
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import detect_operation
+from cdtool.base.arrays import FloatArray
 from cdtool.detectors.desired_dynamics import DesiredDynamics
+from cdtool.detectors.detection import WHOLE_MACHINE, Status
 from cdtool.detectors.direct import Direct
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.inertial_momentum import InertialMomentum
 from cdtool.detectors.kalman_momentum import KalmanMomentum
 from cdtool.detectors.momentum import Momentum
 from cdtool.detectors.velocity import Velocity
-from cdtool.operations import operations_of
-from cdtool.pipeline import detect_operation
+from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.limit import Limit
 from tests.synthetic.machines import ARM, arm_of, machine_of
 from tests.synthetic.motions import PERIOD, moving_recording, resting_recording

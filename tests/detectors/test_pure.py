@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.detection import Status
+from cdtool.detectors.detection import Status
 from cdtool.detectors.pure_inertia import PureInertia
 from cdtool.detectors.pure_torque import PureTorque
 from cdtool.detectors.torque_deviation import TorqueDeviation
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 
 
 def test_pure_torque_is_the_drive_force_and_pure_inertia_the_deceleration(gate):

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status
+from cdtool.base.arrays import FloatArray
+from cdtool.detectors.detection import Status
 from cdtool.detectors.velocity import observe_velocity, relaxations
 
 

@@ -12,7 +12,7 @@ import sympy as sp
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.optimize import brentq
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 # Thesis 3.3 and 3.6: v = V2 - V1 is negative while the bodies approach.
 E = sp.Symbol("e", positive=True)

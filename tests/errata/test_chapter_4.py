@@ -13,7 +13,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 # Table 4.1 with its units put right: tau_m [N m], J_t [kg m2], d_t [N m s/rad], r [m/rad], k_c [N/m^1.5], n.
 TORQUE, INERTIA, FRICTION, RATIO, STIFFNESS, EXPONENT = 0.5, 2.35e-4, 0.03, 0.015, 9.8261e8, 1.5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 # The states of 5.5: d_t [N m s/rad], motor acceleration [rad/s2], motor speed [rad/s].
 X = sp.Matrix(sp.symbols("x1 x2 x3", real=True))

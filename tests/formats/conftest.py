@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.formats.machine_file import MachineFile, read_machine_file
 
 _MACHINE = """
 [machine]

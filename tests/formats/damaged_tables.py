@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.csv import Csv
 
 NAMES = ("time", "torque", "speed", "force")

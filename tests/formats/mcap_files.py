@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap.write import Stream, write_mcap
 
 START = 1_700_000_000 * 10**9

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.errors import RecordingError
-from cdtool.formats.container_checks import check_chunks
-from cdtool.ingest.reading import survey
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import survey
+from cdtool.formats.containers.container_checks import check_chunks
 from tests.formats import bombs
 from tests.noted_times import note
 
@@ -21,8 +21,8 @@ SECONDS, MIB = 5.0, 300
 CHILD = """
 import json, resource, sys, time
 from pathlib import Path
-from cdtool.errors import RecordingError
-from cdtool.ingest.reading import survey
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import survey
 for plain in sys.argv[2:]:
     survey(Path(plain))
 before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()

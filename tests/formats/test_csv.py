@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
 from cdtool.formats.column_names import column_key
 from cdtool.formats.csv import Csv
 

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.channels import TablePins
-from cdtool.errors import RecordingError
-from cdtool.formats.csv import find_dialect as finding
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.text import SAMPLE_BYTES
+from cdtool.formats.csv_dialect import find_dialect as finding
 from tests.formats.csv_cases import cases
 
 HEADS = (

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.channels import ChannelMap, ChannelSource, TablePins, TimeSource
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TablePins, TimeSource
 from cdtool.formats.csv import Csv
 from tests.noted_times import noted
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding, lines_of
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding, lines_of
+from cdtool.formats.channels.reading import choose_format, read_recording
 from cdtool.formats.csv import Csv
-from cdtool.ingest.reading import choose_format, read_recording
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 
 SECONDS = '[channels]\ntime = { column = 0, unit = "s" }\nspeed = { column = 1, unit = "rad/s" }\n'
 STAMPS = ["23:59:58.5", "23:59:59.0", "23:59:59.5"]

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cdtool.findings import lines_of
+from cdtool.base.findings import lines_of
+from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import join_pieces
-from cdtool.ingest.reading import read_recording
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 
 RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
 

@@ -7,11 +7,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from cdtool.channels import ChannelMap, TimeSource
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.base.tables import Table
+from cdtool.formats.channels.channel_map import ChannelMap, TimeSource
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.pins import read_pins
-from cdtool.tables import Table
+from cdtool.formats.csv_dialect.pins import read_pins
 from tests.formats.csv_cases import Case, cases
 
 SEEDS = (1, 2, 3)
@@ -22,7 +22,7 @@ def pinned(case: Case, names: list[str]) -> ChannelMap | None:
     """Return a channel map of all columns with the pins of the case; None without pins."""
     if not case.pins:
         return None
-    from cdtool.channels import ChannelSource
+    from cdtool.formats.channels.channel_map import ChannelSource
 
     pins = read_pins(Table(tomllib.loads(case.pins), "machine.toml", "csv."))
     sources = tuple(ChannelSource(f"c{i}", (name,)) for i, name in enumerate(names[1:]))

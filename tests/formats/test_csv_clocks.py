@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.stamps import NS, unwrap
 from cdtool.formats.pieces import join_pieces
-from cdtool.ingest.reading import read_recording
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 from tests.formats.conftest import COLUMNS
 
 SECONDS = COLUMNS.replace('"ms"', '"s"')

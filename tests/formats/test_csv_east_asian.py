@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.findings import Finding
+from cdtool.base.findings import Finding
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.east_asian import east_asian
+from cdtool.formats.csv_dialect.east_asian import east_asian
 
 JAPANESE = (
     "時間,位置",

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding, lines_of
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding, lines_of
+from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
-from cdtool.ingest.reading import read_recording
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 
 FOOTERS = {
     "a sum": ["Sum,7"],

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import choose_format, log_pieces, survey
 from cdtool.formats.csv.text import BLOCK_BYTES
 from cdtool.formats.pieces import join_pieces
-from cdtool.ingest.reading import choose_format, log_pieces, survey
 from tests.command import cdtool as command
 from tests.noted_times import note
 
@@ -183,8 +183,8 @@ def test_what_is_compressed_but_no_table_is_named(tmp_path):
 CHILD = """
 import json, resource, sys, time
 from pathlib import Path
-from cdtool.errors import RecordingError
-from cdtool.ingest.reading import survey
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import survey
 
 bomb, plain = map(Path, sys.argv[1:])
 survey(plain)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.tables import Table
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.csv.rows import is_complete
-from cdtool.ingest.reading import read_recording
-from cdtool.tables import Table
+from cdtool.formats.csv_dialect.pins import read_pins
 from tests.formats.conftest import COLUMNS
 from tests.formats.csv_cases import cases
 

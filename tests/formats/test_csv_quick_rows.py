@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.rows import RowReader, without_quotes
-from cdtool.formats.twincat_scope import TwincatScope
+from cdtool.formats.exports.twincat_scope import TwincatScope
 from tests.formats.scope_exports import Channel, Options, ramp, write_export
 
 DIGITS = st.text("0123456789", max_size=10)

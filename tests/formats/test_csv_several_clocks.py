@@ -8,13 +8,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import cdtool
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.commands.convert.converting import convert
+from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import join_pieces
-from cdtool.ingest.reading import read_recording
-from cdtool.workflows.convert.converting import convert
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 
 OWN = """[channels]
 time = { column = "time", unit = "s" }

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.channels import TablePins
-from cdtool.errors import RecordingError
-from cdtool.findings import lines_of
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import lines_of
+from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.find_dialect import find_dialect
 from cdtool.formats.csv.text import read_sample
+from cdtool.formats.csv_dialect.find_dialect import find_dialect
 from cdtool.formats.pieces import PieceRun
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 
 PREAMBLE = ("Measurement of gate 7", "Operator: Jones", "Sample rate,1000", "Date;2024-03-01 12:00:00", "")
 BETWEEN = ("", "\n", "Second table\n", "\n[channels]\n", "# next\n", "Result;ok\n\n")

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.formats.csv import Csv, write_csv
+from tests.base.findings.facts import fact_of
 from tests.data_folder import UR10E_LOGS, data, needs_data
-from tests.findings.facts import fact_of
 from tests.noted_times import noted
 
 

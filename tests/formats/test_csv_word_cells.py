@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.columns import Categories
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.columns import Categories
 from cdtool.formats.csv import Csv
 
 TEXTS = [

@@ -8,9 +8,9 @@ import threading
 import numpy as np
 import pytest
 
-from cdtool.formats import hdf5_writing
-from cdtool.formats.hdf5_writing import deferred_signals
-from cdtool.workflows.convert.converting import convert
+from cdtool.commands.convert.converting import convert
+from cdtool.formats.containers import hdf5_writing
+from cdtool.formats.containers.hdf5_writing import deferred_signals
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

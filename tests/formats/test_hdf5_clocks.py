@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import cdtool
+from cdtool.formats.channels.reading import read_recording, survey
+from cdtool.formats.containers.hdf5 import Packing, times_since
 from cdtool.formats.epoch_clock import EpochClock, common_origin
-from cdtool.formats.hdf5 import Packing, times_since
-from cdtool.ingest.reading import read_recording, survey
-from cdtool.machine_file import read_machine_file
-from tests.findings.facts import fact_of
+from cdtool.formats.machine_file import read_machine_file
+from tests.base.findings.facts import fact_of
 
 h5py = pytest.importorskip("h5py")
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.mat import Mat
-from cdtool.ingest.reading import read_recording, survey
 from tests.data_folder import data, needs_data
 
 

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import choose_format, read_recording, survey
+from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mat import Mat
-from cdtool.ingest.reading import choose_format, read_recording, survey
-from cdtool.machine_file import read_machine_file
 from tests.formats.mat_files import CLASSES, save_v73
 
 h5py = pytest.importorskip("h5py")
@@ -131,7 +131,7 @@ def test_without_h5py_the_error_states_what_to_install_or_how_to_save(tmp_path, 
         raise ImportError(module)
 
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(3.0)})
-    monkeypatch.setattr("cdtool.formats.container_checks.import_module", absent)
+    monkeypatch.setattr("cdtool.formats.containers.container_checks.import_module", absent)
     with pytest.raises(RecordingError) as fault:
         Mat().columns(path)
     assert fault.value.message == f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed"

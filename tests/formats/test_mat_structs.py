@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy.io import loadmat, savemat
 from scipy.sparse import csc_array
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import read_as_logged, survey
 from cdtool.formats.mat import Mat
 from cdtool.formats.mat.version_5 import read_variables
-from cdtool.ingest.reading import read_as_logged, survey
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 from tests.formats import bombs
 from tests.formats.mat_files import save_v7, save_v73
 

@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from cdtool.errors import RecordingError, UsageError
+from cdtool.base.errors import RecordingError, UsageError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.write import Stream
+from cdtool.formats.messages.fields import FieldMissingError, parse_field
 from cdtool.formats.source import TopicDetails
-from cdtool.messages.fields import FieldMissingError, parse_field
+from tests.base.findings.facts import fact_of
 from tests.data_folder import DATA, data, needs_data
-from tests.findings.facts import fact_of
 from tests.formats.mcap_files import JOINTS, START, STREAMS, TIME, N, by_hand, wanted, written
 
 __all__ = ["by_hand", "written"]

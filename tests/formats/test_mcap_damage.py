@@ -5,11 +5,11 @@ import struct
 import numpy as np
 import pytest
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.write import Stream
+from tests.base.findings.facts import fact_of
 from tests.command import cdtool
-from tests.findings.facts import fact_of
 from tests.formats.mcap_files import JOINTS, STREAMS, TIME, N, by_hand, wanted, written
 
 __all__ = ["by_hand", "written"]

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType
 from mcap_ros2.writer import Writer as Ros2Writer
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap import Mcap
-from tests.messages.ros_messages import definitions
+from tests.formats.messages.ros_messages import definitions
 
 NAME = "test_msgs/msg/Thing"
 TOPIC = "/thing"

@@ -12,18 +12,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.columns import Column, Piece
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.commands.convert.converting import convert
 from cdtool.formats import slices
+from cdtool.formats.channels.log_statistics import LogStatistics
+from cdtool.formats.channels.reading import choose_format
+from cdtool.formats.columns import Column, Piece
 from cdtool.formats.csv import text
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces, split_by_clock
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
-from cdtool.ingest.log_statistics import LogStatistics
-from cdtool.ingest.reading import choose_format
-from cdtool.workflows.convert.converting import convert
-from tests.formats.containers import two_clocks
-from tests.workflows.convert.kinds import needs
+from tests.commands.convert.kinds import needs
+from tests.formats.container_files import two_clocks
 
 
 def pieces_of(path: Path) -> list[Piece]:

@@ -15,7 +15,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from scipy.io import loadmat
 
-from cdtool.ingest.reading import survey
+from cdtool.formats.channels.reading import survey
 from tests.data_folder import DATA, needs_data
 
 

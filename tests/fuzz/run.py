@@ -23,7 +23,9 @@ def main() -> None:
     name = sys.argv.pop(1)
     # numba cannot compile what is instrumented; what is imported later would not be instrumented.
     kernels = [module for module in modules() if module.endswith("_kernel")]
-    with atheris.instrument_imports(include=["cdtool.formats", "cdtool.messages", "cdtool.ingest"], exclude=kernels):
+    with atheris.instrument_imports(
+        include=["cdtool.formats", "cdtool.formats.messages", "cdtool.formats.channels"], exclude=kernels
+    ):
         for module in modules():
             import_module(module)
         from tests.fuzz.targets import TARGETS

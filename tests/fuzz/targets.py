@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.csv import Csv
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.source import Source

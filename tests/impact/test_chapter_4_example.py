@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.impact import Collision
-from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
+from cdtool.impact.transmissions.transmission_simulation import SimulatedMotion, Start, simulate_impact
 
 STIFFNESS = 9.8261e8
 MASS, DRAG, PUSH = 2.35e-4 / 0.015**2, 0.03 / 0.015**2, 0.5 / 0.015

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 from cdtool.impact.bodies import Bodies, effective_mass
 from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.base import ContactLaw

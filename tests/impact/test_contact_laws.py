@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.contact_laws import CONTACT_LAWS
 from cdtool.impact.contact_laws.base import KeepsIndentation, StoresEnergy
 from cdtool.impact.contact_laws.hertz import Hertz, hertz_stiffness

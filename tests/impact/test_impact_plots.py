@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.commands.study.impact_plots import plot_force_and_speed, plot_loops, plot_restitution, write_impact_plots
 from cdtool.impact.examples.chapter_3 import loops, restitution_over_damping, restitution_over_speed, two_bodies
-from cdtool.report.plots.impact_plots import plot_force_and_speed, plot_loops, plot_restitution, write_impact_plots
 
 
 def test_the_example_of_figure_3_2_loses_half_its_relative_energy():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.impact.impulse import Hypothesis, RigidBody, strike
 
 FLOOR = RigidBody(math.inf, math.inf, (0.0, 0.0))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.control_loop import control_by_force, torque_by_force
 from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.linearised import (
@@ -20,7 +20,7 @@ from cdtool.impact.linearised import (
     undamped,
 )
 from cdtool.impact.rigidity import rigidity
-from cdtool.impact.transfer import Transfer, second_order
+from cdtool.impact.transmissions.transfer import Transfer, second_order
 
 BODE_4_4 = [
     (0.1, 112.7, 692.6, 0.0922),

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.restitution import (
     coefficients,
     damping_for_restitution,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.examples import chapter_4 as example
 from cdtool.impact.sensor_ranking import ITSELF, Ranking, deviations, rank_sensors

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.control_loop import control_by_force, speed_by_reference, torque_by_force
@@ -21,9 +21,9 @@ from cdtool.impact.linearised import (
     motor_by_torque,
     penetration_by_momentum,
 )
-from cdtool.impact.transfer import Transfer
-from cdtool.impact.transmission import Transmission
-from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
+from cdtool.impact.transmissions.transfer import Transfer
+from cdtool.impact.transmissions.transmission import Transmission
+from cdtool.impact.transmissions.transmission_simulation import SimulatedMotion, Start, simulate_impact
 
 DAMPED = replace(example.ELASTIC, damping=0.01, motor_friction=0.02, load_friction=5.0)
 DRIVES: dict[str, Transmission] = {"rigid": example.TRANSMISSION, "elastic": DAMPED}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 from cdtool.impact.waves import QUASI_STATIC_FROM, check_waves, rod_first_frequency, vibration_share
 
 

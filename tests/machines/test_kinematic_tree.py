@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.errors import ConfigurationError, UsageError
+from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.machines.kinematic_tree import KinematicTree, TreeJoint, TreeLink
 
 PENDULUM = KinematicTree(

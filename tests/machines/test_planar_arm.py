@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import ConfigurationError, RecordingError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.recording import Recording, Series
-from tests.findings.facts import fact_of
+from cdtool.recordings.recording import Recording, Series
+from tests.base.findings.facts import fact_of
 from tests.synthetic.machines import ARM, arm_of
 from tests.synthetic.motions import moving_recording
 

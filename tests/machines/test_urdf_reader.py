@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.errors import ConfigurationError
+from cdtool.base.errors import ConfigurationError
 from cdtool.machines import urdf_reader
 from cdtool.machines.urdf_reader import read_urdf
 from tests.data_folder import UR10E_LOGS

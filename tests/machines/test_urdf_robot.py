@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cdtool.base.errors import ConfigurationError
 from cdtool.detectors.momentum import Momentum
-from cdtool.errors import ConfigurationError
-from cdtool.machine_file import fingerprint, read_machine_file
-from cdtool.recording import Recording, Series
+from cdtool.formats.machine_file import fingerprint, read_machine_file
+from cdtool.recordings.recording import Recording, Series
 from tests.synthetic.motions import moving_recording
 from tests.synthetic.robots import JOINTS, six_joint_robot, six_joint_urdf, urdf_robot
 

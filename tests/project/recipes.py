@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from cdtool.registry import Registry
+from cdtool.base.registry import Registry
 from tests.project import pages
 
 FOLDER = pages.DOCS / "recipes"

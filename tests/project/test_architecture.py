@@ -31,9 +31,9 @@ def test_importing_cdtool_loads_nothing_heavy():
 @pytest.mark.parametrize(
     "module",
     [
-        "cdtool.workflows.benchmark.benchmark",
+        "cdtool.commands.scoring.benchmark",
         "cdtool.detectors.friction_ekf",
-        "cdtool.ingest.reading",
+        "cdtool.formats.channels.reading",
         "cdtool.report.outputs",
     ],
 )
@@ -42,7 +42,7 @@ def test_importing_a_module_loads_no_library_that_only_its_use_needs(module):
 
 
 def test_the_command_line_loads_typer_and_nothing_heavier():
-    assert not loaded_after("import cdtool.cli.app") & (set(HEAVY) - {"typer", "rich"})
+    assert not loaded_after("import cdtool.commands.app") & (set(HEAVY) - {"typer", "rich"})
 
 
 def test_imports_run_downward():
@@ -86,7 +86,7 @@ def test_public_names_are_used_or_documented_outside_tests():
 
 def test_the_python_api_names_functions_that_exist_and_every_command_has_one():
     import cdtool
-    from cdtool.cli.app import app
+    from cdtool.commands.app import app
 
     assert all(callable(getattr(cdtool, name)) for name in cdtool.__all__ if name != "__version__")
     members = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]

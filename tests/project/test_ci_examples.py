@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cdtool.evaluation.limits import read_limits
-from cdtool.evaluation.summary import FIGURES
-from cdtool.tables import Table
+from cdtool.base.tables import Table
+from cdtool.results.limits import read_limits
+from cdtool.results.summary import FIGURES
 
 yaml = pytest.importorskip("yaml")
 
@@ -51,7 +51,7 @@ class Shell:
         programs = folder / "programs"
         programs.mkdir()
         program = programs / "cdtool"
-        program.write_text(f"#!{sys.executable}\nfrom cdtool.cli.app import main\nmain()\n", encoding="utf-8")
+        program.write_text(f"#!{sys.executable}\nfrom cdtool.commands.app import main\nmain()\n", encoding="utf-8")
         program.chmod(0o755)
         self.environment = {
             **os.environ,

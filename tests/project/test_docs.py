@@ -18,14 +18,14 @@ from typing import Any
 
 import pytest
 
-from cdtool.channels import ChannelMap
+from cdtool.base.errors import ConfigurationError
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.detectors import DETECTORS
-from cdtool.errors import ConfigurationError
-from cdtool.machine_file import read_machine_file
+from cdtool.formats.channels.channel_map import ChannelMap
+from cdtool.formats.machine_file import read_machine_file
 from cdtool.machines import MACHINES
-from cdtool.recording import CHANNELS
-from cdtool.units import UNITS
-from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from cdtool.recordings.recording import CHANNELS
+from cdtool.recordings.units import UNITS
 from tests.command import Outcome, cdtool
 from tests.data_folder import DATA, UR10E_LOGS, needs_data
 from tests.project.pages import (

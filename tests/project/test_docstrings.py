@@ -5,7 +5,7 @@ Public is what a user of the Python API or the author of a plug-in calls:
 * every function of `cdtool.__all__`; its classes need a summary, the results also an example;
 * every class in the tables of the detectors and the thresholds, and the methods of their contracts;
 * every public function of `cdtool.detectors.base`, `cdtool.detectors.filters` and `cdtool.thresholds.base`, which are
-  the tools of a plug-in, and of `cdtool.evaluation.statistics`;
+  the tools of a plug-in, and of `cdtool.statistics`;
 * every function of the detectors, the thresholds and the evaluation that another folder of cdtool imports.
 
 A public function needs Parameters with a description of each, Returns, Raises if it raises an error itself, and
@@ -39,7 +39,7 @@ from cdtool.thresholds.base import FittedThreshold, Threshold
 ROOT = Path(__file__).parents[2]
 ROOMS = ("detectors", "thresholds", "evaluation")
 WHOLE_MODULES = ("cdtool.detectors.base", "cdtool.detectors.filters", "cdtool.thresholds.base")
-STATISTICS = "cdtool.evaluation.statistics"
+STATISTICS = "cdtool.statistics"
 CONTRACTS = (Detector.signal, Threshold.fit, FittedThreshold.evaluate)
 
 _IMPORT = re.compile(rf"^ *from (cdtool\.(?:{'|'.join(ROOMS)})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
@@ -177,7 +177,10 @@ def known_names() -> set[str]:
     """The names of functions with an example of their own, as a docstring writes them."""
     functions = {**api(), **names_of_functions()}
     with_example = [name for name, item in functions.items() if ">>>" in (inspect.getdoc(item) or "")]
-    return {*with_example, *(name.rpartition(".")[2] for name in with_example if not name.startswith("cdtool.cli"))}
+    return {
+        *with_example,
+        *(name.rpartition(".")[2] for name in with_example if not name.startswith("cdtool.commands")),
+    }
 
 
 @pytest.mark.parametrize("name", sorted(api()))

@@ -8,7 +8,7 @@ from glob import glob
 from pathlib import Path
 
 import cdtool
-from cdtool.workflows.store.use import StoreUse
+from cdtool.execution.store.use import StoreUse
 
 ROOT = Path(__file__).parents[2]
 SHARES = 3

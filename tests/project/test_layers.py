@@ -42,7 +42,7 @@ def test_another_import_is_another_picture(script, layers):
 
 
 def test_a_module_without_a_layer_is_an_error(script, tmp_path, monkeypatch):
-    (tmp_path / "stray.py").write_text("import cdtool.units\n", encoding="utf-8")
+    (tmp_path / "stray.py").write_text("import cdtool.recordings.units\n", encoding="utf-8")
     monkeypatch.setattr(script, "PACKAGE", tmp_path)
     with pytest.raises(ValueError, match="cdtool/stray is in no layer"):
         script.read_layers()

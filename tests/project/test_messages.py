@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from cdtool.cli.app import app
-from cdtool.errors import installing
+from cdtool.base.errors import installing
+from cdtool.commands.app import app
 from tests.project.pages import ROOT
 
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
@@ -142,7 +142,7 @@ def test_every_section_and_key_that_a_message_names_is_documented():
 def test_an_extra_is_installed_from_the_checkout_while_no_index_has_it():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     for path, line, text in TEXTS:
-        assert "cdtool[" not in text, f"{path}:{line}: say it by cdtool.errors.installing"
+        assert "cdtool[" not in text, f"{path}:{line}: say it by cdtool.base.errors.installing"
     for path in {path for path, *_ in TEXTS}:
         for name in re.findall(r"installing\([\"']([a-z0-9]+)[\"']\)", path.read_text(encoding="utf-8")):
             assert name in extras

@@ -1,4 +1,4 @@
-"""Every file that cdtool writes goes through cdtool/files.py: no module opens a user's file name for writing."""
+"""Every file that cdtool writes goes through cdtool/base/files/writing.py: no module opens a file name for writing."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ ROOT = Path(__file__).parents[2]
 BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
 WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", "NamedTemporaryFile", "savefig"}
 ELSEWHERE = {
-    "cdtool/remote/staging.py": "locks a temporary folder of its own",
-    "cdtool/remote/transferred.py": "writes into that folder",
-    "cdtool/cli/streams.py": "opens the null device",
-    "cdtool/workflows/execution/in_worker.py": "opens the null device",
-    "cdtool/workflows/store/journal.py": "appends to a file that the next run takes over if this one is killed",
-    "cdtool/workflows/tuning/journal.py": "appends to a file that the next run goes on with if this one is killed",
-    "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
-    "cdtool/workflows/injecting.py": "writes into the folder that replaced_folder gives it",
-    "cdtool/workflows/injection/injected_logs.py": "writes into that folder, or into the benchmark's own",
-    "cdtool/workflows/benchmark/with_injected.py": "marks such a folder with what it depends on",
+    "cdtool/base/remote/staging.py": "locks a temporary folder of its own",
+    "cdtool/base/remote/transferred.py": "writes into that folder",
+    "cdtool/commands/console/streams.py": "opens the null device",
+    "cdtool/execution/in_worker.py": "opens the null device",
+    "cdtool/execution/store/journal.py": "appends to a file that the next run takes over if this one is killed",
+    "cdtool/commands/tune/journal.py": "appends to a file that the next run goes on with if this one is killed",
+    "cdtool/commands/simulate/recording_folder.py": "writes into the folder that replaced_folder gives it",
+    "cdtool/commands/inject/injecting.py": "writes into the folder that replaced_folder gives it",
+    "cdtool/commands/inject/injected_logs.py": "writes into that folder, or into the benchmark's own",
+    "cdtool/commands/inject/with_injected.py": "marks such a folder with what it depends on",
 }
 
 
@@ -83,7 +83,7 @@ def test_files_are_written_only_by_the_module_for_it():
     found = set()
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
         name = path.relative_to(ROOT).as_posix()
-        if name != "cdtool/files.py" and not name.startswith("cdtool/formats/"):
+        if name != "cdtool/base/files/writing.py" and not name.startswith("cdtool/formats/"):
             found |= {name for _ in writes(ast.parse(path.read_text(encoding="utf-8")))}
     assert found == set(ELSEWHERE)
 

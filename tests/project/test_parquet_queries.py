@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.evaluation.evaluated import evaluate
-from cdtool.evaluation.results import Results
-from cdtool.evaluation.rows import Rows
+from cdtool.commands.score.score_triggers import score
 from cdtool.report.outputs import write_outputs
 from cdtool.report.writers.base import Report
-from cdtool.workflows.score_triggers import score
+from cdtool.results.evaluated import evaluate
+from cdtool.results.results import Results
+from cdtool.results.rows import Rows
 from tests.synthetic.many_results import many_results
 
 duckdb = pytest.importorskip("duckdb", reason="duckdb is absent: the documented queries were not run")

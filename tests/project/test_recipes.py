@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.cli.list_known import _KINDS
+from cdtool.commands.list_known.command import _KINDS
 from tests.command import cdtool
 from tests.project.pages import DOCS, ROOT, check_detector_page, docs_script, name_of
 from tests.project.recipes import Recipe, install, read_recipes, registry_of, write_files

@@ -8,8 +8,8 @@ from pathlib import Path
 from types import ModuleType
 
 import cdtool
-from cdtool.evaluation.summary import summarise
-from cdtool.simulation.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.results.summary import summarise
 
 DOCS = Path(__file__).parents[2] / "docs"
 

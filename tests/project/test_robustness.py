@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.detectors import DETECTORS
-from cdtool.simulation.changed_machine import ChangedMachine
 from cdtool.thresholds import THRESHOLDS
 from tests.project.pages import DOCS, docs_script
 

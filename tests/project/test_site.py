@@ -17,7 +17,7 @@ import pytest
 
 import cdtool
 from cdtool import _API
-from cdtool.cli.app import COMMANDS
+from cdtool.commands.app import COMMANDS
 from tests.project.pages import DOCS, PAGES, ROOT
 
 SITE = DOCS / "site"
@@ -92,7 +92,7 @@ def test_every_page_that_the_search_puts_later_exists(pages):
 def test_every_command_and_option_is_on_its_page(pages):
     from typer.main import get_command
 
-    root: Any = get_command(__import__("cdtool.cli.app", fromlist=["app"]).app)
+    root: Any = get_command(__import__("cdtool.commands.app", fromlist=["app"]).app)
     for name in COMMANDS:
         text = pages[f"reference/cli/{name}"]
         assert text.startswith(f"# cdtool {name}\n")

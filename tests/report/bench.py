@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from cdtool.evaluation.results import (
-    ContactResult,
-)
-from cdtool.evaluation.traces.trace import Trace, make_trace
-from cdtool.evaluation.truth.matching import match
-from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
-from cdtool.operations import operations_of
-from cdtool.pipeline import Detection
-from cdtool.recording import Recording
-from cdtool.workflows.detection import Detected
+from cdtool.alarms.pipeline import Detection
+from cdtool.commands.detecting.detection import Detected
+from cdtool.recordings.operations import operations_of
+from cdtool.recordings.recording import Recording
+from cdtool.results.results import ContactResult
+from cdtool.results.traces.trace import Trace, make_trace
+from cdtool.truth.matching import match
+from cdtool.truth.onset import OnsetRule, find_contacts
 
 NAMES = ("pure_inertia", "friction_ekf", "momentum", "pure_torque")
 RULE = OnsetRule(above=20.0, back_to=8.0)

@@ -8,20 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.activation import Activation
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, detect_operation, run_detector
 from cdtool.detectors import DETECTORS
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.results import (
-    ExposureResult,
-    FalseAlarmResult,
-    RecordingResult,
-    Results,
-    Skipped,
-)
 from cdtool.machines.linear_axis import LinearAxis
-from cdtool.operations import operations_of
-from cdtool.pipeline import Detection, detect_operation, run_detector
-from cdtool.recording import Recording
+from cdtool.recordings.operations import operations_of
+from cdtool.recordings.recording import Recording
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import ExposureResult, FalseAlarmResult, RecordingResult, Results, Skipped
 from cdtool.thresholds.signature import Signature
 from tests.report.bench import NAMES, Bench, contacts_of
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cdtool.evaluation.evaluated import evaluate
-from cdtool.evaluation.limits import LimitRule
 from cdtool.report.writers.base import Report
+from cdtool.results.evaluated import evaluate
+from cdtool.results.limits import LimitRule
 from tests.synthetic.many_results import many_results, traces_of_many
 
 # More than a report lists where tests lower the limits.

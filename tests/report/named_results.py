@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.results import (
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import (
     CalibrationResult,
     ExposureResult,
     FalseAlarmResult,

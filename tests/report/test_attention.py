@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from cdtool.evaluation.evaluated import evaluate
-from cdtool.evaluation.limits import LimitRule
-from cdtool.evaluation.results import FalseAlarmResult, ForceResult
 from cdtool.report.tables.attention import attention_table, failed_recordings, failed_traces
+from cdtool.results.evaluated import evaluate
+from cdtool.results.limits import LimitRule
+from cdtool.results.results import FalseAlarmResult, ForceResult
 from tests.report.bench import contact
 
 

@@ -9,9 +9,9 @@ from dataclasses import fields, replace
 
 import pytest
 
-from cdtool.evaluation.results import ContactResult, ForceResult, ForceStepResult, Results
 from cdtool.report.writers.contacts import contacts_lines
 from cdtool.report.writers.forces import forces_lines
+from cdtool.results.results import ContactResult, ForceResult, ForceStepResult, Results
 from tests.report.bench import contact
 from tests.report.hostile import HOSTILE
 

@@ -8,11 +8,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.limits import LimitRule, not_met
-from cdtool.evaluation.results import LimitResult, RecordingFinding, Results, Skipped
 from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.limits import LimitRule, not_met
+from cdtool.results.results import LimitResult, RecordingFinding, Results, Skipped
 from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.named_results import named

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from cdtool.evaluation.statistics.interval import Interval
 from cdtool.report.number_text import missed, number, percent, rate, with_interval
+from cdtool.statistics.interval import Interval
 
 NAN, INF = math.nan, math.inf
 

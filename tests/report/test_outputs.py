@@ -8,16 +8,16 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cdtool.errors import UsageError
-from cdtool.evaluation.evaluated import evaluate
-from cdtool.evaluation.results import SCHEMA_VERSION, ForceResult, ForceStepResult
-from cdtool.evaluation.traces.file import encode_traces, read_traces
+from cdtool.base.errors import UsageError
 from cdtool.report.markdown.report import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.plots.figures import slug
 from cdtool.report.writers.base import Report
 from cdtool.report.writers.contacts import contacts_lines
 from cdtool.report.writers.junit import to_junit
+from cdtool.results.evaluated import evaluate
+from cdtool.results.results import SCHEMA_VERSION, ForceResult, ForceStepResult
+from cdtool.results.traces.file import encode_traces, read_traces
 from tests.report.bench import Bench
 from tests.report.hostile import HOSTILE
 

@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cdtool.evaluation.evaluated import evaluate
 from cdtool.report import cases, many
 from cdtool.report.cases import suites_of
 from cdtool.report.html import plots
@@ -21,6 +20,7 @@ from cdtool.report.many import is_many
 from cdtool.report.markdown.report import to_markdown
 from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
+from cdtool.results.evaluated import evaluate
 from tests.report.html.html_case import case
 from tests.report.many import COUNT, LIMITS, report_of_many
 from tests.synthetic.many_results import many_results

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.simulation.changed_machine import ChangedMachine
-from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_run
-from cdtool.simulation.gate_recordings import gate_bench
-from cdtool.simulation.recording_folder import GROUPS, write_folder
+from cdtool.commands.simulate.changed_machine import ChangedMachine
+from cdtool.commands.simulate.gate_model import GateParameters, GateRun, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import gate_bench
+from cdtool.commands.simulate.recording_folder import GROUPS, write_folder
 
 GATE = GateParameters()
 # When the leaf passes 0.9 m, and how long it takes for 0.1 m at 0.2 m/s [s].

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdtool.evaluation.results import (
-    ContactResult,
-    ExposureResult,
-    FalseAlarmResult,
-    RecordingResult,
-    Results,
-)
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
 
 MISSED, NOT_ASSESSABLE = "missed", "not_assessable"
 Outcome = float | str

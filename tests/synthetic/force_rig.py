@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 ONSET, RATE = 3.0, 1000.0
 MACHINE = """

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from cdtool.workflows.identification.identifying import IdentifiedMachine
+from cdtool.commands.identify.identifying import IdentifiedMachine
 
 FloatArray = npt.NDArray[np.float64]
 

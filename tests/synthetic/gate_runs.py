@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 
-from cdtool.identification.axis_run import AxisRun, axis_run
+from cdtool.base.tables import Table
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import as_recording
+from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.linear_axis import LinearAxis
-from cdtool.recording import Recording
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
-from cdtool.simulation.gate_recordings import as_recording
-from cdtool.tables import Table
+from cdtool.recordings.recording import Recording
 
 GATE = GateParameters()
 ON_LOAD_SIDE = LinearAxis.from_table(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from cdtool.base.tables import Table
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.tables import Table
 
 GATE = {
     "motor_inertia": 9.5e-4,

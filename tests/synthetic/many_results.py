@@ -11,7 +11,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from cdtool.evaluation.results import (
+from cdtool.results.results import (
     ContactResult,
     ExposureResult,
     FalseAlarmResult,
@@ -23,8 +23,8 @@ from cdtool.evaluation.results import (
     Skipped,
     SweepResult,
 )
-from cdtool.evaluation.rows import Rows
-from cdtool.evaluation.traces.trace import Trace
+from cdtool.results.rows import Rows
+from cdtool.results.traces.trace import Trace
 from tests.report.html.html_case import ONSET, trace_of
 
 DETECTORS = ("momentum", "pure_inertia", "friction_ekf", "inertial_momentum", "pure_torque")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 
 PERIOD = 1e-3
 

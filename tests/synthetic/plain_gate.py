@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 
 Array = npt.NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from tests.synthetic.force_rig import BENCHMARK, MACHINE, ONSET, PROTOCOL, Force, half_sine
 
 INSTRUMENT = """

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.recording import Recording, Series
+from cdtool.recordings.recording import Recording, Series
 
 
 def rest_to_rest(

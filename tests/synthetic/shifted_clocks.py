@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.machines.linear_axis import LinearAxis
-from cdtool.recording import Contact, Recording, Series
+from cdtool.recordings.recording import Contact, Recording, Series
 
 MASS, FRICTION = 40.0, 25.0
 # Below about this speed the axis sticks [m/s].

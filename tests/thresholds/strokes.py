@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.detection import Signal
-from cdtool.recording import Recording, Series
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.recording import Recording, Series
 
 N = 4000
 TIME = np.arange(N) * 1e-3

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.detection import Status
-from cdtool.errors import RecordingError
-from cdtool.recording import Recording, Series
+from cdtool.base.errors import RecordingError
+from cdtool.detectors.detection import Status
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.adaptive import Adaptive
 from tests.thresholds.strokes import TIME, N, signal, stroke
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.detection import WHOLE_MACHINE, Signal, Status
-from cdtool.errors import RecordingError, UsageError
-from cdtool.recording import Recording, Series
+from cdtool.base.errors import RecordingError, UsageError
+from cdtool.detectors.detection import WHOLE_MACHINE, Signal, Status
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.baseline import Baseline, FittedBaseline
 
 RATE = 100.0

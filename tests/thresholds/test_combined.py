@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
 from cdtool.thresholds.combined import Combined
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.trend import Trend

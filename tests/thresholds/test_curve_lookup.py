@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.detection import Signal
-from cdtool.motion.progress import Progress
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.motion.progress import Progress
 from cdtool.thresholds.curve_lookup import LearnedColumn, look_up
 from cdtool.thresholds.normal_motion import NormalCurves, farthest_lasting
 from cdtool.thresholds.signature_curve import Curve, resample

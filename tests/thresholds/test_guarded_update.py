@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.activation import Activation
-from cdtool.detection import Status
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import judge, run_detector
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.commands.simulate.gate_recordings import as_recording
+from cdtool.detectors.detection import Status
 from cdtool.detectors.momentum import Momentum
-from cdtool.errors import SignatureError, UsageError
-from cdtool.operations import operations_of
-from cdtool.pipeline import judge, run_detector
-from cdtool.simulation.gate_recordings import as_recording
+from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, check_complete, guarded, largest_move
 from cdtool.thresholds.signature import Signature

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cdtool.detection import Status
-from cdtool.errors import NothingValidError, UsageError
+from cdtool.base.errors import NothingValidError, UsageError
+from cdtool.detectors.detection import Status
 from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.whitening import burg
 from tests.thresholds.strokes import TIME, N, jittering_clock, signal, stroke

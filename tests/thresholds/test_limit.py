@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.detection import Signal
-from cdtool.errors import UsageError
-from cdtool.recording import Recording
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.limit import Limit
 
 RECORDING = Recording("r", "r", ("a", "b"), {})

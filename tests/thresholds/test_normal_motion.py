@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.motion import MotionClass
-from cdtool.recording import Recording, Series
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.normal_motion import LEVEL_SECONDS, NormalMotion, learn_normal_motion, levels
 
 TIME = np.arange(6000) * 1e-3

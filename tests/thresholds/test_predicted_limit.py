@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.detection import Status
-from cdtool.errors import SignatureError, UsageError
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.detectors.detection import Status
 from cdtool.thresholds.predicted_limit import PredictedLimit
 from tests.thresholds.strokes import STILL, TIME, N, jittering_clock, noise_runs, signal
 

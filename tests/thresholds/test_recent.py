@@ -7,7 +7,7 @@ from weakref import ref
 
 import numpy as np
 
-from cdtool.detection import Signal
+from cdtool.detectors.detection import Signal
 from cdtool.thresholds.recent import Recent
 
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Band, Signal, Status
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.commands.simulate.changed_machine import ChangedMachine
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import as_recording
+from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.momentum import Momentum
-from cdtool.errors import UsageError
-from cdtool.simulation.changed_machine import ChangedMachine
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
-from cdtool.simulation.gate_recordings import as_recording
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.running_level_kernel import CLIP, FREEZE, GUARD, MEMORY, START, WIDER

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.detection import Status
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Status
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
 from tests.thresholds.strokes import N, noise_runs, signal, stroke

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.activation import Activation
-from cdtool.detection import Signal, Status
-from cdtool.machine_file import read_machine_file
-from cdtool.operations import Operation, operations_of
-from cdtool.pipeline import detect_operation
-from cdtool.recording import Recording, Series
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import detect_operation
+from cdtool.commands.learning.fitting import fit_operations
+from cdtool.detectors.detection import Signal, Status
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.operations import Operation, operations_of
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.signature.fitting import fit_operations
 from tests.thresholds.strokes import TIME, N, stroke
 
 JOINTS = ("shoulder", "elbow")

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.detection import Signal, Status
-from cdtool.errors import SignatureError, UsageError
-from cdtool.recording import Recording, Series
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.detectors.detection import Signal, Status
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.signature_curve import Curve
 from tests.thresholds import strokes

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.detection import Signal, Status
-from cdtool.errors import SignatureError
-from cdtool.motion import MotionClass
-from cdtool.motion.progress import Progress
-from cdtool.recording import Recording, Series
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import SignatureError
+from cdtool.detectors.detection import Signal, Status
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.progress import Progress
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve

@@ -9,19 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Signal, Status
-from cdtool.errors import SignatureError, UsageError
-from cdtool.judgement import judged
-from cdtool.motion.speed_range import GUARD
-from cdtool.recording import Recording, Series
+from cdtool.alarms.judgement import judged
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.detectors.detection import Signal, Status
+from cdtool.recordings.motion.speed_range import GUARD
+from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.signature_curve import Curve
 from cdtool.thresholds.speed_range import CURVATURE, RELEASE, SignatureOverSpeeds, interpolate, over_speeds
-from tests.motion.speed_logs import log
+from tests.recordings.motion.speed_logs import log
 from tests.thresholds.strokes import jittering_clock
 
 SPEEDS = (0.2, 0.3)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.detection import Status
-from cdtool.errors import UsageError
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Status
 from cdtool.thresholds.first_order import filtered_slope, low_passed
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.limit_and_trend import LimitAndTrend

@@ -21,7 +21,7 @@ DETECTOR = """
 from dataclasses import dataclass
 from typing import ClassVar
 import numpy as np
-from cdtool.detection import Signal
+from cdtool.detectors.detection import Signal
 from cdtool.detectors.base import gain
 from cdtool.detectors.look import Look
 
@@ -229,7 +229,7 @@ THRESHOLD = """
 from dataclasses import dataclass, replace
 from typing import ClassVar
 import numpy as np
-from cdtool.detection import Band
+from cdtool.detectors.detection import Band
 from cdtool.thresholds.limit import FittedLimit
 
 class Fitted(FittedLimit):
@@ -299,14 +299,14 @@ def test_a_program_error_never_has_the_status_of_a_violated_limit(monkeypatch, t
     def fault(*_: object, **__: object) -> None:
         raise ZeroDivisionError("deep inside")
 
-    monkeypatch.setattr("cdtool.workflows.benchmark.benchmark.read_benchmark_file", fault)
+    monkeypatch.setattr("cdtool.commands.scoring.benchmark.read_benchmark_file", fault)
     done = cdtool("benchmark", benchmark_file(tmp_path))
     assert done.status == 2 and "ZeroDivisionError" in done.err
 
 
 WRITER = """
-from cdtool.files import write_text
-from cdtool.foreign_files import Kind
+from cdtool.base.files.writing import write_text
+from cdtool.base.files.foreign import Kind
 from cdtool.report.writers.base import Writer
 
 class Plugin(Writer):

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.errors import OutputError, RecordingError
-from cdtool.files import replaced
+from cdtool.base.errors import OutputError, RecordingError
+from cdtool.base.files.writing import replaced
+from cdtool.commands.convert.converting import convert
+from cdtool.commands.convert.log_rows import LogRows
 from cdtool.formats.groups import Part
-from cdtool.workflows.convert.converting import convert
-from cdtool.workflows.log_rows import LogRows
-from tests.workflows.convert.kinds import KINDS, needs, table
+from tests.commands.convert.kinds import KINDS, needs, table
 
 # A full disk, simulated for a process: no file may exceed a few KiB.
 LIMITED = """
@@ -23,7 +23,7 @@ import resource, sys
 limit = int(sys.argv.pop(1))
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 sys.argv[0] = "cdtool"
-from cdtool.cli.app import main
+from cdtool.commands.app import main
 main()
 """
 
@@ -77,7 +77,7 @@ def test_a_read_error_is_not_reported_for_the_file_being_written(tmp_path, monke
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
     monkeypatch.setattr(LogRows, "parts", lost)
-    monkeypatch.setattr("cdtool.formats.csv_writing._lines", lambda *_: "")
+    monkeypatch.setattr("cdtool.formats.exports.csv_writing._lines", lambda *_: "")
     monkeypatch.setattr(Part, "__len__", lambda _: 0)
     with pytest.raises(RecordingError, match=r"run\.csv: cannot be read: Input/output error"):
         convert(log, tmp_path / "out.csv")

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.activation import Activation
-from cdtool.errors import SignatureError, UsageError
-from cdtool.signature_store import write_signature
+from cdtool.alarms.activation import Activation
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.commands.detecting.detection_options import DetectionOptions
+from cdtool.formats.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.detection_options import DetectionOptions
 from tests.command import cdtool as run
 from tests.synthetic.door import MACHINE, write_log
 

@@ -20,7 +20,7 @@ from tests.command_server import CommandServer, Ended, command_server
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
 CONTRACTS = "torque_rate or robust_limit"
-MAIN = "from cdtool.cli.app import main; main()"
+MAIN = "from cdtool.commands.app import main; main()"
 
 Command = Callable[..., Ended]
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.activation import Activation
-from cdtool.machine_file import read_machine_file
-from cdtool.operations import operations_of
-from cdtool.pipeline import detect_operation
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import detect_operation
+from cdtool.commands.learning.fitting import fit_operations
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.signature.fitting import fit_operations
 from tests.command import cdtool as run
 from tests.data_folder import DATA, UR10E_LOGS, needs_data
 

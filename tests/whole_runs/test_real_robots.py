@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.errors import CdtoolError
-from cdtool.machine_file import read_machine_file
-from cdtool.operations import operations_of
-from cdtool.pipeline import run_detector
+from cdtool.alarms.pipeline import run_detector
+from cdtool.base.errors import CdtoolError
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.operations import operations_of
 from tests.data_folder import UR10E_LOGS, data, needs_data
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "ur10e_collisions.py"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
+from cdtool.base.errors import ConfigurationError, NothingValidError, UsageError
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
 from cdtool.detectors import DETECTORS
-from cdtool.errors import ConfigurationError, NothingValidError, UsageError
-from cdtool.simulation.arm_recordings import write_arm_recordings
 from tests.command import cdtool
 
 

@@ -10,16 +10,16 @@ from pathlib import Path, PureWindowsPath
 
 import pytest
 
-from cdtool import file_locks
-from cdtool.cli import streams
-from cdtool.file_locks import holding, lock_handle
-from cdtool.files import replaced_folder, write_text
+from cdtool.base.files import locks as file_locks
+from cdtool.base.files.locks import holding, lock_handle
+from cdtool.base.files.writing import replaced_folder, write_text
+from cdtool.commands.console import streams
+from cdtool.commands.judging.runs import shown_path
+from cdtool.execution import processes
+from cdtool.execution.store.entry import Entry
+from cdtool.execution.store.journal import Journal, left_behind
 from cdtool.formats.mcap import file_bytes
 from cdtool.report.plots.figures import slug
-from cdtool.workflows.execution import processes
-from cdtool.workflows.runs import shown_path
-from cdtool.workflows.store.entry import Entry
-from cdtool.workflows.store.journal import Journal, left_behind
 from tests.command import cdtool
 from tests.fuzz.hostile_commands import make_bench
 from tests.windows_files import CAN_SIMULATE, windows_files

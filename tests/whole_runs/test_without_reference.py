@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 import cdtool
-from cdtool.simulation.arm_recordings import write_arm_recordings
-from cdtool.simulation.gate_model import GateParameters
-from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark.benchmark import benchmark
+from cdtool.commands.scoring.benchmark import benchmark
+from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.gate_model import GateParameters
+from cdtool.commands.simulate.gate_recordings import write_gate_recordings
 from tests.command import cdtool as command
 
 DETECTORS = ["igm", "gm"]

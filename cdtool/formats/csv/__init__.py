@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.channels import ChannelMap, TablePins, TimeSource
-from cdtool.columns import Column, Piece
-from cdtool.errors import RecordingError, UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import RecordingError, UsageError
+from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
+from cdtool.formats.columns import Column, Piece
 from cdtool.formats.csv.gzipped import open_text
 from cdtool.formats.groups import PREFIX
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 
 if TYPE_CHECKING:
-    from cdtool.formats.csv.dialect import Dialect
     from cdtool.formats.csv.several_clocks import Clocks
     from cdtool.formats.csv.table import TextTable
+    from cdtool.formats.csv_dialect.dialect import Dialect
 
 _MARK = b"# " + PREFIX.encode()
 _KEY = _MARK + b"origin_s: "
@@ -47,8 +47,8 @@ class Csv:
     def sniff(self, path: Path) -> bool:
         """Return whether the file starts with text other than markup, and is not of another format of text."""
         from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
-        from cdtool.formats.csv.foreign_heads import is_measurement, is_scope_export
         from cdtool.formats.csv.text import read_sample
+        from cdtool.formats.csv_dialect.foreign_heads import is_measurement, is_scope_export
 
         head = read_sample(path, HEAD_BYTES)
         if is_measurement(head) or is_scope_export(head):
@@ -85,8 +85,8 @@ class Csv:
 
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
-    from cdtool.formats.csv.find_dialect import find_dialect
     from cdtool.formats.csv.text import SAMPLE_BYTES, read_sample, read_small
+    from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
     content = read_small(path)
     sample = read_sample(path) if content is None else content[:SAMPLE_BYTES]

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.channels import TablePins
-from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
+from cdtool.formats.csv_dialect.dialect import Dialect
 
 # Samples with fewer rows, or with more lines above the rows, are not shortened.
 _FEWEST_ROWS, _MOST_ABOVE = 100, 40

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.columns import Categories
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding, lines_of
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding, lines_of
+from cdtool.formats.columns import Categories
 from cdtool.formats.csv.cells import NULLS, STAMP_LIKE, number
-from cdtool.formats.csv.dialect import Dialect, quoted
 from cdtool.formats.csv.stamps import MISSING_STAMP, Integers
+from cdtool.formats.csv_dialect.dialect import Dialect, quoted
 
 # A survey reads a column of numbers with up to this many unreadable cells, or up to this share of the rows.
 _FEW, _SHARE = 3, 0.05

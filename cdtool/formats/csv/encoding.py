@@ -6,10 +6,10 @@ import codecs
 import re
 from pathlib import Path
 
-from cdtool.errors import RecordingError
-from cdtool.formats.csv.east_asian import east_asian
+from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.gzipped import is_gzipped, measure
 from cdtool.formats.csv.text import UNIT_BYTES, Text, recoded
+from cdtool.formats.csv_dialect.east_asian import east_asian
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
 _MARKS = (

@@ -15,8 +15,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any, cast
 
-from cdtool.errors import RecordingError
-from cdtool.formats.container_checks import check_size
+from cdtool.base.errors import RecordingError
+from cdtool.formats.containers.container_checks import check_size
 
 MAGIC = b"\x1f\x8b"
 _PIECE = 1 << 20

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 
 COMMENTS = ("#", "%", "//")

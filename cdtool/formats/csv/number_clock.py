@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.clock.stamps import EPOCH, count_leading_strays
+from cdtool.base.arrays import FloatArray
+from cdtool.base.plain_text import digits
 from cdtool.formats.csv.cell_values import RequestedColumns
-from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS
-from cdtool.plain_text import digits
+from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.recordings.clock.stamps import EPOCH, count_leading_strays
 
 # Days since 1899-12-30, as counted by Excel, of 1970-01-01, and of the start of the years 2000 and 2100.
 _DAY_1970, _FIRST_DAY, _LAST_DAY = 25569.0, 36526.0, 73051.0

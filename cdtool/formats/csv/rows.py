@@ -20,14 +20,14 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from cdtool.arrays import FloatArray
-from cdtool.findings import Finding
-from cdtool.formats.container_checks import check_size
+from cdtool.base.arrays import FloatArray
+from cdtool.base.findings import Finding
+from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.csv.cell_values import CellValues, RequestedColumns
 from cdtool.formats.csv.cells import MISSING, kind, split_line
-from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
 from cdtool.formats.csv.stamps import Integers
 from cdtool.formats.csv.table_lines import TableLines
+from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
 
 RECENT = 20
 # A block of so many bytes is read line by line: pandas would take as long to start.

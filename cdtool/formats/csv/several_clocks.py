@@ -15,13 +15,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.clock import EPOCH
-from cdtool.columns import Piece
-from cdtool.findings import Finding
+from cdtool.base.arrays import FloatArray
+from cdtool.base.findings import Finding
 from cdtool.formats.column_names import split_unit
-from cdtool.formats.csv.dialect import Dialect
-from cdtool.units import find_unit
+from cdtool.formats.columns import Piece
+from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.recordings.clock import EPOCH
+from cdtool.recordings.units import find_unit
 
 Table = TypeVar("Table")  # what the reader of a table returns after its last piece
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-z]|$)", re.IGNORECASE)

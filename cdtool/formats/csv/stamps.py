@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.formats.csv.cells import MISSING, STAMP_LIKE
 
 Integers = npt.NDArray[np.int64]

@@ -14,19 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.channels import ChannelMap
-from cdtool.columns import Categories, Piece
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import column_key
+from cdtool.formats.columns import Categories, Piece
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
-from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
 from cdtool.formats.csv.rows import RowReader, Rows
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, Layout, seconds_since, unwrap
+from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import PieceRun
-from cdtool.large_integers import rounded_integers, rounding_finding
 
 # A total is of so many rows, and as exact as the written numbers are.
 _FEWEST_SUMMED, _SAME_SUM = 3, 1e-6

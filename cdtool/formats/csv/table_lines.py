@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding, lines_of
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding, lines_of
+from cdtool.base.plain_text import counted
 from cdtool.formats.csv.cell_values import CellValues
 from cdtool.formats.csv.cells import has_numbers, has_open_quote, kind, split_line
-from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.lines import begins_comment, is_ruler
-from cdtool.plain_text import counted
+from cdtool.formats.csv_dialect.dialect import Dialect
 
 # Blank lines, comments and repeated headers, of which there may be more only beside as many rows.
 _MOST_SKIPPED = 20_000

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.errors import RecordingError
-from cdtool.formats.container_checks import check_size
+from cdtool.base.errors import RecordingError
+from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
 
 SAMPLE_BYTES = 1 << 17

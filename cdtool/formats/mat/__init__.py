@@ -14,21 +14,21 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
-from cdtool.channels import ChannelMap
-from cdtool.columns import Column, as_float64
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
-from cdtool.formats.clock_beside import assumed_clock, is_clock_name
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
-from cdtool.formats.container_checks import check_size, library, one_line_errors
+from cdtool.formats.columns import Column, as_float64
+from cdtool.formats.containers.clock_beside import assumed_clock, is_clock_name
+from cdtool.formats.containers.container_checks import check_size, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
 from cdtool.formats.mat.layout import Layout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables
 from cdtool.formats.source import Source
-from cdtool.large_integers import rounded_integers, rounding_finding
 
 # So many single numbers and texts of a file are shown.
 _MOST_DETAILS = 60

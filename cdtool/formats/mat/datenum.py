@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
-from cdtool.columns import as_float64
+from cdtool.base.arrays import FloatArray
+from cdtool.formats.columns import as_float64
 
 DAY_S = 86400.0
 # The datenum of 1970-01-01, and of the start of the years 2000 and 2100.

@@ -13,8 +13,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdtool.findings import Finding
-from cdtool.formats.clock_beside import is_clock_name
+from cdtool.base.findings import Finding
+from cdtool.formats.containers.clock_beside import is_clock_name
 from cdtool.formats.mat.variables import MatColumn, Numbers, Section, Value, Variables, left_out
 
 _DETAIL = 80

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
 
 # A file with more values, fields and cells than this is refused: no log has as many.
 MOST_VALUES = 200_000

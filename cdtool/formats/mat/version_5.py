@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.errors import RecordingError
-from cdtool.formats.container_checks import check_size
+from cdtool.base.errors import RecordingError
+from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.mat.variables import Numbers, Opaque, Value, ValueCount, Variables
 
 MAGIC = b"MATLAB 5.0 MAT-file"

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.container_checks import check_chunks
+from cdtool.formats.containers.container_checks import check_chunks
 from cdtool.formats.mat.variables import Numbers, Opaque, Value, ValueCount, Variables
 
 _USER_BLOCK, _MAGIC, _HDF5 = 512, b"MATLAB 7.", b"\x89HDF\r\n\x1a\n"

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from cdtool.formats.bags.topic_log import IsWanted, TopicFormat, survey
 from cdtool.formats.mcap.exact_times import with_exact_times
 from cdtool.formats.mcap.log import Log
 from cdtool.formats.mcap.records import MAGIC
 from cdtool.formats.pieces import Pieces
-from cdtool.formats.topic_log import IsWanted, TopicFormat, survey
 
 __all__ = ["Mcap"]
 

@@ -12,9 +12,9 @@ import numpy as np
 from mcap.records import Attachment
 from mcap.writer import Writer
 
+from cdtool.formats.bags.topic_log import Messages
 from cdtool.formats.mcap.definitions import DefinedStream
 from cdtool.formats.mcap.records import MAGIC, PREFIX
-from cdtool.formats.topic_log import Messages
 
 # Bytes from the start of a chunk to its CRC: prefix, two times, size.
 _CHUNK_CRC = PREFIX + 24

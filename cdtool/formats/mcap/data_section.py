@@ -33,7 +33,7 @@ from cdtool.formats.mcap.losses import Loss, Losses
 from cdtool.formats.mcap.messages import Positions, Walk
 from cdtool.formats.mcap.records import LARGEST, MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
 from cdtool.formats.mcap.summary import Summary, matches_header
-from cdtool.messages.batch import Batch
+from cdtool.formats.messages.batch import Batch
 
 # Chunks are joined up to this size [bytes]: messages of many small ones are then decoded together.
 JOINED = 1 << 23

@@ -8,7 +8,7 @@ from mcap.records import Channel, Schema
 
 from cdtool.formats.mcap.records import DamageError, Opcode, parse
 from cdtool.formats.mcap.summary import Summary
-from cdtool.messages.batch import Stream
+from cdtool.formats.messages.batch import Stream
 
 
 @dataclass(frozen=True)

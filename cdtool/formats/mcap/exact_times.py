@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from cdtool.columns import Piece
+from cdtool.formats.columns import Piece
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.records import LARGEST, PREFIX, DamageError, Opcode, parse
 from cdtool.formats.mcap.summary import Summary

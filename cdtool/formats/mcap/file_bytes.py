@@ -12,10 +12,10 @@ from typing import Self
 
 import numpy as np
 
+from cdtool.base.remote.ranges import RangedBytes
+from cdtool.base.remote.remote_path import RemotePath
 from cdtool.formats.mcap.chunks import Bytes
 from cdtool.formats.mcap.records import DamageError, crc32
-from cdtool.remote.ranges import RangedBytes
-from cdtool.remote.remote_path import RemotePath
 
 _PIECE = 1 << 20
 _MOST_AT_ONCE = 1 << 30  # macOS refuses to read 2 GiB and more in one call

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.bags.topic_log import IsWanted, Messages, TopicLog
 from cdtool.formats.mcap.data_section import Block, DataSection
 from cdtool.formats.mcap.definitions import Definitions
 from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_origin
@@ -19,9 +20,8 @@ from cdtool.formats.mcap.losses import Loss
 from cdtool.formats.mcap.messages import NO_DATE
 from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, parse
 from cdtool.formats.mcap.summary import between_chunks, matches_header, read_summary, unwanted_chunks
+from cdtool.formats.messages.batch import Batch
 from cdtool.formats.source import TopicDetails
-from cdtool.formats.topic_log import IsWanted, Messages, TopicLog
-from cdtool.messages.batch import Batch
 
 _LONGEST_HEADER = 1 << 12
 

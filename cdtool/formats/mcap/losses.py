@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from cdtool.findings import Finding
+from cdtool.base.findings import Finding
 from cdtool.formats.mcap.chunks import ChunkHeader
 from cdtool.formats.mcap.summary import Summary
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from cdtool.formats.mcap.chunks import Bytes
 from cdtool.formats.mcap.records import PREFIX, Opcode
-from cdtool.messages.batch import Batch, numbers_at
+from cdtool.formats.messages.batch import Batch, numbers_at
 
 # Times from here [ns] are invalid: relative to them, other times would lose digits.
 NO_DATE = 1 << 63

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError, nearest
-from cdtool.messages.schemas import DEFINITIONS, Definition
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError, nearest
+from cdtool.formats.messages.schemas import DEFINITIONS, Definition
 
 _SECOND = 10**9
 # What no recording contains: the number from which the marks of a layout are made, and the stamp of a layout.

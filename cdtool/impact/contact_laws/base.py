@@ -11,7 +11,7 @@ from typing import Protocol, Self, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 
 class ContactLaw(Protocol):

@@ -9,8 +9,8 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 from cdtool.impact.checks import require_exponent, require_not_negative, require_positive
 from cdtool.impact.contact_laws.base import spring_energy, spring_force
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.impact.checks import require_exponent, require_not_negative, require_positive
 from cdtool.impact.contact_laws.base import pushing, spring_energy, spring_force
 from cdtool.impact.restitution import hunt_crossley_restitution

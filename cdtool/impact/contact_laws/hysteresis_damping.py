@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy.typing as npt
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.impact.checks import require_not_negative, require_positive
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
+from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.base import ContactLaw
@@ -21,7 +22,6 @@ from cdtool.impact.restitution import (
     hunt_crossley_restitution,
     kelvin_voigt_restitution,
 )
-from cdtool.short_repr import short_repr
 
 # A body of 1 kg at 0.5 m/s, a stiffness as of plastic on steel with a radius of 1 mm, and a fairly lossy contact.
 _BODIES = Bodies(mass_1=1.0, speed_1=0.5)

@@ -8,8 +8,8 @@ from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import ConstantTorque, SpeedController
 from cdtool.impact.sensor_ranking import ImpactCase
 from cdtool.impact.sensors import Sensor
-from cdtool.impact.transmission import ElasticTransmission, RigidTransmission
-from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
+from cdtool.impact.transmissions.transmission import ElasticTransmission, RigidTransmission
+from cdtool.impact.transmissions.transmission_simulation import SimulatedMotion, Start, simulate_impact
 
 TRANSMISSION = RigidTransmission(inertia=2.35e-4, friction=0.03, ratio=0.015)
 TORQUE = ConstantTorque(0.5)

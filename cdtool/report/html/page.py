@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdtool.plain_text import counted
+from cdtool.base.plain_text import counted
 from cdtool.report.html.page_tables import PageTable, classes
 from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from cdtool.plain_text import plain
+from cdtool.base.plain_text import plain
 from cdtool.report.table import Cell, Column, Log, Table
 
 # A browser needs long to lay out more rows than this.

@@ -8,16 +8,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import REASONS
-from cdtool.evaluation.results import ContactResult, Results, SweepResult
-from cdtool.evaluation.rows import grouped, picked, values_of
-from cdtool.evaluation.statistics.kaplan_meier import survival
-from cdtool.evaluation.statistics.rates import poisson_at_most
-from cdtool.evaluation.statistics.small_sample import FEWEST
-from cdtool.evaluation.summary import Summary, latencies
-from cdtool.evaluation.traces.trace import Trace
-from cdtool.plain_text import plain
+from cdtool.base.arrays import FloatArray
+from cdtool.base.plain_text import plain
+from cdtool.detectors.detection import REASONS
 from cdtool.report.few_contacts import draws_no_interval, open_end
 from cdtool.report.html.page_tables import short, visible
 from cdtool.report.html.traces import HEIGHTS
@@ -30,6 +23,13 @@ from cdtool.report.table import shown as named
 from cdtool.report.tables.recordings import log_of, logs_of
 from cdtool.report.tables.results import part_of
 from cdtool.report.writers.base import Report
+from cdtool.results.results import ContactResult, Results, SweepResult
+from cdtool.results.rows import grouped, picked, values_of
+from cdtool.results.summary import Summary, latencies
+from cdtool.results.traces.trace import Trace
+from cdtool.statistics.kaplan_meier import survival
+from cdtool.statistics.rates import poisson_at_most
+from cdtool.statistics.small_sample import FEWEST
 
 Row = TypeVar("Row")
 # Heights [px] of a detector's lane in the latency plot and of the other plots.

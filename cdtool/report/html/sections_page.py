@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cdtool.errors import CdtoolError
-from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.base.errors import CdtoolError
 from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.self_contained import content_policy, page_part, page_template
 from cdtool.report.plots.figures import png
 from cdtool.report.table import Cell, Column, Table, name_cell
+from cdtool.results.results import RecordingFinding, Skipped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

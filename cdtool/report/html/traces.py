@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.evaluation.traces.file import NO_LIMIT, trace_values
-from cdtool.evaluation.traces.trace import Trace
-from cdtool.plain_text import plain
+from cdtool.base.plain_text import plain
+from cdtool.results.traces.file import NO_LIMIT, trace_values
+from cdtool.results.traces.trace import Trace
 
 ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
 MISSING, ABOVE_ALL, BELOW_ALL = "!", "^", "_"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from urllib.parse import quote
 
-from cdtool.errors import UsageError
-from cdtool.plain_text import counted
+from cdtool.base.errors import UsageError
+from cdtool.base.plain_text import counted
 from cdtool.report.markdown.text import Section, escape, fitted
 from cdtool.report.model import NO_CERTIFICATE, TITLES, Model
 from cdtool.report.table import Table

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
 
-from cdtool.plain_text import counted, plain, shorten
+from cdtool.base.plain_text import counted, plain, shorten
 from cdtool.report.table import Cell, Column, Table
 
 # A colon followed by a space is part of a sentence; others begin an emoji or are part of an address.

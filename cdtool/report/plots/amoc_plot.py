@@ -13,10 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.evaluation.amoc import AmocCurve, AmocPoint, amoc_curves
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.summary import Summary
+from cdtool.base.arrays import FloatArray
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import (
@@ -35,6 +32,9 @@ from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
 from cdtool.report.plots.side_table import Column, SideTable, key_height
 from cdtool.report.plots.style import BAND, look_of
 from cdtool.report.writers.base import Image, Report
+from cdtool.results.curves.amoc import AmocCurve, AmocPoint, amoc_curves
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.summary import Summary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,9 +11,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cdtool.errors import OutputError, UsageError
-from cdtool.files import write_bytes
-from cdtool.plain_text import plain, shorten
+from cdtool.base.errors import OutputError, UsageError
+from cdtool.base.files.writing import write_bytes
+from cdtool.base.plain_text import plain, shorten
 from cdtool.report.number_text import number
 
 if TYPE_CHECKING:

@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.detection import Status
-from cdtool.evaluation.force.limits import ForceProfile
-from cdtool.evaluation.force.traced import TracedForce, force_profiles, traced_forces
-from cdtool.evaluation.force.verdict import ForceVerdict, StepVerdict
-from cdtool.evaluation.results import Results
-from cdtool.evaluation.traces.decimation import kept_samples
-from cdtool.plain_text import counted
+from cdtool.base.arrays import FloatArray
+from cdtool.base.plain_text import counted
+from cdtool.detectors.detection import Status
 from cdtool.report.model import AXES
 from cdtool.report.plots.figures import drawing, label, new_figure, save, slug, write
 from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, NOT_ASSESSED, look_of
 from cdtool.report.writers.base import Image, Report
+from cdtool.results.results import Results
+from cdtool.results.traced_force import TracedForce, force_profiles, traced_forces
+from cdtool.results.traces.decimation import kept_samples
+from cdtool.truth.force.limits import ForceProfile
+from cdtool.truth.force.verdict import ForceVerdict, StepVerdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

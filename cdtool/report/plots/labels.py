@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.report.plots.figures import text_width
 from cdtool.report.plots.style import LIMIT
 

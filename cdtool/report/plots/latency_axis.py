@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
+from cdtool.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,11 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.arrays import FloatArray
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.results import Results
-from cdtool.evaluation.statistics.small_sample import FEWEST
-from cdtool.evaluation.summary import Summary
+from cdtool.base.arrays import FloatArray
 from cdtool.report.few_contacts import draws_no_interval, grouped, open_end
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, with_interval
@@ -32,6 +28,10 @@ from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latenc
 from cdtool.report.plots.side_table import Column, SideTable, count_cells
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.results import Results
+from cdtool.results.summary import Summary
+from cdtool.statistics.small_sample import FEWEST
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

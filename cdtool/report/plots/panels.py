@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.arrays import BoolArray, FloatArray
-from cdtool.detection import REASONS, Alarm, Status
-from cdtool.evaluation.traces.decimation import decimate, kept_samples
-from cdtool.evaluation.traces.trace import Span, StatisticCurve
-from cdtool.pipeline import Detection
+from cdtool.alarms.pipeline import Detection
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.detectors.detection import REASONS, Alarm, Status
 from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT, NOT_ASSESSED, ONSET_DASHES, look_of
+from cdtool.results.traces.decimation import decimate, kept_samples
+from cdtool.results.traces.trace import Span, StatisticCurve
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cdtool.evaluation.summary import Summary
 from cdtool.report.number_text import NOTHING
 from cdtool.report.plots.figures import write
 from cdtool.report.plots.style import look_of
+from cdtool.results.summary import Summary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

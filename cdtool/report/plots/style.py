@@ -5,10 +5,10 @@ from __future__ import annotations
 from contextlib import suppress
 from zlib import crc32
 
-from cdtool.detection import Status
+from cdtool.base.errors import CdtoolError
 from cdtool.detectors import DETECTORS
+from cdtool.detectors.detection import Status
 from cdtool.detectors.look import BLUE, BROWN, GREY, RED, SKY, Look
-from cdtool.errors import CdtoolError
 
 FORCE = "black"
 LIMIT = "0.25"

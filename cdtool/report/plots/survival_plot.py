@@ -8,10 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.statistics.small_sample import FEWEST
-from cdtool.evaluation.summary import Summary
-from cdtool.evaluation.survival_curves import SurvivalCurve, survival_curves
 from cdtool.report.model import AXES
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
@@ -19,6 +15,10 @@ from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
 from cdtool.report.plots.side_table import Column, SideTable, count_cells, key_height
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
+from cdtool.results.curves.survival_curves import SurvivalCurve, survival_curves
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.summary import Summary
+from cdtool.statistics.small_sample import FEWEST
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from cdtool.evaluation.traces.trace import ContactOutcome, Panel, Span, Trace
-from cdtool.plain_text import counted
+from cdtool.base.plain_text import counted
 from cdtool.report.model import AXES
 from cdtool.report.plots.figures import (
     Margins,
@@ -33,6 +32,7 @@ from cdtool.report.plots.panels import (
 )
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
+from cdtool.results.traces.trace import ContactOutcome, Panel, Span, Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
-from cdtool.evaluation.results import ForceResult, Results
-from cdtool.evaluation.traces.trace import Trace
-from cdtool.plain_text import counted
+from cdtool.base.plain_text import counted
 from cdtool.report.number_text import NOTHING, number
 from cdtool.report.table import Cell, Column, Fields, Log, Table, empty_cell, name_cell, shown, tabulate
 from cdtool.report.tables.results import part_of
+from cdtool.results.recording_outcomes import RecordingOutcome, recording_outcomes
+from cdtool.results.results import ForceResult, Results
+from cdtool.results.traces.trace import Trace
 
 
 @dataclass

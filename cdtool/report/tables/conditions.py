@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cdtool.evaluation.changed_conditions import ConditionRow, condition_rows
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.plain_text import plain
+from cdtool.base.plain_text import plain
 from cdtool.report.number_text import NOTHING, number, percent, value_and_interval
 from cdtool.report.table import Cell, Column, Table, empty_cell, key_of, name_cell, shown, tabulate
 from cdtool.report.tables.results import detector_cell
+from cdtool.results.changed_conditions import ConditionRow, condition_rows
+from cdtool.results.evaluated import Evaluated
 
 
 def conditions_table(evaluated: Evaluated) -> Table:

@@ -6,8 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, Results
-from cdtool.evaluation.rows import grouped, picked, values_of
 from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOTHING, number, spoken
 from cdtool.report.table import (
@@ -24,6 +22,8 @@ from cdtool.report.table import (
     tabulate,
     tone_of,
 )
+from cdtool.results.results import ForceResult, ForceStepResult, PointResult, Results
+from cdtool.results.rows import grouped, picked, values_of
 
 _VERDICTS = ("pass", "fail", "not_assessable")
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from cdtool.evaluation.results import Results
 from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOTHING
 from cdtool.report.table import Cell, Column, Row, Table, name_cell, shown
 from cdtool.report.tables.results import detector_cell, part_of
+from cdtool.results.results import Results
 
 _NAMES = {
     "tool_version": "cdtool version",

@@ -6,17 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from cdtool.evaluation.alike import Reason, alike
-from cdtool.evaluation.results import (
-    ContactResult,
-    ExposureResult,
-    FalseAlarmResult,
-    RecordingResult,
-    Results,
-)
-from cdtool.evaluation.rows import grouped
-from cdtool.evaluation.summary import later_ms
-from cdtool.plain_text import counted
+from cdtool.base.plain_text import counted
 from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number, percent
 from cdtool.report.table import (
@@ -34,6 +24,10 @@ from cdtool.report.table import (
     tabulate,
 )
 from cdtool.report.tables.results import detector_cell, part_of
+from cdtool.results.alike import Reason, alike
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
+from cdtool.results.rows import grouped
+from cdtool.results.summary import later_ms
 
 _OPERATION = re.compile(r"#\d+\Z")
 _MOST_LISTED = 3

@@ -7,13 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from cdtool.evaluation.comparison import SIGNIFICANT, Comparison
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.results import CalibrationResult, LimitResult, Results
-from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.paired import holm
-from cdtool.evaluation.summary import Summary
-from cdtool.plain_text import counted
+from cdtool.base.plain_text import counted
 from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_interval
 from cdtool.report.number_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING, missed, number, rate, with_interval
 from cdtool.report.table import (
@@ -32,6 +26,12 @@ from cdtool.report.table import (
     shown,
     tabulate,
 )
+from cdtool.results.comparison import SIGNIFICANT, Comparison
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.results import CalibrationResult, LimitResult, Results
+from cdtool.results.summary import Summary
+from cdtool.statistics.interval import Interval
+from cdtool.statistics.paired import holm
 
 _WORST_FIRST = ("violated", "not_assessable", "met")
 _TOO_FEW = "too few recordings to show one"

@@ -14,12 +14,12 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from cdtool.evaluation.results import ContactResult, FalseAlarmResult, ForceResult, Results
-from cdtool.evaluation.rows import grouped, picked, values_of
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING
 from cdtool.report.table import Cell, Column, Fields, Log, Table, empty_cell, name_cell, number_cell, shown, tabulate
 from cdtool.report.tables.recordings import log_of, logs_of
 from cdtool.report.tables.results import detector_cell
+from cdtool.results.results import ContactResult, FalseAlarmResult, ForceResult, Results
+from cdtool.results.rows import grouped, picked, values_of
 
 Row = TypeVar("Row")
 # Cases of one kind, and at least so many of each detector and group.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from cdtool.registry import Registry
+from cdtool.base.registry import Registry
 from cdtool.report.writers.base import Subject, Writer
 
 WRITERS = Registry(
@@ -19,10 +19,10 @@ WRITERS = Registry(
         "contacts": "cdtool.report.writers.contacts:Contacts",
         "forces": "cdtool.report.writers.forces:Forces",
         "figure": "cdtool.report.writers.figure:Figure",
-        "comparison_markdown": "cdtool.report.writers.comparison_markdown:ComparisonMarkdown",
-        "comparison_json": "cdtool.report.writers.comparison_json:ComparisonJson",
-        "protocol_html": "cdtool.report.writers.protocol_html:ProtocolHtml",
-        "protocol_pdf": "cdtool.report.writers.protocol_pdf:ProtocolPdf",
+        "comparison_markdown": "cdtool.commands.compare.comparison_markdown:ComparisonMarkdown",
+        "comparison_json": "cdtool.commands.compare.comparison_json:ComparisonJson",
+        "protocol_html": "cdtool.commands.protocol.document.html_writer:ProtocolHtml",
+        "protocol_pdf": "cdtool.commands.protocol.document.pdf_writer:ProtocolPdf",
     },
     contract=("name", "suffixes", "in_folder", "subject", "kinds", "files", "has_content", "write"),
 )

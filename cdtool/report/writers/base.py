@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, Generic, Literal, TypeVar, get_args
 
-from cdtool.errors import ConfigurationError
-from cdtool.evaluation.evaluated import Evaluated
-from cdtool.evaluation.traces.trace import Trace
-from cdtool.foreign_files import Kind
+from cdtool.base.errors import ConfigurationError
+from cdtool.base.files.foreign import Kind
 from cdtool.report.model import Model, report_model
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.traces.trace import Trace
 
 Subject = Literal["benchmark", "comparison", "protocol"]
 Content = TypeVar("Content")
@@ -83,5 +83,8 @@ class Writer(Generic[Content]):
         return True
 
     def write(self, report: Content, target: Path) -> None:
-        """Write the report by `cdtool.files`; raises CdtoolError. The same report produces the same bytes."""
+        """Write the report by `cdtool.base.files.writing`; raises CdtoolError.
+
+        The same report produces the same bytes.
+        """
         raise NotImplementedError

@@ -7,11 +7,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import ClassVar
 
-from cdtool.evaluation.results import ContactResult, Results
-from cdtool.files import write_pieces
-from cdtool.foreign_files import Kind
+from cdtool.base.files.foreign import Kind
+from cdtool.base.files.writing import write_pieces
 from cdtool.report.csv_text import csv_lines
 from cdtool.report.writers.base import Report, Writer
+from cdtool.results.results import ContactResult, Results
 
 
 class Contacts(Writer[Report]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from cdtool.foreign_files import FIGURES, Kind
+from cdtool.base.files.foreign import FIGURES, Kind
 from cdtool.report.plots.figures import SUFFIXES
 from cdtool.report.writers.base import Report, Writer
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
 
-from cdtool.evaluation.results import Results
-from cdtool.files import write_pieces
-from cdtool.foreign_files import Kind
+from cdtool.base.files.foreign import Kind
+from cdtool.base.files.writing import write_pieces
 from cdtool.report.csv_text import csv_lines
 from cdtool.report.writers.base import Report, Writer
+from cdtool.results.results import Results
 
 _OF_CONTACT = ("recording", "group", "contact", "point", "profile", "verdict", "peak_n")
 _OF_STEP = ("name", "from_s", "at_most_n", "peak_n", "time_budget_ms", "verdict", "reason")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from cdtool.files import write_text
-from cdtool.foreign_files import Kind
+from cdtool.base.files.foreign import Kind
+from cdtool.base.files.writing import write_text
 from cdtool.report.writers.base import Report, Writer
 
 

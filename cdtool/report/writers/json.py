@@ -6,11 +6,11 @@ import hashlib
 from pathlib import Path
 from typing import ClassVar
 
-from cdtool.evaluation.results_file import json_pieces
-from cdtool.evaluation.traces.file import encode_traces, traces_path
-from cdtool.files import replaced, write_pieces
-from cdtool.foreign_files import Kind
+from cdtool.base.files.foreign import Kind
+from cdtool.base.files.writing import replaced, write_pieces
 from cdtool.report.writers.base import Report, Writer
+from cdtool.results.files.results_file import json_pieces
+from cdtool.results.traces.file import encode_traces, traces_path
 
 
 class Json(Writer[Report]):

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import ClassVar
 from xml.etree import ElementTree
 
-from cdtool.files import write_text
-from cdtool.foreign_files import Kind
-from cdtool.plain_text import plain
+from cdtool.base.files.foreign import Kind
+from cdtool.base.files.writing import write_text
+from cdtool.base.plain_text import plain
 from cdtool.report.cases import Case, Suite, suites_of
 from cdtool.report.writers.base import Report, Writer
 

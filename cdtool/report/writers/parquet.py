@@ -6,13 +6,13 @@ import hashlib
 from pathlib import Path
 from typing import ClassVar
 
-from cdtool.errors import UsageError
-from cdtool.evaluation.results_folder import KIND, PROVENANCE, holds_only_tables, require_pyarrow, write_tables
-from cdtool.evaluation.traces.file import TRACES_IN_FOLDER, encode_traces
-from cdtool.files import replaced_folder
-from cdtool.foreign_files import Kind
-from cdtool.plain_text import plain
+from cdtool.base.errors import UsageError
+from cdtool.base.files.foreign import Kind
+from cdtool.base.files.writing import replaced_folder
+from cdtool.base.plain_text import plain
 from cdtool.report.writers.base import Report, Writer
+from cdtool.results.files.results_folder import KIND, PROVENANCE, holds_only_tables, require_pyarrow, write_tables
+from cdtool.results.traces.file import TRACES_IN_FOLDER, encode_traces
 
 
 class Parquet(Writer[Report]):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
 from cdtool.formats.mcap.log import Log
 
 COMPRESSIONS = ("none", "lz4", "zstd")

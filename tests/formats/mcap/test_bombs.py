@@ -15,7 +15,7 @@ import pytest
 import zstandard
 from mcap.writer import CompressionType, Writer
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap import Mcap, chunks
 from cdtool.formats.mcap.records import MAGIC
 from tests.formats.mcap.small_files import read_or_refused
@@ -26,7 +26,7 @@ _CHILD = """
 import json, resource, sys, time
 from pathlib import Path
 import numpy, zstandard, lz4.frame
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.mcap.log import Log
 def run(path):
     try:

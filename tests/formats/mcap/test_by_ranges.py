@@ -10,9 +10,9 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 import cdtool
-from cdtool.errors import CdtoolError, RecordingError, is_lasting
+from cdtool.base.errors import CdtoolError, RecordingError, is_lasting
+from cdtool.base.remote import ranges, remote_path, staging, transferred
 from cdtool.formats.mcap.file_bytes import FileBytes
-from cdtool.remote import ranges, remote_path, staging, transferred
 
 MACHINE = """
 [machine]

@@ -7,9 +7,9 @@ import struct
 import numpy as np
 import pytest
 
-from cdtool.findings import Finding
+from cdtool.base.findings import Finding
 from cdtool.formats.mcap.log import Log
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 from tests.formats.mcap.small_files import COMPRESSIONS, read, read_or_refused, small_file
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
 
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.mcap import data_section
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.log import Log

@@ -5,9 +5,9 @@ from __future__ import annotations
 import typer
 from typer.testing import CliRunner
 
-from cdtool.cli.recover import recover
-from cdtool.errors import UsageError
-from cdtool.exit_status import ExitStatus
+from cdtool.base.errors import UsageError
+from cdtool.base.exit_status import ExitStatus
+from cdtool.commands.convert.recover_command import recover
 from tests.formats.mcap.small_files import small_file
 
 APP = typer.Typer()

@@ -7,11 +7,11 @@ import hashlib
 import pytest
 from mcap.reader import make_reader
 
-from cdtool.errors import RecordingError, UsageError
+from cdtool.base.errors import RecordingError, UsageError
+from cdtool.commands.convert.recovering import recover
 from cdtool.formats.mcap.log import Log
 from cdtool.formats.mcap.records import Opcode
-from cdtool.workflows.recovering import recover
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
 

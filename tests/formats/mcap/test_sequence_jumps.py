@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
-from cdtool.findings import Finding
+from cdtool.base.findings import Finding
 from cdtool.formats.mcap import Mcap
 from tests.formats.mcap.small_files import small_file
 

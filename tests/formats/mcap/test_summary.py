@@ -10,7 +10,7 @@ from mcap.writer import CompressionType, Writer
 
 from cdtool.formats.mcap import chunks, data_section
 from cdtool.formats.mcap.log import Log
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 from tests.formats.mcap.small_files import read, small_file
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.formats.mcap import Mcap
-from cdtool.messages.topic import sort_times
+from cdtool.formats.messages.topic import sort_times
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 
 _LATEST = 2**64 - 1

@@ -8,11 +8,11 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.errors import RecordingError
+from cdtool.base.errors import RecordingError
+from cdtool.commands.convert.recovering import recover
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap import Mcap
-from cdtool.workflows.recovering import recover
-from tests.findings.facts import fact_of
+from tests.base.findings.facts import fact_of
 from tests.formats.mcap.small_files import small_file
 
 MS = 10**6

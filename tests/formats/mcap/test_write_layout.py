@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap_ros2.writer import Writer
 
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.messages.schemas import DEFINITIONS
+from cdtool.formats.messages.schemas import DEFINITIONS
 
 START = 1_700_000_000_000_000_000
 

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from cdtool.errors import CdtoolError
+from cdtool.base.errors import CdtoolError
 from tests.formats.mcap_damage.bombs import without_bomb
 from tests.formats.mcap_damage.readers import READERS, Key, Reading
 from tests.formats.mcap_damage.truth import Case, Message, Truth

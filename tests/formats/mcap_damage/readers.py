@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.log import Log
 from cdtool.formats.source import Source

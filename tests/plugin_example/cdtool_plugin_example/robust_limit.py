@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import Signal
-from cdtool.errors import SignatureError
-from cdtool.recording import Recording
+from cdtool.base.errors import SignatureError
+from cdtool.detectors.detection import Signal
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.limit import FittedLimit
 
 # Ratio of the standard deviation to the median absolute deviation of normally distributed values.
@@ -34,7 +34,7 @@ class RobustLimit:
     --------
     One of four runs with an unusual peak does not move the limit far.
 
-    >>> from cdtool.recording import Recording
+    >>> from cdtool.recordings.recording import Recording
     >>> def pair(peak):
     ...     values = np.array([[-1.0], [peak]])
     ...     signal = Signal(np.array([0.0, 0.1]), values, np.zeros((2, 1), np.uint8), "N", signed=True)

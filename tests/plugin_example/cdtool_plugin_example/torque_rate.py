@@ -5,11 +5,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.detection import Signal, Status
 from cdtool.detectors.base import gain, per_joint, require_channels, require_positive
+from cdtool.detectors.detection import Signal, Status
 from cdtool.detectors.filters import low_pass, settling_time, started_at
-from cdtool.dynamics import Gain, Machine
-from cdtool.recording import Recording
+from cdtool.machines.dynamics import Gain, Machine
+from cdtool.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class TorqueRate:
     A drive force that rises by 1 N per millisecond has a rate of 1000 N/s.
 
     >>> from cdtool.machines.linear_axis import LinearAxis
-    >>> from cdtool.recording import Recording, Series
-    >>> from cdtool.tables import Table
+    >>> from cdtool.recordings.recording import Recording, Series
+    >>> from cdtool.base.tables import Table
     >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
     >>> time = np.arange(2000) * 1e-3
     >>> run = Recording("run", "", ("axis",), {"torque": Series(time, 1000.0 * time, "N")})

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cdtool.evaluation.coverage_map import CellKey, MappedContact, coverage_map
-from cdtool.evaluation.limits import LimitRule
-from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
-from cdtool.evaluation.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
-from cdtool.recording import Contact
-from cdtool.workflows.coverage import Coverage
+from cdtool.commands.inject.coverage.coverage import Coverage
+from cdtool.commands.inject.coverage.coverage_map import CellKey, MappedContact, coverage_map
+from cdtool.recordings.recording import Contact
+from cdtool.results.limits import LimitRule
+from cdtool.results.results import ContactResult, RecordingFinding, Skipped
+from cdtool.results.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 
 ONSET = 2.0
 SOFT, STIFF = 1e4, 1e5

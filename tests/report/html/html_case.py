@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cdtool.detection import Status
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.limits import LimitRule
-from cdtool.evaluation.results import (
+from cdtool.detectors.detection import Status
+from cdtool.recordings.recording import Contact
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.limits import LimitRule
+from cdtool.results.results import (
     CalibrationResult,
     ContactResult,
     ExposureResult,
@@ -23,8 +24,7 @@ from cdtool.evaluation.results import (
     Skipped,
     SweepResult,
 )
-from cdtool.evaluation.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
-from cdtool.recording import Contact
+from cdtool.results.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 
 Naming = Callable[[str], str]
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from cdtool.report.html.coverage_page import coverage_html
+from cdtool.commands.inject.coverage.page import coverage_html
 from cdtool.report.html.page import to_html
 from cdtool.report.html.sections_page import PageSection, SectionsPage
 from cdtool.report.table import Cell, Column, Table

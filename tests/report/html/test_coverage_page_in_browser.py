@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from cdtool.report.html.coverage_page import coverage_html
+from cdtool.commands.inject.coverage.page import coverage_html
 from tests.report.html.coverage_case import coverage_case
 from tests.report.html.test_html_in_browser import all_of, browser, shown, texts  # noqa: F401
 

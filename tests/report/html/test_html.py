@@ -17,11 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.results import ContactResult, RecordingResult, Results
-from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.traces.file import NO_LIMIT
-from cdtool.plain_text import plain
+from cdtool.base.plain_text import plain
 from cdtool.report.html.page import to_html
 from cdtool.report.html.plots import css_colour
 from cdtool.report.html.self_contained import page_part
@@ -31,6 +27,10 @@ from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
 from cdtool.report.table import interval_cell
 from cdtool.report.tables.recordings import log_of
 from cdtool.report.writers.base import Report
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import ContactResult, RecordingResult, Results
+from cdtool.results.traces.file import NO_LIMIT
+from cdtool.statistics.interval import Interval
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case, trace_of
 

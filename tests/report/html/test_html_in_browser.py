@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from cdtool.evaluation.evaluated import evaluate
-from cdtool.plain_text import plain
+from cdtool.base.plain_text import plain
 from cdtool.report import many
 from cdtool.report.html.page import to_html
 from cdtool.report.writers.base import Report
+from cdtool.results.evaluated import evaluate
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
 from tests.report.many import LIMITS, report_of_many

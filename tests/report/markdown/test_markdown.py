@@ -12,10 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from cdtool.errors import UsageError
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.limits import LimitRule
-from cdtool.evaluation.results import (
+from cdtool.base.errors import UsageError
+from cdtool.report.markdown.report import to_markdown
+from cdtool.report.markdown.text import escape
+from cdtool.report.writers.base import Image, Report
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.limits import LimitRule
+from cdtool.results.results import (
     CalibrationResult,
     ExposureResult,
     FalseAlarmResult,
@@ -25,9 +28,6 @@ from cdtool.evaluation.results import (
     Results,
     Skipped,
 )
-from cdtool.report.markdown.report import to_markdown
-from cdtool.report.markdown.text import escape
-from cdtool.report.writers.base import Image, Report
 from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.named_results import forces, named

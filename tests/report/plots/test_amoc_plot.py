@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.results import Results, SweepResult
-from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.report.plots import amoc_plot
 from cdtool.report.plots.amoc_plot import plot_amoc
 from cdtool.report.plots.figures import drawing
 from cdtool.report.plots.style import look_of
-from tests.evaluation.sweeps import CONTACTS, swept
+from cdtool.results.curves.sweep import MULTIPLES
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import Results, SweepResult
 from tests.report.bench import contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
+from tests.results.sweeps import CONTACTS, swept
 
 QUIET_FROM = 0.7
 

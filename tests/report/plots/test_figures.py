@@ -13,26 +13,27 @@ import matplotlib
 import numpy as np
 import pytest
 
-from cdtool.activation import Activation
-from cdtool.detection import REASONS, Signal, Status, Verdict
-from cdtool.errors import CdtoolError, OutputError, UsageError
-from cdtool.evaluation.traces.file import _trace as trace_from
-from cdtool.evaluation.traces.file import as_read, trace_values
-from cdtool.evaluation.traces.trace import ContactOutcome, Trace, make_trace
-from cdtool.evaluation.truth.matching import Matching, match
-from cdtool.operations import operations_of
-from cdtool.pipeline import Detection, judge
-from cdtool.recording import Contact, Recording, Series
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, judge
+from cdtool.base.errors import CdtoolError, OutputError, UsageError
+from cdtool.commands.detect import plot as detection_plot
+from cdtool.commands.detect.plot import plot_detected
+from cdtool.commands.detecting.detection import Detected
+from cdtool.detectors.detection import REASONS, Signal, Status, Verdict
+from cdtool.recordings.operations import operations_of
+from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.report.html.plots import plot_data
-from cdtool.report.plots import detection_plot, latency_plot, trigger_plot
-from cdtool.report.plots.detection_plot import plot_detected
+from cdtool.report.plots import latency_plot, trigger_plot
 from cdtool.report.plots.figures import SUFFIXES, drawing, new_figure, save
 from cdtool.report.plots.latency_plot import plot_latencies
 from cdtool.report.plots.style import HATCHES, look_of
 from cdtool.report.plots.trigger_plot import plot_triggers
 from cdtool.report.writers.base import Report
+from cdtool.results.traces.file import _trace as trace_from
+from cdtool.results.traces.file import as_read, trace_values
+from cdtool.results.traces.trace import ContactOutcome, Trace, make_trace
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.detection import Detected
+from cdtool.truth.matching import Matching, match
 from tests.report.bench import NAMES, Bench
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
@@ -276,7 +277,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_temporary_file(tmp_path, monk
 
     with drawing():
         figure = new_figure(2.0, 2.0)
-        monkeypatch.setattr("cdtool.files.os.fsync", fail)
+        monkeypatch.setattr("cdtool.base.files.writing.os.fsync", fail)
         with pytest.raises(CdtoolError, match="No space left"):
             save(figure, target)
     assert target.read_bytes() == b"old"

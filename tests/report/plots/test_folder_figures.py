@@ -6,19 +6,19 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.force.curve import force_time_curve
-from cdtool.evaluation.force.limits import ForceProfile, ForceStep
-from cdtool.evaluation.force.verdict import assess_force
-from cdtool.evaluation.results import RecordingResult, Results
-from cdtool.evaluation.traces.trace import Trace
+from cdtool.commands.scoring.force_rows import force_rows
 from cdtool.report.plots.folder_figures import write_figures
 from cdtool.report.plots.trigger_plot import most_informative
 from cdtool.report.writers.base import Report
-from cdtool.workflows.benchmark.force_rows import force_rows
-from tests.evaluation.sweeps import swept
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import RecordingResult, Results
+from cdtool.results.traces.trace import Trace
+from cdtool.truth.force.curve import force_time_curve
+from cdtool.truth.force.limits import ForceProfile, ForceStep
+from cdtool.truth.force.verdict import assess_force
 from tests.report.bench import Bench, contact
 from tests.report.hostile import HOSTILE
+from tests.results.sweeps import swept
 
 PROFILE = ForceProfile("gap", "A gap", "a standard", False, (ForceStep(0.0, 400.0, "dynamic"),))
 

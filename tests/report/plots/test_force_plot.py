@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from cdtool.arrays import FloatArray
-from cdtool.errors import UsageError
-from cdtool.evaluation.force.curve import ForceTimeCurve
-from cdtool.evaluation.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
-from cdtool.evaluation.force.verdict import assess_force
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 from cdtool.report.plots import force_plot
 from cdtool.report.plots.figures import SUFFIXES, drawing
 from cdtool.report.plots.force_plot import ForceCurve, ForcePanel, plot_forces
+from cdtool.truth.force.curve import ForceTimeCurve
+from cdtool.truth.force.limits import ForceProfile, ForceStep, profile_of, read_force_limits
+from cdtool.truth.force.verdict import assess_force
 from tests.report.hostile import HOSTILE
 
 GAP = profile_of(read_force_limits(), "en_12453_reducing_gap")

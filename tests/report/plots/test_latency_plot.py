@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.evaluation.evaluated import evaluate
-from cdtool.evaluation.results import Results
 from cdtool.report.plots import latency_plot
 from cdtool.report.plots.figures import drawing
 from cdtool.report.plots.latency_plot import plot_latencies
+from cdtool.results.evaluated import evaluate
+from cdtool.results.results import Results
 from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts

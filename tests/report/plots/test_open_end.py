@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.results import ExposureResult, Results
 from cdtool.report.few_contacts import open_end
 from cdtool.report.plots.latency_plot import plot_latencies
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import ExposureResult, Results
 from tests.report.bench import contacts_of
 
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.results import Results
 from cdtool.report.plots import survival_plot
 from cdtool.report.plots.figures import drawing
 from cdtool.report.plots.survival_plot import plot_survival
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import Results
 from tests.report.bench import contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.plots.svg import assert_harmless, assert_within, joined, texts

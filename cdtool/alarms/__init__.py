@@ -1,0 +1,1 @@
+"""From the signal of a detector to its alarms: threshold, activation, judgement."""

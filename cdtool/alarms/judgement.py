@@ -1,0 +1,232 @@
+"""Compare a detector's signal with thresholds over a whole log: statistic, band and activation.
+
+With several classes of motion, the threshold that applies is selected sample by sample, from earlier samples only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.kernels import kernel
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.detectors.detection import Band, Signal, Status, StatusArray, contiguous
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.applicable import HOLD, Motion, judging_classes, speed_is_recent
+from cdtool.recordings.motion.evident_motion import evident_speed
+from cdtool.recordings.motion.strokes import Stroke, strokes_so_far
+from cdtool.recordings.recording import Recording
+from cdtool.thresholds.base import FittedThreshold, KnownBand, is_per_run
+from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
+from cdtool.thresholds.speed_range import over_speeds
+
+_MATRIX = "Array(float64, 2, 'C', readonly=True)"
+_STATUS = "Array(uint8, 2, 'C', readonly=True)"
+_ROWS = "Array(bool, 1, 'C', readonly=True)"
+# Marks of a sample: on which sides a class leaves it unlimited, and whether a class limits it.
+OPEN_BELOW, OPEN_ABOVE, LIMITED = 1, 2, 4
+
+
+@dataclass(frozen=True)
+class _Share:
+    """The rows of a log on which a threshold is evaluated, and those to which it applies, (rows,)."""
+
+    threshold: KnownBand
+    recording: Recording
+    signal: Signal
+    rows: slice
+    judges: BoolArray
+
+    __repr__ = short_repr
+
+    @cached_property
+    def evaluated(self) -> tuple[Signal, Band]:
+        """Return the statistic and its band on these rows; raises RecordingError if the threshold fails."""
+        return checked_evaluation(self.threshold, self.recording, self.signal)
+
+    def at_share(self, share: float) -> tuple[Signal, Band]:
+        """Return `evaluated` at that share of the safety factor."""
+        changed = checked_factor(self.threshold, share * self.threshold.safety_factor)
+        return checked_evaluation(changed, self.recording, self.signal)
+
+    @cached_property
+    def met_at(self) -> tuple[Signal, FloatArray]:
+        """Return the statistic, and for each sample (rows, J) the safety factor at which its limit would be met."""
+        return checked_exceedance(self.threshold, self.recording, self.signal, self.evaluated)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A signal with its thresholds over a whole log; `recording` has no ground truth.
+
+    If several classes of motion apply, a sample is outside only if it is outside all of their bands. `strokes` are
+    those of a log that is cut, as they were known while it ran.
+    """
+
+    recording: Recording
+    signal: Signal
+    thresholds: tuple[FittedThreshold, ...]
+    strokes: tuple[Stroke, ...]
+    hold: float = HOLD
+
+    __repr__ = short_repr
+
+    @property
+    def classes(self) -> tuple[MotionClass, ...]:
+        """Return the classes of motion that were learned."""
+        return classes_of(self.thresholds)
+
+    @cached_property
+    def evaluated(self) -> tuple[Signal, Band]:
+        """Return the statistic and its band; raises RecordingError if a threshold fails."""
+        return self._merged([share.evaluated for share in self._shares])
+
+    def narrower(self, share: float) -> Band:
+        """Return the band at that share of the safety factor."""
+        return self._merged([item.at_share(share) for item in self._shares])[1]
+
+    @cached_property
+    def met_at(self) -> FloatArray:
+        """Return (n, J) the safety factor at which each sample's limit would be met; -inf without a limit."""
+        met = np.full(self.signal.values.shape, np.inf)
+        judged = np.zeros(met.shape, dtype=bool)
+        for share in self._shares:
+            statistic, own = share.met_at
+            valid = share.judges[:, np.newaxis] & (statistic.status == Status.VALID)
+            rows = slice(share.rows.start, share.rows.start + len(own))
+            met[rows] = np.where(valid & ((own < met[rows]) | np.isnan(own)), own, met[rows])
+            judged[rows] |= valid
+        met[~judged] = -np.inf
+        return met
+
+    @cached_property
+    def _shares(self) -> tuple[_Share, ...]:
+        if not self.classes and self.thresholds and is_per_run(self.thresholds[0]) and len(self.strokes) > 1:
+            return tuple(self._of_stroke(number) for number in range(len(self.strokes)))
+        if not self.classes:
+            everywhere = np.ones(len(self.signal.time), dtype=bool)
+            rows = slice(0, len(self.signal.time))
+            return tuple(_Share(item, self.recording, self.signal, rows, everywhere) for item in self.thresholds[:1])
+        applied = over_speeds([item for item in self.thresholds if class_of(item) is not None])
+        motions: list[Motion] = [getattr(item, "motion") for item in applied]  # noqa: B009
+        judging = judging_classes(self.recording, motions, self.strokes, self.signal.time, self.hold)
+        return tuple(self._share(applied[item.motion], item.stroke, item.where) for item in judging)
+
+    def _of_stroke(self, number: int) -> _Share:
+        """Evaluate the threshold in one stroke alone, and at rest after it: a contact that halts it ends the stroke."""
+        judges = self.signal.time >= self.strokes[number].applies
+        if number + 1 < len(self.strokes):
+            judges &= self.signal.time < self._moves_after(self.strokes[number + 1].applies)
+        return self._share(self.thresholds[0], number, judges)
+
+    def _moves_after(self, applies: float) -> float:
+        """Return when a joint moves again after `applies` [s], at most `hold` later."""
+        speed = self.recording["speed"]
+        moves = speed.derived("any joint moves", lambda: speed.time[evident_speed(speed).any(axis=1)])
+        after = int(np.searchsorted(moves, applies, side="right"))
+        return min(float(moves[after]) if after < len(moves) else np.inf, applies + self.hold)
+
+    def _share(self, threshold: KnownBand, number: int, judges: BoolArray) -> _Share:
+        """Evaluate a class in a stroke, without other motions before it, so that its filters start there."""
+        stroke = self.strokes[number]
+        after = self.strokes[number + 1].applies + self.hold if number + 1 < len(self.strokes) else np.inf
+        whole = len(self.strokes) == 1
+        rows = slice(0, len(self.signal.time)) if whole else self.signal.rows(stroke.start, after)
+        recording = self.recording if whole else self.recording.section(stroke.start, after)
+        part = self.signal.part(rows)
+        judges = judges[rows]
+        if not judges.all():
+            elsewhere = part.valid & ~judges[:, np.newaxis]
+            part = part.changed(status=np.where(elsewhere, np.uint8(Status.OTHER_SPEED), part.status))
+        return _Share(threshold, recording, part, rows, judges)
+
+    def _merged(self, evaluated: Sequence[tuple[Signal, Band]]) -> tuple[Signal, Band]:
+        """Merge several classes: the band that a sample exceeds least applies, so it is outside only if outside all."""
+        shares = self._shares
+        if len(shares) == 1 and shares[0].judges.all():
+            return evaluated[0]
+        signal, shape = self.signal, self.signal.values.shape
+        recent = speed_is_recent(self.recording, self.classes, signal.time, self.hold)
+        values, unit = np.array(signal.values, order="C"), signal.unit
+        elsewhere = np.where(recent, np.uint8(Status.OTHER_SPEED), np.uint8(Status.GAP))[:, np.newaxis]
+        status = np.ascontiguousarray(np.where(signal.valid, elsewhere, signal.status))
+        lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
+        marks = np.zeros(shape, dtype=np.uint8)
+        for share, (statistic, band) in zip(shares, evaluated, strict=True):
+            own, unit = contiguous(statistic, band), statistic.unit
+            merge_share(*own, share.judges, share.rows.start, values, status, lower, upper, least, marks)
+        # If each class monitors a different side, together they monitor none.
+        status[marks == (OPEN_BELOW | OPEN_ABOVE | LIMITED)] = Status.NO_LIMIT
+        return signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
+
+
+def judged(
+    recording: Recording,
+    signal: Signal,
+    thresholds: Sequence[FittedThreshold],
+    cut: str = "whole",
+    hold: float = HOLD,
+) -> Judgement:
+    """Return the judgement of a log, cut into strokes by `cut`; `hold` [s]: see `recordings.motion.applicable`."""
+    seen = recording.without_ground_truth()
+    strokes = strokes_so_far(seen, cut, classes_of(thresholds))
+    return Judgement(seen, signal, tuple(thresholds), tuple(strokes), hold)
+
+
+def classes_of(thresholds: Sequence[FittedThreshold]) -> tuple[MotionClass, ...]:
+    """Return the classes of motion that thresholds were learned for; a threshold without one applies to any motion."""
+    classes = (class_of(item) for item in thresholds)
+    return tuple(item for item in classes if item is not None)
+
+
+def class_of(threshold: FittedThreshold) -> MotionClass | None:
+    """Return the class of motion that a threshold was learned for; None if it applies to any motion."""
+    motion: MotionClass | None = getattr(threshold, "motion", None)
+    return motion
+
+
+@kernel(
+    f"void({_MATRIX}, {_STATUS}, {_MATRIX}, {_MATRIX}, {_ROWS}, int64, "
+    "float64[:,::1], uint8[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], uint8[:,::1])",
+)
+def merge_share(  # noqa: PLR0913  a kernel: one loop, arrays one by one
+    own_values: FloatArray,
+    own_status: StatusArray,
+    own_lower: FloatArray,
+    own_upper: FloatArray,
+    judges: BoolArray,
+    first: int,
+    values: FloatArray,
+    status: StatusArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    least: FloatArray,
+    marks: StatusArray,
+) -> None:
+    """Take a class's statistic and limits where it is exceeded `least` so far; its own arrays begin at row `first`."""
+    for j in range(own_values.shape[1]):
+        for i in range(own_values.shape[0]):
+            if not judges[i]:
+                continue
+            k = first + i
+            if own_status[i, j] != Status.VALID:
+                if status[k, j] == Status.OTHER_SPEED:
+                    status[k, j] = own_status[i, j]
+                continue
+            value, low, high = own_values[i, j], own_lower[i, j], own_upper[i, j]
+            above, below = value - high, low - value
+            outside = above if above >= below or math.isnan(below) else below
+            if outside < least[k, j] or status[k, j] != Status.VALID:
+                values[k, j], lower[k, j], upper[k, j], least[k, j] = value, low, high, outside
+                status[k, j] = Status.VALID
+            if low == -math.inf:
+                marks[k, j] |= OPEN_BELOW
+            if high == math.inf:
+                marks[k, j] |= OPEN_ABOVE
+            if math.isfinite(low) or math.isfinite(high):
+                marks[k, j] |= LIMITED

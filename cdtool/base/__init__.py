@@ -1,0 +1,1 @@
+"""What every room uses and no other room explains: errors, files, findings, tables."""

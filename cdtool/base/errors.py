@@ -1,0 +1,103 @@
+"""Errors with a next step for the user.
+
+Conventions: one line with the file, the row or key and the value, then a hint with the next step.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from itertools import takewhile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class CdtoolError(Exception):
+    """A known error: `message` states what is wrong and where, `hint` what to do next.
+
+    `channel` is the channel of the log that it is about, for code that can do without one; else empty.
+    """
+
+    def __init__(self, message: str, hint: str = "", *, channel: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+        self.channel = channel
+
+    def __str__(self) -> str:
+        return f"{self.message} ({self.hint})" if self.hint else self.message
+
+    def _render_traceback_(self) -> list[str]:
+        """Return what Jupyter shows: the line of the caller and the error, without the frames inside cdtool.
+
+        `%debug` still stops where the error was raised.
+        """
+        import traceback
+
+        package = str(Path(__file__).parents[1])
+        calls = traceback.extract_tb(self.__traceback__)
+        callers = list(takewhile(lambda call: not call.filename.startswith(package), calls))
+        place = [f"line {callers[-1].lineno}: {callers[-1].line}"] if callers and callers[-1].line else []
+        hint = [f"next step: {self.hint}"] if self.hint else []
+        return [*place, f"{type(self).__name__}: {self.message}", *hint]
+
+
+class UsageError(CdtoolError):
+    """A command or function was called with invalid arguments."""
+
+
+class ConfigurationError(CdtoolError):
+    """A machine file or benchmark file is wrong; the message names the key."""
+
+
+class RecordingError(CdtoolError):
+    """A recording cannot be read, or something it needs is missing."""
+
+
+class OutputError(CdtoolError):
+    """A file or folder cannot be written; its previous content is unchanged."""
+
+
+class SignatureError(CdtoolError):
+    """A signature cannot be learned or read, or does not belong to the machine, detector or log."""
+
+
+class WorkerError(CdtoolError):
+    """A process that works for this one ended before its result."""
+
+
+class NothingValidError(SignatureError):
+    """The detector cannot assess any sample of the runs to learn from, because of detector and motion."""
+
+
+def installing(extra: str) -> str:
+    """Return how an extra is installed: in the checkout, as long as no index has the package."""
+    return f"pip install '.[{extra}]'"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return a hint for a wrong name: the nearest known names first, then all of them."""
+    names = sorted(known)
+    close = get_close_matches(name, names, n=2, cutoff=0.5)
+    listed = ", ".join(names) if names else "none"
+    if close:
+        return f"did you mean {' or '.join(close)}? known: {listed}"
+    return f"known: {listed}"
+
+
+def is_lasting(fault: CdtoolError) -> bool:
+    """Return whether the same files give the same error again: it is not one of the system.
+
+    A network, a full disk, missing permissions, too little memory or a package that is not installed may be in order
+    the next time.
+    """
+    seen: set[int] = set()
+    cause: BaseException | None = fault
+    while cause is not None and id(cause) not in seen:
+        if isinstance(cause, OSError | ImportError | MemoryError):
+            return False
+        seen.add(id(cause))
+        cause = cause.__cause__ or cause.__context__
+    return True

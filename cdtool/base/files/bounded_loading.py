@@ -1,0 +1,277 @@
+"""Read TOML, JSON, gzip and small text files with bounds on size, depth, memory and numbers.
+
+Conventions: an error of the file itself (missing, not a regular file, too large) is raised as the caller's error class,
+with the path. An error of its contents is a ContentError: its text is the reason, and the caller adds the file and the
+next step. Files written by cdtool or by a person stay within all bounds; a hostile file is refused before it uses the
+memory.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import stat
+import tomllib
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.base.errors import CdtoolError
+from cdtool.base.remote.storage_error import StorageError
+
+MIB = 2**20
+# Text written by a person: a machine, benchmark, label or trigger file, a URDF.
+MOST_TEXT = 16 * MIB
+MOST_TOML = 4 * MIB
+# Results, signatures and traces, on disk and unpacked.
+MOST_JSON = 512 * MIB
+MOST_DEPTH = 64
+MOST_KEY_PARTS = 32
+_MOST_TOML_WORDS = 200_000
+_MOST_TOML_ENTRIES = 50_000
+_MOST_WORD = 1000
+# Upper bound of the memory for JSON as Python values: bytes per character (as bytes and text), element, list, object.
+_PER_CHARACTER, _PER_ELEMENT, _PER_LIST, _PER_OBJECT = 2, 40, 60, 200
+# A file may need this much memory, and this multiple of its size on disk; only hostile files need more.
+_FREE, _RATIO = 160 * MIB, 16
+# Traces are about 8 times larger unpacked, and their numbers need 9 times the memory of their digits.
+_PACKED_RATIO = 100
+_PIECE = MIB
+_MOST_DIGITS = 19
+_LARGEST_INTEGER = 2**63
+
+_TOML_TOKEN = re.compile(
+    r'(?P<lines>"""[^"\\]*+(?:(?:\\.|"(?!""))[^"\\]*+)*+"{3,5}|\'\'\'.*?\'{3,5})'
+    r"|(?P<unclosed>\"\"\"|''')"
+    r'|(?P<text>"[^"\\\n]*+(?:\\[^\n][^"\\\n]*+)*+"?|\'[^\'\n]*+\'?)'
+    r"|#[^\n]*"
+    r"|(?P<word>[A-Za-z0-9_+-]+)"
+    r"|[^\S\n]+"
+    r"|(?P<mark>.)",
+    re.DOTALL,
+)
+# The end is optional: the rest of an unterminated text is searched only once, not from each of its quotes.
+_JSON_TEXT = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"?', re.DOTALL)
+_NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
+
+
+class ContentError(ValueError):
+    """The contents of a file are not as required; the text is the reason, on one line, without the file's name."""
+
+
+def read_bytes(
+    path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT, hint: str = "check the path", missing: str = ""
+) -> bytes:
+    """Return the bytes of a regular file of at most `most` bytes; otherwise raise `error` with the path and `hint`.
+
+    A FIFO, device or folder is refused without being read. `missing`: the hint for a missing file.
+    """
+    try:
+        # Without O_NONBLOCK, opening a FIFO would wait for a writer.
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except FileNotFoundError:
+        raise error(f"{path}: no such file", missing or hint) from None
+    except StorageError as fault:
+        raise error(fault.message, fault.hint) from fault
+    except ValueError as fault:  # a NUL, which is not allowed in file names
+        raise error(f"{str(path)!r}: is not a file name", hint) from fault
+    except OSError as fault:
+        raise error(f"{path}: cannot be read: {fault.strerror}", hint) from fault
+    state = os.fstat(handle)
+    if not stat.S_ISREG(state.st_mode):
+        os.close(handle)
+        if stat.S_ISDIR(state.st_mode):
+            raise error(f"{path}: cannot be read: is a folder", "give a file in it")
+        raise error(f"{path}: is not a regular file", "save the stream to a file first")
+    with os.fdopen(handle, "rb") as file:
+        if state.st_size > most:
+            raise error(
+                f"{path}: has {state.st_size / MIB:.0f} MiB; at most {most / MIB:.0f} are read",
+                "check that it is the right file",
+            )
+        try:
+            content = file.read(most + 1)  # a file in /proc has more bytes than stated
+        except OSError as fault:
+            raise error(f"{path}: cannot be read: {fault.strerror}", hint) from fault
+    if len(content) > most:
+        raise error(f"{path}: has more than {most / MIB:.0f} MiB", "check that it is the right file")
+    return content
+
+
+def read_text(path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT) -> str:
+    """Return the UTF-8 text of a regular file, without the mark that Windows editors begin it with.
+
+    Raises `error` with the path.
+    """
+    hint = "give a UTF-8 text file"
+    try:
+        text = read_bytes(path, error, most=most, hint=hint, missing="check the path").decode("utf-8-sig")
+    except UnicodeDecodeError as fault:
+        raise error(f"{path}: is not UTF-8 text", hint) from fault
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the tables of a TOML text; raises ContentError with the line, or with the key of a number out of range."""
+    _check_toml(text)
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        raise ContentError(str(fault)) from fault
+    except (ValueError, RecursionError) as fault:
+        raise ContentError(f"{fault}") from fault
+    for key, number in _integers(values, ""):
+        if not -_LARGEST_INTEGER <= number < _LARGEST_INTEGER:
+            raise ContentError(f"{key} is a whole number of {len(str(abs(number)))} digits: more than 64 bits")
+    return values
+
+
+def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
+    """Return the values of strict JSON in UTF-8: finite numbers, integers of at most 64 bits; raises ContentError.
+
+    `size_on_disk` [bytes]: of the file from which it was unpacked.
+    """
+    if size_on_disk is None:
+        _check_memory(_memory(content), _FREE + _RATIO * len(content))
+    if _depth(content) > MOST_DEPTH:
+        raise ContentError(f"nested more than {MOST_DEPTH} deep")
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as fault:
+        raise ContentError("not UTF-8 text") from fault
+    if not text.strip():
+        raise ContentError("it is empty")
+    try:
+        return json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_integer)
+    except json.JSONDecodeError as fault:
+        raise ContentError(f"truncated or damaged at line {fault.lineno}") from fault
+    except RecursionError as fault:
+        raise ContentError("nested too deeply") from fault
+
+
+def parse_own_json(text: str | bytes) -> Any:
+    """Return the values of JSON from inside a file that cdtool wrote, with NaN as it may hold; raises ValueError."""
+    try:
+        return json.loads(text)
+    except RecursionError as fault:
+        raise ContentError("nested too deeply") from fault
+
+
+def unpack_json(content: bytes) -> Any:
+    """Return the values of gzipped strict JSON; ContentError before unpacking that takes far too much memory.
+
+    Otherwise as `parse_json`.
+    """
+    bound = _FREE + _PACKED_RATIO * len(content)
+    pieces: list[bytes] = []
+    memory = 0
+    for piece in _unpacked(content):
+        memory += _memory(piece)
+        _check_memory(memory, bound)
+        pieces.append(piece)
+    return parse_json(b"".join(pieces), len(content))
+
+
+def _unpacked(content: bytes) -> Iterator[bytes]:
+    stream = zlib.decompressobj(wbits=31)
+    packed = content
+    try:
+        while not stream.eof:
+            piece = stream.decompress(packed, _PIECE)
+            packed = stream.unconsumed_tail
+            if not piece and not packed and not stream.eof:
+                raise ContentError("truncated")
+            yield piece
+    except zlib.error as fault:
+        raise ContentError("not a complete gzip file") from fault
+    if stream.unused_data:
+        raise ContentError(f"{len(stream.unused_data)} bytes after its end")
+
+
+def _check_toml(text: str) -> None:
+    """Raise ContentError for a text that takes tomllib far more memory, time or stack than a person's file."""
+    depth = dots = entries = escapes = 0
+    for number, token in enumerate(_TOML_TOKEN.finditer(text)):
+        found, kind = token[0], token.lastgroup
+        if kind in ("text", "lines"):
+            escapes += found.count("\\")
+        if number + escapes > _MOST_TOML_WORDS or entries > _MOST_TOML_ENTRIES:
+            raise ContentError(f"more than {_MOST_TOML_ENTRIES} keys or {_MOST_TOML_WORDS} words")
+        if kind == "unclosed":
+            raise ContentError(f"a text that begins {_line(text, token)} is not terminated")
+        if kind == "word" and len(found) > _MOST_WORD:
+            raise ContentError(f"a number or key of {len(found)} characters {_line(text, token)}")
+        if kind in (None, "text", "lines", "word"):
+            continue
+        if found == ".":
+            dots += 1
+            entries += dots > 1
+            if dots >= MOST_KEY_PARTS:
+                raise ContentError(f"a key of more than {MOST_KEY_PARTS} parts {_line(text, token)}")
+            continue
+        dots = 0
+        entries += found in "=[{"
+        depth = max(0, depth + (found in "[{") - (found in "]}"))
+        if depth > MOST_DEPTH:
+            raise ContentError(f"nested more than {MOST_DEPTH} deep {_line(text, token)}")
+
+
+def _line(text: str, token: re.Match[str]) -> str:
+    return f"at line {text.count(chr(10), 0, token.start()) + 1}"
+
+
+def _integers(value: Any, key: str) -> Iterator[tuple[str, int]]:
+    """Yield all integers below a value, with their keys."""
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            yield from _integers(item, f"{key}.{name}" if key else name)
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            yield from _integers(item, f"{key}[{i}]")
+    elif isinstance(value, int):
+        yield key, value
+
+
+def _memory(content: bytes) -> int:
+    """Return an upper bound of the memory for JSON as Python values [bytes]."""
+    elements = content.count(b",")
+    lists, objects = content.count(b"["), content.count(b"{")
+    return _PER_CHARACTER * len(content) + _PER_ELEMENT * elements + _PER_LIST * lists + _PER_OBJECT * objects
+
+
+def _check_memory(memory: int, bound: int) -> None:
+    if memory > bound:
+        raise ContentError(f"needs more than {bound / MIB:.0f} MiB of memory, too much for its size: refused")
+
+
+def _depth(content: bytes) -> int:
+    """Return the nesting depth of lists and objects, ignoring texts."""
+    brackets = np.frombuffer(_JSON_TEXT.sub(b"", content).translate(None, _NO_BRACKETS), dtype=np.uint8)
+    if not len(brackets):
+        return 0
+    steps = np.where((brackets == ord("[")) | (brackets == ord("{")), 1, -1).astype(np.int8)
+    return int(np.cumsum(steps, dtype=np.int32).max())
+
+
+def _refuse(constant: str) -> float:
+    raise ContentError(f"{constant} is not a JSON number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if math.isinf(value):
+        raise ContentError(f"{text[:40]} exceeds the largest number")
+    return value
+
+
+def _integer(text: str) -> int:
+    if len(text) > _MOST_DIGITS:
+        digits = len(text.removeprefix("-"))
+        if digits > _MOST_DIGITS:
+            raise ContentError(f"a whole number of {digits} digits: more than 64 bits")
+    return int(text)

@@ -1,1 +1,0 @@
-"""The command line: translates arguments, prints. The only place that knows typer and rich."""

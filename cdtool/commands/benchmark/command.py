@@ -1,0 +1,208 @@
+"""`cdtool benchmark`."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdtool.base.errors import UsageError
+from cdtool.base.plain_text import counted
+from cdtool.commands.console import completions
+from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress
+from cdtool.commands.console.options import (
+    ClusterOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    OutputOption,
+    QuietOption,
+    RetriesOption,
+    TimeoutOption,
+    listed,
+)
+from cdtool.commands.console.place import Place, location
+from cdtool.commands.console.summary_table import finish
+from cdtool.commands.console.written_reports import show_results, write_reports
+
+if TYPE_CHECKING:
+    from cdtool.commands.scoring.store.stored_outcomes import StoreReport
+    from cdtool.execution.store.use import StoreUse
+    from cdtool.execution.workers import Workers
+    from cdtool.results.evaluated import Evaluated
+
+
+def benchmark(
+    file: Annotated[
+        Place,
+        typer.Argument(
+            parser=location,
+            help="Benchmark file (TOML); see docs/benchmark-file.md.",
+            metavar="FILE",
+            autocompletion=completions.files(".toml"),
+        ),
+    ],
+    output: OutputOption = None,
+    force: ForceOption = False,
+    protocol: Annotated[
+        Place | None,
+        typer.Option(
+            "--protocol",
+            "-p",
+            parser=location,
+            help="Protocol file (TOML) for -o NAME.pdf or NAME.html, the protocol. Default: [protocol] of FILE.",
+        ),
+    ] = None,
+    detectors: Annotated[
+        str | None,
+        typer.Option(
+            "--detectors",
+            help="Detectors instead of the file's, as gm,vo,eo; all: all that the logs allow.",
+            autocompletion=completions.detector_list,
+        ),
+    ] = None,
+    false_alarm_budget: Annotated[
+        str | None,
+        typer.Option("--false-alarm-budget", help="Set each safety factor for this rate, as 1/1000op or 0.1/h."),
+    ] = None,
+    jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
+    store: Annotated[
+        Place | None,
+        typer.Option(
+            "--store",
+            parser=location,
+            help="Folder where outcomes are kept: only recordings for which something has changed are computed.",
+        ),
+    ] = None,
+    trust_mtime: Annotated[
+        bool,
+        typer.Option("--trust-mtime", help="With --store: a file of the same size and time is the same, unread."),
+    ] = False,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="With --store: read again what could not be read.")
+    ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list which recordings would be computed.")] = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
+
+    Exits with status 1 if a limit or force profile in the file is violated, and with 4 if a protocol is incomplete.
+
+    Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
+    """
+    from cdtool.commands.scoring.benchmark import benchmark as run
+    from cdtool.commands.scoring.benchmark_file import SECTIONS
+    from cdtool.execution.store.use import StoreUse
+    from cdtool.execution.workers import Workers
+    from cdtool.report.model import SECTIONS as REPORT_SECTIONS
+    from cdtool.report.outputs import check_outputs
+    from cdtool.report.writers.base import Report
+    from cdtool.results.files.results_file import to_json
+
+    if store is None and (trust_mtime or retry_failed):
+        raise UsageError(f"{'--trust-mtime' if trust_mtime else '--retry-failed'} needs --store", "add --store DIR")
+    workers = Workers(jobs, timeout, retries, cluster)
+    use = None if store is None else StoreUse(store, trust_times=trust_mtime, retry_failed=retry_failed)
+    if dry_run:
+        _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
+        return
+    documents = SECTIONS.load("protocol")(file, protocol, output or [], force)
+    check_outputs(documents.reports, force=force)
+    documents.check()
+    with progress("benchmark", quiet=quiet) as advance:
+        done = run(
+            file,
+            detectors=_named(detectors),
+            false_alarm_budget=false_alarm_budget,
+            workers=workers,
+            store=use,
+            progress=advance,
+        )
+    evaluated: Evaluated = done.evaluated
+    try:
+        command = _command(file, protocol, output or [], detectors, false_alarm_budget)
+        evaluated, lines = documents.write(done, command)
+    finally:  # a protocol that cannot be made does not cost the reports
+        report = Report(evaluated, done.traces)
+        written = write_reports(report, documents.reports, force=force, quiet=quiet, inputs=done.inputs)
+    print_skipped(done.results.skipped, done.results.findings)
+    if as_json:
+        typer.echo(to_json(evaluated.results), nl=False)
+    else:
+        show_results(evaluated, written, quiet=quiet, more=_stored(done.stored))
+        injected = [] if quiet else REPORT_SECTIONS.load("injected").lines(evaluated)
+        for line in [*injected, *lines]:
+            typer.echo(line)
+        if not lines and done.results.forces and not quiet:
+            typer.echo("next, for a test protocol of these forces:")
+            typer.echo(f"  cdtool protocol init {shlex.quote(plain(file))} -o protocol.toml")
+    finish(evaluated)
+
+
+def _command(
+    file: Path, protocol: Path | None, output: list[Path], detectors: str | None, false_alarm_budget: str | None
+) -> str:
+    """Return the command with the options that determine a protocol; of the outputs only their names."""
+    options = [("-p", protocol), ("--detectors", detectors), ("--false-alarm-budget", false_alarm_budget)]
+    given = [(name, value) for name, value in options if value is not None] + [
+        ("-o", Path(path.name)) for path in output
+    ]
+    return shlex.join(["cdtool", "benchmark", str(file), *(str(word) for pair in given for word in pair)])
+
+
+def _stored(outcomes: StoreReport | None) -> list[str]:
+    """Return how many recordings were computed, if outcomes are kept in a store."""
+    if outcomes is None:
+        return []
+    return [f"store: {counted(outcomes.computed, 'recording')} computed, {outcomes.reused} as stored"]
+
+
+def _show_dry_run(
+    file: Path,
+    detectors: tuple[str, ...],
+    false_alarm_budget: str | None,
+    workers: Workers,
+    store: StoreUse | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Print which recordings would be computed, their size, and how long that takes."""
+    from rich.filesize import decimal
+
+    from cdtool.commands.scoring.dry_run import dry_run
+
+    found = dry_run(file, detectors=detectors, false_alarm_budget=false_alarm_budget, workers=workers, store=store)
+    if as_json:
+        print_json(asdict(found) | {"bytes": found.bytes})
+        leave(found.skipped)
+        return
+    for item in found.logs:
+        typer.echo(f"{plain(item.recording)}: {', '.join(item.detectors)}, {decimal(item.bytes)}")
+    time = "" if found.seconds is None else f", about {_duration(found.seconds)}"
+    total = counted(found.total, "recording")
+    typer.echo(f"{len(found.logs)} of {total} would be computed: {decimal(found.bytes)}{time}")
+    if found.to_inject:
+        typer.echo(f"{counted(found.to_inject, 'contact')} of [inject] would be made first, and computed too")
+    print_skipped(found.skipped)
+    leave(found.skipped)
+
+
+def _duration(seconds: float) -> str:
+    """Return a rough time in words."""
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _named(detectors: str | None) -> tuple[str, ...]:
+    names = listed(detectors or "")
+    if detectors is not None and not names:
+        raise UsageError("--detectors is empty", "give detector names separated by commas, or omit the option")
+    return names

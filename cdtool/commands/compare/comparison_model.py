@@ -1,0 +1,132 @@
+"""What every report of a comparison of two builds shows, computed once as plain values: verdict, tables, notes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cdtool.commands.compare.comparison import BuildComparison
+from cdtool.commands.compare.questions import Figure
+from cdtool.commands.compare.rows import BuildRow
+from cdtool.report.few_contacts import EXPLAINED
+from cdtool.report.model import NO_CERTIFICATE
+from cdtool.report.number_text import NOTHING, number
+from cdtool.report.table import Cell, Column, Fields, Table, name_cell, shown, tabulate
+
+_TONES = {"worse": "bad", "mixed": "bad", "inconclusive": "unknown"}
+_MOST_CHANGES = 10
+_MEANS = ("latency_ms", "force_at_alarm_n")
+_HOW_TO_READ = (
+    "Two values are old / new. Contacts: the same ones in both, unless there are two numbers. Latency is a mean (of "
+    "fewer than ten contacts a median) and the force at the alarm a median, of the contacts that both detected; "
+    "changes are means of their pairs. “No change shown” does not mean that there is no change: the change in brackets "
+    "would have been shown with 80 % power. A change has an interval from ten or more recordings or campaigns."
+)
+
+
+@dataclass(frozen=True)
+class ComparisonModel:
+    """The plain values of a comparison. Texts from files are unchanged: renderers escape them.
+
+    `changes`: what is shown to be worse or better, a sentence per detector and group, the first ten.
+    """
+
+    verdict: str
+    short_results: Table
+    changes: Sequence[str]
+    results: Table
+    changed: Table
+    how_to_read: Sequence[str]
+    notes: Sequence[str]
+
+
+def comparison_model(comparison: BuildComparison) -> ComparisonModel:
+    """Return everything that the report of a comparison shows."""
+    inconclusive = (
+        "“Inconclusive”: these recordings could not have shown a change for the worse of "
+        f"{100.0 * comparison.relevant_change:g} %."
+    )
+    few = any(row.few for row in comparison.rows)
+    changed_rows = [row for row in comparison.rows if row.outcome in ("worse", "mixed", "better")]
+    changed: Fields[tuple[str, str, str]] = (
+        (Column("setting"), lambda item: Cell(item[0])),
+        (Column("old"), lambda item: Cell(item[1])),
+        (Column("new"), lambda item: Cell(item[2])),
+    )
+    only = (("old", comparison.only_old), ("new", comparison.only_new))
+    return ComparisonModel(
+        verdict=comparison.words,
+        short_results=_short_table(comparison.rows),
+        changes=[f"{shown(row.group)}, {shown(row.detector)}: {row.words}" for row in changed_rows[:_MOST_CHANGES]]
+        + ([f"and {len(changed_rows) - _MOST_CHANGES} more changes"] if len(changed_rows) > _MOST_CHANGES else []),
+        results=_results_table(comparison.rows, few),
+        changed=tabulate(
+            "changed",
+            "Under test, and different",
+            changed,
+            [(item.key, item.old, item.new) for item in comparison.changed],
+        ),
+        how_to_read=(f"{_HOW_TO_READ} {inconclusive} {NO_CERTIFICATE}", *([EXPLAINED] if few else [])),
+        notes=(
+            *(f"Only in {which}, not compared: {', '.join(names)}." for which, names in only if names),
+            *(f"{note}." for note in comparison.notes),
+        ),
+    )
+
+
+def both(row: BuildRow, figure: Figure, digits: int = 3) -> str:
+    """Return a value of both builds as "old / new", a mean with `digits` digits; a dash if neither is known."""
+    answer = row.question(figure)
+    if answer is None or (math.isnan(answer.old) and math.isnan(answer.new)):
+        return NOTHING
+    if figure in _MEANS:
+        return f"{number(answer.old, digits)} / {number(answer.new, digits)}"
+    return f"{answer.old:.0f} / {answer.new:.0f}"
+
+
+def ranges_of(row: BuildRow) -> str:
+    """Return the ranges of latency of both builds as "25.0 to 28.0 / 30.0 to 34.0"; empty with ten or more contacts."""
+    latency = row.question("latency_ms")
+    if latency is None or latency.ranges is None:
+        return ""
+    return " / ".join(" to ".join(dict.fromkeys(map(number, ends))) for ends in latency.ranges)
+
+
+def contacts_of(row: BuildRow) -> str:
+    """Return the number of pairs; "old / new" if the contacts are not the same; a dash without any contact."""
+    if not row.old_contacts and not row.new_contacts:
+        return NOTHING
+    return str(row.pairs) if row.paired else f"{row.old_contacts} / {row.new_contacts}"
+
+
+def _short_table(rows: Sequence[BuildRow]) -> Table:
+    """Return the rows in seven columns, which fit a pull request; the result in one word."""
+    fields: Fields[BuildRow] = (
+        (Column("group"), lambda row: name_cell(row.group)),
+        (Column("detector"), lambda row: name_cell(row.detector)),
+        (Column("latency ms"), lambda row: Cell(both(row, "latency_ms"))),
+        (Column("missed"), lambda row: Cell(both(row, "missed"))),
+        (Column("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
+        (Column("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n"))),
+        (Column("result", choice=True), lambda row: Cell(row.outcome, tone=_TONES.get(row.outcome, ""))),
+    )
+    return tabulate("short_results", "", fields, rows)
+
+
+def _results_table(rows: Sequence[BuildRow], few: bool) -> Table:
+    """Return a row per detector and group; `few`: with ranges of latency, as a row has too few contacts for a mean."""
+    ranges: Fields[BuildRow] = ((Column("range ms"), lambda row: Cell(ranges_of(row) or NOTHING)),)
+    fields: Fields[BuildRow] = (
+        (Column("group"), lambda row: name_cell(row.group)),
+        (Column("detector"), lambda row: name_cell(row.detector)),
+        (Column("contacts"), lambda row: Cell(contacts_of(row))),
+        (Column("latency ms"), lambda row: Cell(both(row, "latency_ms", 4))),
+        *(ranges if few else ()),
+        (Column("missed"), lambda row: Cell(both(row, "missed"))),
+        (Column("not assessable"), lambda row: Cell(both(row, "not_assessable"))),
+        (Column("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
+        (Column("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n", 4))),
+        (Column("result"), lambda row: Cell(row.words)),
+    )
+    return tabulate("results", "", fields, rows)

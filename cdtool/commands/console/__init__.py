@@ -1,0 +1,1 @@
+"""What the command line of every command uses: options, streams, tables and progress."""

@@ -1,0 +1,43 @@
+"""The last step of a command that scores: its reports are written, with progress, and its results shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from cdtool.commands.console.console import plain
+from cdtool.commands.console.late_progress import late_progress
+from cdtool.commands.console.summary_table import show_conclusion, show_table
+
+if TYPE_CHECKING:
+    from cdtool.report.writers.base import Report
+    from cdtool.results.evaluated import Evaluated
+
+# Shorter waits do not need a bar [s].
+AFTER_S = 1.0
+
+
+def write_reports(
+    report: Report, targets: Sequence[Path], *, force: bool, quiet: bool, inputs: Sequence[Path] = ()
+) -> list[Path]:
+    """Write all reports and return what to show; a bar until the last figure is written. Raises CdtoolError."""
+    from cdtool.report.outputs import write_outputs
+
+    with late_progress("writing reports", AFTER_S, quiet=quiet or not targets) as advance:
+        return write_outputs(report, targets, force=force, inputs=inputs, progress=advance)
+
+
+def show_results(evaluated: Evaluated, written: Sequence[Path], *, quiet: bool, more: Sequence[str] = ()) -> None:
+    """Print the conclusion, and unless `quiet` the tables, `more` lines, and what was written."""
+    show_conclusion(evaluated)
+    if quiet:
+        return
+    typer.echo()
+    show_table(evaluated)
+    for line in more:
+        typer.echo(line)
+    for path in written:
+        typer.echo(f"written: {plain(path)}")

@@ -1,0 +1,430 @@
+"""The result of a detector on logs for Python: alarms and contacts as DataFrames, the signal, the figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, overload
+
+import numpy as np
+
+from cdtool.alarms.pipeline import Detection
+from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
+from cdtool.base.notebook.html_table import html_table
+from cdtool.base.notebook.keyword_options import by_keywords
+from cdtool.base.notebook.near_attributes import NearAttributes
+from cdtool.base.notebook.presenting import described, presented
+from cdtool.base.notebook.same_values import equal_by_values, same_values
+from cdtool.base.plain_text import counted
+from cdtool.commands.detect.log_by_name import UnknownLogError, number_of
+from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of, detect_log, detect_log_runs
+from cdtool.commands.detecting.detection_options import DetectionOptions
+from cdtool.commands.judging.runs import several_logs
+from cdtool.detectors.detection import Status
+from cdtool.recordings.recording import Recording
+from cdtool.results.frames import OUTCOMES, rows_as_frame
+from cdtool.results.results import ContactResult, RecordingFinding, Skipped
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+_Settings = ParamSpec("_Settings")
+VERDICTS = ("alarm", "no alarm", "not_assessable")
+
+
+@dataclass(frozen=True)
+class AlarmRow:
+    """One alarm: a row of `DetectionResult.alarms`."""
+
+    recording: str
+    operation: str
+    detector: str
+    joint: str
+    time_s: float
+    side: str
+    statistic: float
+    limit: float
+    contact_onset_s: float | None
+
+
+@dataclass(frozen=True)
+class OperationRow:
+    """The verdict on one operation: a row of `DetectionResult.summary()`."""
+
+    recording: str
+    operation: str
+    detector: str
+    verdict: str
+    alarms: int
+    contacts: int
+    assessed_s: float
+    reason: str | None
+
+
+@dataclass(frozen=True, repr=False)
+class DetectionResult(NearAttributes):
+    """What a detector says about one log: alarms and contacts as DataFrames, its signal, its figure.
+
+    Parameters
+    ----------
+    detected : Detected
+        The same as plain values: matches, findings, the normal motion.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> found
+    DetectionResult(03.csv, momentum: alarm, 1 alarm, 1 contact)
+    >>> found.alarms[["joint", "side"]].values.tolist(), found.contacts.outcome.tolist()
+    ([['gate', 'above']], ['detected'])
+    """
+
+    detected: Detected
+
+    __eq__ = equal_by_values
+
+    @property
+    def recording(self) -> Recording:
+        """The log on the load side."""
+        return self.detected.recording
+
+    @property
+    def detections(self) -> tuple[Detection, ...]:
+        """The detector's statistic, band and verdict of each operation."""
+        return self.detected.detections
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The monitored joints: the columns of the statistic."""
+        return self.detected.joints
+
+    @property
+    def outcome(self) -> str:
+        """The verdict on the log: "alarm" if any operation has one, "not_assessable" if none is assessable."""
+        outcomes = {item.verdict.outcome for item in self.detections}
+        return next((outcome for outcome in VERDICTS if outcome in outcomes), "not_assessable")
+
+    @cached_property
+    def alarms(self) -> pd.DataFrame:
+        """A row per alarm: joint, time, side, statistic, limit, and the onset of its contact (NaN: none is known)."""
+        return alarms_frame([self])
+
+    @cached_property
+    def contacts(self) -> pd.DataFrame:
+        """A row per contact, with the columns of a benchmark's `contacts`."""
+        return contacts_frame([self])
+
+    def summary(self) -> pd.DataFrame:
+        """Return a row per operation with its verdict."""
+        return summary_frame([self])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the signal of all operations with its limits as a DataFrame.
+
+        Returns
+        -------
+        DataFrame
+            Index `time_s`; for each joint the columns `JOINT statistic`, `JOINT lower`, `JOINT upper` in the unit of
+            the signal, and `JOINT status`: VALID, or why a sample is not assessable.
+        """
+        import pandas as pd
+
+        parts = [item.statistic for item in self.detections]
+        time = np.concatenate([np.empty(0), *(part.time for part in parts)])
+        names = pd.Index([item.name for item in Status])
+        columns: dict[str, object] = {}
+        for column, joint in enumerate(self.joints):
+            curves = {
+                "statistic": [part.values[:, column] for part in parts],
+                "lower": [item.band.lower[:, column] for item in self.detections],
+                "upper": [item.band.upper[:, column] for item in self.detections],
+            }
+            columns |= {f"{joint} {name}": np.concatenate([np.empty(0), *curve]) for name, curve in curves.items()}
+            status = np.concatenate([np.empty(0, np.uint8), *(part.status[:, column] for part in parts)])
+            columns[f"{joint} status"] = pd.Categorical.from_codes(status.astype(np.int64), names)
+        return pd.DataFrame(columns, index=pd.Index(time, name="time_s"))
+
+    def plot(self) -> Figure:
+        """Return signal, limits, trigger and load cell over time, as `cdtool detect --plot` draws them; no pyplot."""
+        from cdtool.commands.detect.plot import detection_figure
+
+        return described(
+            detection_figure(self.detected), f"{self.recording.name}: signal, limits, trigger and load cell"
+        )
+
+    def __repr__(self) -> str:
+        return f"DetectionResult({PurePath(self.recording.name).name}, {self._detector}: {', '.join(self._words())})"
+
+    @property
+    def _detector(self) -> str:
+        return self.detections[0].detector if self.detections else "no operation"
+
+    def _words(self) -> list[str]:
+        alarms = sum(len(item.verdict.alarms) for item in self.detections)
+        words = [self.outcome.replace("_", " "), counted(alarms, "alarm")]
+        return [*words, *([counted(len(self.detected.contacts), "contact")] if self.detected.contacts else [])]
+
+    def _repr_html_(self) -> str:
+        """Return the verdict on each operation as a table, which a notebook shows."""
+        return _html([self], f"{self._detector} on {self.recording.name}", self.detected.threshold)
+
+
+class DetectionResults(NearAttributes, Sequence[DetectionResult]):
+    """What a detector says about several logs: a sequence of `DetectionResult`, with the same frames over all of them.
+
+    A log is found by its number or its name: `found[0]`, `found["03.csv"]`.
+
+    Parameters
+    ----------
+    runs : sequence of DetectionResult
+        The logs, or the runs of a log, in their order.
+    skipped : sequence of Skipped
+        Logs and runs that were left out, with the reason.
+    findings : sequence of RecordingFinding
+        Findings about the logs.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> logs = ["sample_logs/gate/stiff/03.csv", "sample_logs/gate/holdout/03.csv"]
+    >>> found = cdtool.detect(logs, "sample_logs/gate/machine.toml", detector="momentum", limit=[400.0])
+    >>> found
+    DetectionResults(2 logs, momentum: 1 alarm)
+    >>> [log.outcome for log in found]
+    ['alarm', 'no alarm']
+    >>> found["stiff/03.csv"].outcome
+    'alarm'
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[DetectionResult],
+        skipped: Sequence[Skipped] = (),
+        findings: Sequence[RecordingFinding] = (),
+    ) -> None:
+        self.runs, self.findings = tuple(runs), tuple(findings)
+        self._skipped = tuple(skipped)
+
+    @classmethod
+    def of(cls, *found: DetectedRuns) -> DetectionResults:
+        """Return the results of the runs of several logs."""
+        runs = [DetectionResult(run) for log in found for run in log.runs]
+        return cls(
+            runs, [item for log in found for item in log.skipped], [item for log in found for item in log.findings]
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DetectionResults):
+            return NotImplemented
+        return same_values((self.runs, self._skipped), (other.runs, other._skipped))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    @cached_property
+    def alarms(self) -> pd.DataFrame:
+        """A row per alarm, over all logs."""
+        return alarms_frame(self)
+
+    @cached_property
+    def contacts(self) -> pd.DataFrame:
+        """A row per contact, over all logs."""
+        return contacts_frame(self)
+
+    @cached_property
+    def skipped(self) -> pd.DataFrame:
+        """A row per log or run that was left out, with the reason."""
+        return rows_as_frame(Skipped, self._skipped)
+
+    def summary(self) -> pd.DataFrame:
+        """Return a row per operation with its verdict."""
+        return summary_frame(self)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @property
+    def names(self) -> list[str]:
+        """The name of each log: the path it was given by."""
+        return [run.recording.source or run.recording.name for run in self.runs]
+
+    @overload
+    def __getitem__(self, number: int | str | PurePath) -> DetectionResult: ...
+
+    @overload
+    def __getitem__(self, number: slice) -> DetectionResults: ...
+
+    def __getitem__(self, number: int | str | PurePath | slice) -> DetectionResult | DetectionResults:
+        """Return a result by number, or by the name of its log or the end of it; of a slice, several."""
+        if isinstance(number, slice):
+            return DetectionResults(self.runs[number])
+        if isinstance(number, str | PurePath):
+            left_out = {item.recording: item.reason for item in self._skipped}
+            return self.runs[number_of(str(number), self.names, left_out)]
+        return self.runs[number]
+
+    def __contains__(self, item: object) -> bool:
+        if not isinstance(item, str | PurePath):
+            return item in self.runs
+        try:
+            number_of(str(item), self.names)
+        except UnknownLogError as fault:
+            return fault.several
+        return True
+
+    def __iter__(self) -> Iterator[DetectionResult]:
+        return iter(self.runs)
+
+    def __repr__(self) -> str:
+        alarms = sum(len(item.verdict.alarms) for run in self for item in run.detections)
+        words = [counted(alarms, "alarm"), *([f"{len(self._skipped)} left out"] if self._skipped else [])]
+        return f"DetectionResults({counted(len(self), 'log')}, {self._detector}: {', '.join(words)})"
+
+    @property
+    def _detector(self) -> str:
+        return self.runs[0]._detector if self.runs else "no log"
+
+    def _repr_html_(self) -> str:
+        """Return the verdict on each operation as a table, which a notebook shows."""
+        note = f"{len(self._skipped)} left out: see skipped" if self._skipped else ""
+        return _html(self.runs, f"{self._detector} on {counted(len(self), 'log')}", note)
+
+
+def alarms_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
+    """Return a row per alarm of all operations."""
+    rows = []
+    for run in runs:
+        for detection in run.detections:
+            for alarm in detection.verdict.alarms:
+                contact = contact_of(run.detected, alarm)
+                onset = None if contact is None or contact.in_progress else contact.start
+                names = (run.recording.name, detection.operation.name, detection.detector, alarm.joint)
+                rows.append(AlarmRow(*names, alarm.time, alarm.side, alarm.statistic, alarm.limit, onset))
+    return rows_as_frame(AlarmRow, rows, {"side": ("above", "below")})
+
+
+def contacts_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
+    """Return a row per contact of all operations, as `cdtool benchmark` writes them."""
+    rows = [row for run in runs for of_operation in run.detected.contact_rows for row in of_operation]
+    return rows_as_frame(ContactResult, rows, {"outcome": OUTCOMES})
+
+
+def summary_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
+    """Return a row per operation."""
+    return rows_as_frame(OperationRow, [row for run in runs for row in _operations(run)], {"verdict": VERDICTS})
+
+
+def _operations(run: DetectionResult) -> Iterator[OperationRow]:
+    for detection, matching in zip(run.detections, run.detected.matchings, strict=True):
+        verdict = detection.verdict
+        yield OperationRow(
+            run.recording.name,
+            detection.operation.name,
+            detection.detector,
+            verdict.outcome,
+            len(verdict.alarms),
+            len(matching.matches),
+            detection.assessed_seconds,
+            verdict.reason or None,
+        )
+
+
+def _html(runs: Sequence[DetectionResult], caption: str, note: str) -> str:
+    rows = []
+    for run in runs:
+        for row, detection, matching in zip(_operations(run), run.detections, run.detected.matchings, strict=True):
+            first = detection.verdict.alarms[0] if detection.verdict.alarms else None
+            latency = next((1e3 * item.latency for item in matching.matches if item.alarm), None)
+            alarm = (first.joint, f"{first.time:.3f}") if first else (None, None)
+            rows.append((row.operation, row.verdict.replace("_", " "), row.alarms, *alarm, row.contacts, latency))
+    headings = ("operation", "verdict", "alarms", "joint", "first alarm [s]", "contacts", "latency [ms]")
+    return html_table(caption, headings, rows, note)
+
+
+def detect_logs(
+    logs: str | Path | Sequence[str | Path], options: DetectionOptions
+) -> DetectionResult | DetectionResults:
+    """Run one detector over one log or many: with a signature, with limits, or with those of the first seconds.
+
+    Parameters
+    ----------
+    logs : str, Path or sequence of them
+        A log, or several.
+    options : DetectionOptions
+        The machine, the detector and its threshold.
+
+    Returns
+    -------
+    DetectionResult or DetectionResults
+        Of one log: its alarms and contacts as DataFrames, the signal with its limits, and the figure. Of a sequence, a
+        sequence of them, with a result for each run of a log that is cut into runs; a log that cannot be read is
+        left out and listed in `skipped`.
+
+    Raises
+    ------
+    UsageError
+        No threshold is given, or more than one; the list of logs is empty; a single log is cut into several runs.
+    SignatureError
+        The signature belongs to another machine or to other gains.
+    RecordingError
+        A single log cannot be read, or has no channel that the detector needs; or none of several can be used.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> found.outcome, found.alarms.joint[0], found.detections[0].statistic.unit
+    ('alarm', 'gate', 'N')
+    >>> found.contacts.latency_ms.between(0.0, 200.0).all().item()
+    True
+    """
+    if isinstance(logs, str | Path):
+        return DetectionResult(detect_log(logs, options))
+    logs = several_logs(logs)
+    options = replace(options, benchmark=options.prepared())  # learned once for all logs
+    found: list[DetectedRuns] = []
+    skipped: list[Skipped] = []
+    for log in logs:
+        try:
+            found.append(detect_log_runs(log, options))
+        except (UsageError, SignatureError, OutputError):  # an error in the settings affects every log
+            raise
+        except CdtoolError as fault:
+            skipped.append(Skipped(str(log), str(fault)))
+    if skipped and not found:
+        raise RecordingError(f"none of {counted(len(skipped), 'log')} can be used, the first: {skipped[0].reason}")
+    results = DetectionResults.of(*found)
+    return DetectionResults(results.runs, [*skipped, *results._skipped], results.findings)
+
+
+class _OneOrMany(Protocol[_Settings]):
+    """A function of one log or several: what it returns depends on that."""
+
+    @overload
+    def __call__(  # type: ignore[overload-overlap]  # a str is one log, not a sequence of them
+        self, logs: str | Path, *values: _Settings.args, **named: _Settings.kwargs
+    ) -> DetectionResult: ...
+
+    @overload
+    def __call__(
+        self, logs: Sequence[str | Path], *values: _Settings.args, **named: _Settings.kwargs
+    ) -> DetectionResults: ...
+
+
+def _typed(_: Callable[_Settings, DetectionOptions], function: Any) -> _OneOrMany[_Settings]:
+    """Return a function of these options with its type."""
+    typed: _OneOrMany[_Settings] = function
+    return typed
+
+
+detect = _typed(DetectionOptions, by_keywords(DetectionOptions, detect_logs))
+detect_runs = presented(
+    by_keywords(DetectionOptions, detect_log_runs),
+    DetectionResults.of,
+    "DetectionResults\n    The result of `detect` for each run, and in `skipped` what was left out.",
+)

@@ -1,0 +1,229 @@
+"""Output of `cdtool detect`: alarms, missed contacts and sections that are not assessable, as a table or as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cdtool.base.plain_text import counted
+from cdtool.commands.console.colour import Toned
+from cdtool.commands.console.console import number, plain, say, table
+from cdtool.commands.console.contact_rows import contact_as_json
+from cdtool.commands.console.truth_shown import NEGATIVE
+
+if TYPE_CHECKING:
+    from cdtool.alarms.pipeline import Detection
+    from cdtool.commands.detect.contact_force import ForceSummary
+    from cdtool.commands.detecting.detection import Detected
+    from cdtool.detectors.detection import Alarm
+    from cdtool.results.results import ContactResult
+    from cdtool.truth.matching import Matching
+
+# Operations whose sections that are not assessable are shown, and how many sections of each.
+_SHOWN, _SECTIONS = 6, 3
+# `found_by` of a contact whose onset was found by the rule for the load cell.
+_CELL = "load cell"
+# The colours of outcomes.
+_TONES = {"missed": "bad", "not_assessable": "unknown"}
+
+
+def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
+    """Print the table of all logs, then sections that are not assessable, signal notes and estimated forces."""
+    rows = [(found, *pair) for found in done for pair in zip(found.detections, found.matchings, strict=True)]
+    detections = [detection for found in done for detection in found.detections]
+    _show(rows, done[0].threshold)
+    _show_not_assessable(detections)
+    _show_notes(detections)
+    for force in list(forces.values())[:_SHOWN]:
+        _show_force(force)
+    if len(forces) > _SHOWN:
+        typer.echo(f"estimated force: and {counted(len(forces) - _SHOWN, 'more operation')} (--json has all)")
+
+
+def show_conclusion(done: Sequence[Detected]) -> None:
+    """Print in one line how many operations have which verdict, and how many contacts which outcome."""
+    detections = [detection for found in done for detection in found.detections]
+    matches = [item for found in done for matching in found.matchings for item in matching.matches]
+    parts = [
+        ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(Counter(names).items()))
+        for names in (
+            [detection.verdict.outcome for detection in detections],
+            [item.outcome for item in matches],
+        )
+    ]
+    words = f"{counted(len(detections), 'operation')}: {parts[0]}" if detections else "no operation"
+    words += f"; {counted(len(matches), 'contact')}: {parts[1]}" if matches else "; no contact"
+    say(words, tone="bad" if any(item.outcome == "missed" for item in matches) else "")
+
+
+def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
+    """Return one JSON object per operation."""
+    return [
+        _as_json(log, found, detection, matching, rows, forces.get(detection.operation.name))
+        for log, found in done
+        for detection, matching, rows in zip(found.detections, found.matchings, found.contact_rows, strict=True)
+    ]
+
+
+def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> None:
+    """Print a row per alarm, per contact without an alarm, and per operation without either."""
+    cells = [cell for row in rows for cell in _rows_of(*row)]
+    first = rows[0][1]
+    unit = first.statistic.unit
+    columns = [("recording", "left"), ("verdict", "left"), ("time\ns", "right"), ("joint", "left")]
+    columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
+    typer.echo(f"{first.detector}: {plain(threshold)}")
+    table(columns, cells)
+    rules = {found.onset for found, _, matching in rows for item in matching.matches if item.contact.found_by == _CELL}
+    for rule in sorted(rules):
+        say(f"latency from contact onset to alarm, debounce included; onset: {rule}")
+
+
+def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
+    from cdtool.commands.detecting.detection import NO_CONTACT
+
+    name = detection.operation.name
+    latency = {item.alarm: item for item in matching.matches if item.alarm}
+    rows: list[tuple[object, ...]] = []
+    for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.column)):
+        late = number(1e3 * latency[alarm].latency, 3) if alarm in latency else "-"
+        figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
+        why = "" if alarm in latency else _why_no_latency(found, alarm)
+        if alarm in latency and latency[alarm].clipped:
+            why = NEGATIVE
+        if alarm in latency and latency[alarm].contact.hole:
+            later = 1e3 * latency[alarm].contact.uncertainty
+            missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"
+            why = f"{why}; {missing}" if why else missing
+        verdict = Toned("alarm", "bad" if why == NO_CONTACT else "")
+        rows.append((name, verdict, f"{alarm.time:.3f}", alarm.joint, *figures, why))
+    for item in matching.matches:
+        if not item.alarm:
+            outcome = item.outcome.replace("_", " ")
+            at = "until" if item.contact.in_progress else "at"
+            time = item.contact.end if item.contact.in_progress else item.contact.start
+            why = f"contact {at} {time:.3f} s{': ' + item.reason if item.reason else ''}"
+            rows.append((name, Toned(outcome, _TONES.get(item.outcome, "")), "-", "-", "-", "-", "-", why))
+    if not rows:
+        outcome = detection.verdict.outcome.replace("_", " ")
+        verdict = Toned(outcome, _TONES.get(detection.verdict.outcome, ""))
+        rows.append((name, verdict, "-", "-", "-", "-", "-", detection.verdict.reason))
+    return rows
+
+
+def _why_no_latency(found: Detected, alarm: Alarm) -> str:
+    """Explain why an alarm has no latency: it repeats the alarm of a contact, or belongs to no contact."""
+    from cdtool.commands.detecting.detection import contact_of, same_contact, why_no_contact
+
+    contact = contact_of(found, alarm)
+    return why_no_contact(found, alarm) if contact is None else same_contact(found, contact, alarm)
+
+
+def _show_force(force: ForceSummary) -> None:
+    at_alarm = f"{force.at_alarm:.1f} N at the first alarm, " if math.isfinite(force.at_alarm) else ""
+    largest = (
+        f"largest {force.largest:.1f} N at {force.largest_at:.3f} s" if math.isfinite(force.largest) else "unknown"
+    )
+    typer.echo(f"{plain(force.operation)}: estimated force at {plain(str(force.contact))}: {at_alarm}{largest}")
+
+
+def _show_notes(detections: list[Detection]) -> None:
+    """Print the detector's notes on its signal, for as many operations as sections that are not assessable."""
+    noted = [detection for detection in detections if detection.statistic.notes]
+    for detection in noted[:_SHOWN]:
+        for note in detection.statistic.notes:
+            say(f"{detection.operation.name}: {note}")
+    if len(noted) > _SHOWN:
+        typer.echo(f"and {counted(len(noted) - _SHOWN, 'more operation')} with such a note (--json has all)")
+
+
+def _show_not_assessable(detections: list[Detection]) -> None:
+    """Print the share of each operation that is not assessable, and the time, position and reason of long sections."""
+    shown = [detection for detection in detections if detection.statistic.shares()]
+    for detection in shown[:_SHOWN]:
+        sections = detection.not_assessable_sections()
+        longest = sorted(sections, key=lambda item: item.start - item.end)[:_SECTIONS]
+        unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
+        parts = []
+        for item in sorted(longest, key=lambda item: item.start):
+            where = (
+                f" ({_place(item.way_start)} to {_place(item.way_end)} {unit})"
+                if math.isfinite(item.way_start + item.way_end)
+                else ""
+            )
+            parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
+        if more := len(sections) - len(longest):
+            parts.append(f"and {counted(more, 'shorter section')} (--json has all)")
+        if detection.other_speed and detection.verdict.outcome != "not_assessable":  # otherwise it is among the reasons
+            parts.append(detection.other_speed)
+        share = 1.0 - float(detection.statistic.valid.mean())
+        say(f"not assessable in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
+    if len(shown) > _SHOWN:
+        typer.echo(f"not assessable: and {counted(len(shown) - _SHOWN, 'more operation')} (--json has all)")
+
+
+def _place(way: float) -> str:
+    """Return a position along the travel [load unit] with three digits, at most to a millimetre or milliradian."""
+    return f"{round(way, 3) + 0.0:.3g}"
+
+
+def _as_json(
+    log: Path,
+    found: Detected,
+    detection: Detection,
+    matching: Matching,
+    rows: Sequence[ContactResult],
+    force: ForceSummary | None,
+) -> dict[str, Any]:
+    from cdtool.commands.detecting.detection import contact_of, why_no_contact
+
+    belonging = {alarm: contact_of(found, alarm) for alarm in detection.verdict.alarms}
+    belonging |= {item.alarm: item.contact for item in matching.matches if item.alarm}
+    return {
+        "log": str(log),
+        "operation": detection.operation.name,
+        "detector": detection.detector,
+        "unit": detection.statistic.unit,
+        "threshold": found.threshold,
+        "verdict": detection.verdict.outcome,
+        "reason": detection.verdict.reason or None,
+        "alarms": [
+            {
+                "time_s": alarm.time,
+                "joint": alarm.joint,
+                "side": alarm.side,
+                "statistic": alarm.statistic,
+                "limit": alarm.limit,
+                "contact_onset_s": contact.start if contact else None,
+                "why_no_contact": None if contact else why_no_contact(found, alarm),
+            }
+            for alarm, contact in ((alarm, belonging[alarm]) for alarm in detection.verdict.alarms)
+        ],
+        "contacts": [contact_as_json(detection, row) for row in rows],
+        "not_judged": detection.statistic.shares(),
+        "other_speed": detection.other_speed or None,
+        "stretches_not_judged": [asdict(item) for item in detection.not_assessable_sections()],
+        "estimated_force": _force_as_json(force) if force else None,
+        "notes": list(detection.statistic.notes),
+        "findings": _findings(found),
+    }
+
+
+def _findings(found: Detected) -> list[str]:
+    read, of_log = (
+        map(str, found.recording.findings),
+        (item.reason for item in found.findings if item.severity == "warning"),
+    )
+    return list(dict.fromkeys([*read, *of_log]))
+
+
+def _force_as_json(force: ForceSummary) -> dict[str, Any]:
+    figures = {"at_alarm_n": force.at_alarm, "largest_n": force.largest, "largest_at_s": force.largest_at}
+    known = {name: value if math.isfinite(value) else None for name, value in figures.items()}
+    return {"link": force.contact.link, "point_m": list(force.contact.point), **known}

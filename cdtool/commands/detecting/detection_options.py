@@ -1,0 +1,108 @@
+"""Settings to run one detector over a log, used by `cdtool.detect` and `cdtool.explain`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cdtool.alarms.activation import ActivationSettings
+from cdtool.base.errors import UsageError
+from cdtool.commands.judging.scoring_rules import ScoringRules
+from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.recordings.log_section import LogSection
+from cdtool.recordings.operations import RunCut
+
+if TYPE_CHECKING:
+    from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
+    from cdtool.commands.learning.learning import Learned
+    from cdtool.detectors.base import Detector
+    from cdtool.formats.signature_file import SignatureFile
+
+
+@dataclass(frozen=True)
+class DetectionOptions:
+    """The machine and the threshold, or a benchmark file that contains them and every other setting.
+
+    Parameters
+    ----------
+    machine : str, Path or MachineFile, optional
+        The machine file; not with `benchmark`.
+    benchmark : str, Path or PreparedBenchmark, optional
+        A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors, and
+        `signature`, which replaces its threshold.
+    signature : str, Path, Learned or SignatureFile, optional
+        A signature file or what was learned, which contains detector, threshold and activation.
+    detector : str or Detector, optional
+        Name or short name of the detector, or a detector of your own; needed with `limit` or `warm_up`.
+    limit : sequence of float, optional
+        Limit |i| < limit in the signal's unit, one number or one per joint, in place of a signature.
+    warm_up : float, optional
+        Limits from the run's own first seconds in motion (threshold `baseline`), this long [s], in place of a
+        signature.
+    joints : sequence of str, optional
+        With `limit` or `warm_up`, the joints to monitor; all by default. A signature monitors those that it was learned
+        for.
+    section : LogSection, optional
+        The part of the log that is used; the whole log by default.
+    operations : str, optional
+        How the log is cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
+        clock-reset.
+    activation : ActivationSettings, optional
+        Settings of the activation that replace those of the signature, or the default: debounce [samples], rearm [s],
+        hysteresis [share], latch.
+    rules : ScoringRules, optional
+        The onset rule of contacts, and how long after it an alarm belongs to a contact.
+    """
+
+    machine: str | Path | MachineFile | None = None
+    _: KW_ONLY
+    benchmark: str | Path | PreparedBenchmark | None = None
+    signature: str | Path | Learned | SignatureFile | None = None
+    detector: str | Detector | None = None
+    limit: Sequence[float] = ()
+    warm_up: float | None = None
+    joints: Sequence[str] = ()
+    section: LogSection = field(default_factory=LogSection)
+    operations: str = "whole"
+    activation: ActivationSettings | None = None
+    rules: ScoringRules | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a limit that is a number and not a list."""
+        if isinstance(self.limit, int | float):
+            raise UsageError(f"limit is {self.limit}, not a list", f"give limit=[{self.limit}], or one per joint")
+
+    def prepared(self) -> PreparedBenchmark | None:
+        """Return the benchmark, read and learned, or None; raises UsageError for settings combined with it."""
+        if self.benchmark is None:
+            return None
+        own_threshold = self.limit or self.warm_up is not None
+        cut = self.section or self.operations != "whole"
+        by_hand = own_threshold or cut or self.joints or self.activation or self.rules
+        if self.machine is not None or by_hand:
+            raise UsageError("settings cannot be combined with a benchmark file", "set them in the benchmark file")
+        if not isinstance(self.benchmark, str | Path):
+            return self.benchmark
+        from cdtool.commands.detecting.prepared_detector import prepare_benchmark
+
+        if not isinstance(self.detector, str | None):
+            raise UsageError("a benchmark file names its detectors", "give the name of one of them")
+        return prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether the log is cut into runs; a benchmark file must have been read."""
+        benchmark = self.benchmark
+        if benchmark is not None and not isinstance(benchmark, str | Path):
+            return benchmark.setup.has_runs
+        return RunCut.of(self.operations) is not None
+
+    def machine_file(self) -> MachineFile:
+        """Return the machine file, read; raises UsageError if none is given."""
+        if self.benchmark is not None and not isinstance(self.benchmark, str | Path):
+            return self.benchmark.setup.machine_file
+        if self.machine is None:
+            raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")
+        return self.machine if isinstance(self.machine, MachineFile) else read_machine_file(self.machine)

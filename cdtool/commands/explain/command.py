@@ -1,0 +1,259 @@
+"""`cdtool explain`: the command, and its output on screen and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cdtool.base.log_names import log_stem
+from cdtool.base.plain_text import counted
+from cdtool.commands.console.console import (
+    leave,
+    number,
+    plain,
+    print_json,
+    print_not_assessable,
+    print_skipped,
+    say,
+    table,
+)
+from cdtool.commands.console.log_options import LogOptions
+from cdtool.commands.console.option_groups import with_options
+from cdtool.commands.console.options import ForceOption, JsonOption, figure_name
+from cdtool.commands.console.place import Place, location
+
+if TYPE_CHECKING:
+    from cdtool.commands.explain.explaining import Explained
+    from cdtool.results.explanation.cause import Cause
+    from cdtool.results.explanation.explanation import AlarmExplanation, Explanation, MissExplanation
+    from cdtool.results.explanation.margin import Moment
+
+# Events that are printed and drawn; --json has all.
+_SHOWN = 20
+# Its reason already names the speeds.
+_BLIND = "not_assessable"
+
+
+@with_options
+def explain(
+    log: Annotated[Place, typer.Argument(parser=location, help="Recording to explain.", metavar="LOG")],
+    options: LogOptions,
+    plot: Annotated[
+        Place | None,
+        typer.Option(
+            "--plot",
+            parser=location,
+            help="PNG, SVG or PDF file for the first event, or an existing folder for all events.",
+        ),
+    ] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Explain the cause of each alarm in a log and why each missed contact was missed.
+
+    With --benchmark, all settings and the threshold come from that file; the results match those of `cdtool benchmark`.
+
+    Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
+    """
+    from cdtool.commands.explain.explaining import explain_log_runs
+    from cdtool.commands.judging.runs import lost
+
+    drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
+    settings = options.settings()
+    explained = explain_log_runs(log, settings)
+    prepared = settings.prepared()
+    runs = [(run.found.recording.source if settings.has_runs else str(log), run) for run in explained.runs]
+    skipped = [*(prepared.skipped if prepared else ()), *explained.skipped]
+    skipped += [item for run in explained.runs for item in run.found.not_scored]
+    findings = [*(prepared.losses if prepared else ()), *explained.findings]
+    for run in explained.runs:
+        findings += [*lost(run.found.recording), *run.found.findings]
+    print_skipped(skipped, findings)
+    if as_json:
+        values = [_as_json_value(name, run) for name, run in runs]
+        print_json(values if settings.has_runs else values[0])
+    else:
+        for _, run in runs:
+            _show_explained(run)
+    for path in _draw(explained.runs, drawn, log_stem(log), force=force):
+        if not as_json:
+            typer.echo(f"plot written to {plain(path)}")
+    leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))
+
+
+def _draw(runs: Sequence[Explained], plot: Path | None, stem: str, *, force: bool) -> list[Path]:
+    """Draw the first event into a file, or each event into a folder; return the files written."""
+    if plot is None:
+        return []
+    from cdtool.commands.explain.margin_plot import plot_explanation
+
+    events = [event for run in runs for event in run.events][: _SHOWN if plot.is_dir() else 1]
+    paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
+    paths = [figure_name(path, force=force) for path in paths]
+    for (detection, item), path in zip(events, paths, strict=True):
+        plot_explanation(detection, item, path)
+    return paths
+
+
+def _show_explained(explained: Explained) -> None:
+    """Print every event of a log, and the operations without one."""
+    shown = explained.events[:_SHOWN]
+    for _, item in shown:
+        _show_event(item)
+    if len(explained.events) > len(shown):
+        typer.echo(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
+    elsewhere = [item for item in explained.found.detections if item.other_speed and item.verdict.outcome != _BLIND]
+    for detection in elsewhere[:_SHOWN]:
+        say(f"{detection.operation.name}, not assessable at another speed: {detection.other_speed}")
+    pairs = zip(explained.found.detections, explained.explanations, strict=True)
+    quiet = [detection for detection, events in pairs if not events]
+    for detection in quiet[:_SHOWN]:
+        why = detection.verdict.reason or "no alarm and no missed contact"
+        say(f"{detection.operation.name}, {detection.detector}: {why}")
+    if len(quiet) > _SHOWN:
+        typer.echo(f"and {counted(len(quiet) - _SHOWN, 'more operation')} without an event")
+
+
+def _show_event(item: Explanation) -> None:
+    """Print the headline, the sentences, and the margin over time."""
+    from cdtool.results.explanation.explanation import AlarmExplanation
+    from cdtool.results.explanation.words import words
+
+    headline, *sentences = words(item)
+    say(f"{item.operation}, {item.detector}: {headline}")
+    for sentence in sentences:
+        say(sentence, indent="  ")
+    # Without an onset or an alarm to count from, one column stays empty and is dropped.
+    alarm = item.alarm.time if isinstance(item, AlarmExplanation) else None
+    rows = [
+        (
+            f"{1e3 * (moment.time - item.contact.start):.0f}" if item.contact else "",
+            f"{1e3 * (moment.time - alarm):.0f}" if alarm is not None else "",
+            number(moment.statistic, 4),
+            number(moment.limit, 4),
+            number(moment.margin, 4),
+            f"{100.0 * moment.share:.0f}" if math.isfinite(moment.share) else "-",
+            moment.reason,
+        )
+        for moment in item.moments
+    ]
+    if rows:
+        heads = ("from onset\nms", "to alarm\nms", f"signal\n{item.unit}", "limit\n", "margin\n", "of limit\n%")
+        table([*((head, "right") for head in heads), ("", "left")], rows)
+    typer.echo()
+
+
+def _as_json_value(log: str, explained: Explained) -> dict[str, Any]:
+    """Return the same as JSON values."""
+    from cdtool.commands.console.contact_rows import contact_as_json
+    from cdtool.results.explanation.explanation import AlarmExplanation
+
+    items = [item for _, item in explained.events]
+    return {
+        "log": log,
+        "verdicts": [
+            {"operation": item.operation.name, "verdict": item.verdict.outcome, "reason": item.verdict.reason or None}
+            for item in explained.found.detections
+        ],
+        "contacts": [
+            contact_as_json(detection, row)
+            for detection, rows in zip(explained.found.detections, explained.found.contact_rows, strict=True)
+            for row in rows
+        ],
+        "alarms": [_alarm_as_json(item) for item in items if isinstance(item, AlarmExplanation)],
+        "missed": [_miss_as_json(item) for item in items if not isinstance(item, AlarmExplanation)],
+    }
+
+
+def _alarm_as_json(item: AlarmExplanation) -> dict[str, Any]:
+    return {
+        **_common(item),
+        "role": item.role,
+        "time_s": item.alarm.time,
+        "side": item.alarm.side,
+        "statistic": item.alarm.statistic,
+        "limit": item.alarm.limit,
+        "onset_s": item.contact.start if item.contact else None,
+        "left_band_s": item.left,
+        "missing_samples_skipped": item.skipped,
+        "likely_cause": _cause_as_json(item.cause),
+    }
+
+
+def _cause_as_json(cause: Cause) -> dict[str, Any]:
+    return {
+        "kind": str(cause.kind),
+        "shifts": [asdict(shift) for shift in cause.shifts],
+        "transient": asdict(cause.transient) if cause.transient else None,
+        "lost": asdict(cause.loss) if cause.loss else None,
+    }
+
+
+def _miss_as_json(item: MissExplanation) -> dict[str, Any]:
+    return {
+        **_common(item),
+        "outcome": item.outcome,
+        "reason": item.reason or None,
+        "onset_s": item.contact.start,
+        "watched_ms": 1e3 * item.watched,
+        "not_judged": dict(item.not_judged),
+        "joints": [
+            {
+                "joint": found.joint,
+                "nearest": _moment_as_json(found.nearest),
+                "longest_outside_samples": found.longest,
+                "longest_outside_from_s": found.outside_from,
+                "held_share_of_limit": found.held,
+                "outside_before_contact_from_s": found.latched_from,
+            }
+            for found in item.approaches
+        ],
+    }
+
+
+def _common(item: Explanation) -> dict[str, Any]:
+    from cdtool.results.explanation.words import words
+
+    return {
+        "operation": item.operation,
+        "detector": item.detector,
+        "joint": item.joint,
+        "unit": item.unit,
+        "debounce_samples": item.debounce,
+        "words": words(item),
+        "detector_reads": list(item.inputs),
+        "compared_with_runs": item.runs,
+        "not_compared_because": str(item.absent) if item.absent else None,
+        "moved": [
+            {
+                "channel": found.channel,
+                "joint": found.joint,
+                "time_s": found.time,
+                "direction": found.direction or None,
+                "reason": found.reason or None,
+                "unit": found.unit or None,
+                "value": found.value,
+                "normal_mean": found.mean,
+                "normal_spread": found.spread,
+                "brief": found.brief,
+            }
+            for found in item.moved
+        ],
+        "margins": [_moment_as_json(moment) for moment in item.moments],
+    }
+
+
+def _moment_as_json(moment: Moment) -> dict[str, Any]:
+    return {
+        "time_s": moment.time,
+        "statistic": moment.statistic,
+        "limit": moment.limit,
+        "margin": moment.margin,
+        "share_of_limit": moment.share,
+        "reason": moment.reason or None,
+    }

@@ -1,0 +1,551 @@
+"""Linear regression of the force in the filtered inverse-dynamics form, with standard errors for coloured residuals.
+
+The equation F = M a + friction is not evaluated sample by sample: each side goes through the same low-pass w with a
+finite impulse response. The derivatives fall on the low-pass, w * x'' = w'' * x, so that the position is never
+differentiated and the filters cancel. A missing sample spoils only the equations within reach of the response.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.commands.identify.estimate import IdentificationError
+from cdtool.machines.axis_model.axis_run import AxisRun
+
+IntArray = npt.NDArray[np.int64]
+
+# The low-pass is a moving average applied this many times: a B-spline, whose second derivative is still continuous.
+_AVERAGES = 4
+# Its corner (-3 dB) times the length of one average [-].
+_CORNER = 0.2256
+# A fourth difference of white noise has the variance 70 times that of the noise.
+_FOURTH_DIFFERENCE = math.sqrt(70.0)
+# The largest share of the largest differences that is motion rather than noise.
+_MOTION_SHARE = 0.05
+# Samples in which the noise is about the same.
+_NOISE_BLOCK = 400
+# A reference with fewer samples than this share of the run's is not used.
+_KNOWN_SHARE = 0.5
+# Rounding of a channel relative to its largest value [-].
+_ROUNDING = 1e-12
+# The sign of a speed is unknown below this share of the usual highest speed and this many standard deviations of its
+# noise.
+_UNKNOWN_SHARE, _UNKNOWN_DEVIATIONS = 0.005, 4.0
+# Noise hides the motion where the sign is unknown up to this share of the usual highest speed.
+_HIDDEN_SHARE = 0.5
+# A travel is motion if it is this many times what the noise alone can look like.
+_TRAVEL_SEEN = 3.0
+# An equation is used if at most this share of its weight falls on samples whose sign of speed is unknown.
+_UNKNOWN_WEIGHT = 0.1
+# A stroke whose highest speed is below this share of the usual highest speed is an oscillation at rest.
+_STROKE_SHARE = 0.1
+# From rest to this share of the stroke's highest speed, and back, a drive winds up and sticks: motor and load do not
+# move as one.
+_START_UP_SHARE = 0.15
+# Regressors with a larger condition number depend on each other.
+_DEPENDENT = 1e7
+# A block without which fewer than this share of an excitation remains cannot be left out.
+_LEAST_REMAINING = 1e-6
+# A coefficient takes part in a combination that is lost if its share is above this [-].
+_INVOLVED = 1e-3
+# Iterations of the robust weights, and the change relative to the force at which they stop.
+_ITERATIONS, _SAME = 30, 1e-6
+
+
+class Loss(Enum):
+    """The loss of a residual r in units of the scatter: how much an outlier counts."""
+
+    SQUARES = "squares"
+    HUBER = "Huber"
+    SOFT_L1 = "soft L1"
+
+
+class LagForm(Enum):
+    """How a channel lags: through a first-order low-pass, or by a pure delay."""
+
+    LOW_PASS = "low-pass"
+    DELAY = "delay"
+
+
+@dataclass(frozen=True)
+class TorqueLag:
+    """The lag of the logged torque behind the true one [s]; 0 for none."""
+
+    time: float = 0.0
+    form: LagForm = LagForm.LOW_PASS
+
+
+NO_LAG = TorqueLag()
+
+
+class LowPass:
+    """A symmetric low-pass of finite length, with the derivatives of the signal, on one uniform clock.
+
+    `corner` [Hz] (-3 dB) is lowered where the clock with `period` [s] is too slow for it: `corner_hz` has the real one.
+    """
+
+    def __init__(self, corner: float, period: float) -> None:
+        if not 0.0 < corner < math.inf:
+            raise UsageError(f"low-pass of {corner:g} Hz", "give a frequency above 0")
+        self.steps = max(round(_CORNER / (corner * period)), 2)
+        self.period = period
+        self.corner_hz = _CORNER / (self.steps * period)
+        average = _integral(self.steps) / self.steps
+        difference = np.zeros(self.steps + 1)
+        difference[[0, -1]] = np.array([1.0, -1.0]) / (self.steps * period)
+        twice = np.convolve(average, average)
+        self._weights = np.convolve(twice, twice)
+        self._slope = np.convolve(np.convolve(twice, average), difference)
+        self._curvature = np.convolve(twice, np.convolve(difference, difference))
+
+    @property
+    def reach(self) -> int:
+        """Return how many samples to either side an output depends on."""
+        return _AVERAGES * self.steps // 2
+
+    def value(self, signal: FloatArray) -> FloatArray:
+        """Return the low-passed signal (n,); NaN where a sample within reach is missing."""
+        return _convolved(signal, self._weights)
+
+    def slope(self, signal: FloatArray) -> FloatArray:
+        """Return the low-passed first derivative (n,) [1/s]; NaN as in `value`."""
+        return _convolved(signal, self._slope)
+
+    def curvature(self, signal: FloatArray) -> FloatArray:
+        """Return the low-passed second derivative (n,) [1/s2]; NaN as in `value`."""
+        return _convolved(signal, self._curvature)
+
+    def slope_noise(self, noise: float) -> float:
+        """Return the standard deviation of `slope` for white noise of that standard deviation."""
+        return noise * float(np.linalg.norm(self._slope))
+
+    def curvature_noise(self, noise: float) -> float:
+        """Return the standard deviation of `curvature` for white noise of that standard deviation."""
+        return noise * float(np.linalg.norm(self._curvature))
+
+
+def _integral(steps: int) -> FloatArray:
+    """Return the weights (steps + 1,) of an integral over samples, in steps, exact for cubic signals.
+
+    A difference of the position is the exact integral of the speed: that of the force must be as exact. Simpson's rule
+    for 2 steps, else Gregory's.
+    """
+    if steps == 2:
+        return np.array([1.0, 4.0, 1.0]) / 3.0
+    weights = np.ones(steps + 1)
+    weights[[0, -1]], weights[[1, -2]] = 5.0 / 12.0, 13.0 / 12.0
+    return weights
+
+
+def _convolved(signal: FloatArray, weights: FloatArray) -> FloatArray:
+    result = np.full(len(signal), np.nan)
+    if len(signal) >= len(weights):
+        reach = len(weights) // 2
+        result[reach : len(signal) - reach] = np.convolve(signal, weights, mode="valid")
+    return result
+
+
+def shifted(signal: FloatArray, samples: float) -> FloatArray:
+    """Return the signal (n,) that many samples, or parts of one, earlier; NaN where it is not known."""
+    before = math.floor(samples)
+    share = samples - before
+    index = np.arange(len(signal)) + before
+    first = np.where((index >= 0) & (index < len(signal)), signal[np.clip(index, 0, len(signal) - 1)], np.nan)
+    if share == 0.0:
+        return np.asarray(first, dtype=np.float64)
+    index += 1
+    after = np.where((index >= 0) & (index < len(signal)), signal[np.clip(index, 0, len(signal) - 1)], np.nan)
+    return np.asarray((1.0 - share) * first + share * after, dtype=np.float64)
+
+
+def white_noise(signal: FloatArray) -> float:
+    """Return the standard deviation of the white noise of a smooth signal, from its fourth differences.
+
+    It is the root mean square over blocks of the signal: noise may grow with the speed, as that of a jittered clock
+    does. In each block the largest differences are left out: they may be motion. Samples at rest, which repeat each
+    other, do not count: an encoder is only noisy while it moves. Every second sample counts too, since samples that are
+    interpolated between those of a jittered clock share their noise with the next one. 0 with fewer than 10 samples.
+    Noise that was filtered before it was logged is underestimated.
+    """
+    return max(_noise_of(signal), _noise_of(signal[::2]))
+
+
+def _noise_of(signal: FloatArray) -> float:
+    if len(signal) < 10:
+        return 0.0
+    steps = np.diff(signal)
+    repeats = (steps[3:] == 0.0) & (steps[2:-1] == 0.0) & (steps[1:-2] == 0.0) & (steps[:-3] == 0.0)
+    differences = np.abs(np.diff(signal, 4))
+    differences = differences[np.isfinite(differences) & ~repeats]
+    if len(differences) < 6:
+        return 0.0
+    blocks = np.array_split(differences, max(len(differences) // _NOISE_BLOCK, 1))
+    variances = [_trimmed_mean_square(block) for block in blocks]
+    lengths = [len(block) for block in blocks]
+    return math.sqrt(float(np.average(variances, weights=lengths))) / _FOURTH_DIFFERENCE
+
+
+def _trimmed_mean_square(differences: FloatArray) -> float:
+    kept = np.sort(differences)[: max(int((1.0 - _MOTION_SHARE) * len(differences)), 1)]
+    # Without its largest 5 % the square of a normal variable has 0.759 of its mean.
+    return float(np.mean(kept**2)) / 0.759
+
+
+@dataclass(frozen=True, eq=False)
+class FilteredRun:
+    """A run's channels through one low-pass; all arrays (n,) on the run's clock, NaN where they are unknown.
+
+    `inner_speed` is the speed from a low-pass of half the length: friction is a function of it, before the low-pass.
+    `reference_speed` and `reference_acceleration` are filtered like the measured ones; None without a reference.
+    `inner_reference_speed` likewise. `unknown_speed` [m/s, rad/s]: below it the sign of the speed is unknown.
+    `position` is the measured one, or the integral of the speed. `force_slope`: the derivative of `force` [N/s, N m/s].
+    """
+
+    run: AxisRun
+    low_pass: LowPass
+    force: FloatArray
+    force_slope: FloatArray
+    acceleration: FloatArray
+    speed: FloatArray
+    position: FloatArray
+    inner_speed: FloatArray
+    reference_acceleration: FloatArray | None
+    reference_speed: FloatArray | None
+    inner_reference_speed: FloatArray | None
+    acceleration_noise: float
+    unknown_speed: float = 0.0
+
+    __repr__ = short_repr
+
+    @cached_property
+    def sign(self) -> FloatArray:
+        """Return the sign of the inner speed (n,), straight through the speeds at which it is unknown."""
+        if self.unknown_speed <= 0.0:
+            return np.sign(self.inner_speed)
+        return np.clip(self.inner_speed / self.unknown_speed, -1.0, 1.0)
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether the axis moves, but the noise of its speed hides in which direction."""
+        known = self.position[np.isfinite(self.position)]
+        travel = float(np.ptp(known)) if len(known) else 0.0
+        seen_as_rest = self.unknown_speed * self.low_pass.reach * self.run.period
+        is_moving = travel > _TRAVEL_SEEN * seen_as_rest
+        return is_moving and self.unknown_speed >= _HIDDEN_SHARE * _usual_highest(self.inner_speed)
+
+    @cached_property
+    def reference_sign(self) -> FloatArray | None:
+        """Return the sign of the reference speed (n,), as `sign`; None without a reference."""
+        if self.inner_reference_speed is None:
+            return None
+        return np.clip(self.inner_reference_speed / max(self.unknown_speed, 1e-12), -1.0, 1.0)
+
+    @cached_property
+    def complete(self) -> npt.NDArray[np.bool_]:
+        """Return where force, speed, acceleration and the sign of the speed within reach are known or zero (n,)."""
+        reached = self.low_pass.value(self.inner_speed)
+        return np.isfinite(self.force + self.speed + self.acceleration + reached)
+
+    @cached_property
+    def moving(self) -> npt.NDArray[np.bool_]:
+        """Return where the run is complete and the axis moves almost all the time within reach (n,)."""
+        unknown = np.where(np.isnan(self.inner_speed), np.nan, np.abs(self.inner_speed) < self.unknown_speed)
+        weight = self.low_pass.value(unknown)
+        moving: npt.NDArray[np.bool_] = np.nan_to_num(weight, nan=1.0) <= _UNKNOWN_WEIGHT
+        return moving & self.complete & (self.stroke >= 0)
+
+    @cached_property
+    def usable(self) -> npt.NDArray[np.bool_]:
+        """Return where the equation can be used (n,): moving, without starts from rest and stops.
+
+        These last up to 15 % of the stroke's highest speed.
+        """
+        usable = self.moving.copy()
+        for first, last, after_rest, before_rest in self._stroke_ends:
+            fast = first + np.flatnonzero(self._start_up_over(first, last))
+            if after_rest:
+                usable[first : fast[0]] = False
+            if before_rest:
+                usable[fast[-1] + 1 : last + 1] = False
+        return usable
+
+    def _start_up_over(self, first: int, last: int) -> npt.NDArray[np.bool_]:
+        speed = np.nan_to_num(np.abs(self.inner_speed[first : last + 1]))
+        over: npt.NDArray[np.bool_] = speed >= _START_UP_SHARE * np.max(speed)
+        return over
+
+    @cached_property
+    def _stroke_ends(self) -> list[tuple[int, int, bool, bool]]:
+        """Return first and last sample of each stroke, and whether it starts from and ends in rest."""
+        reach = self.low_pass.reach
+        is_rest = np.abs(self.inner_speed) < self.unknown_speed
+        ends = []
+        for number in range(int(self.stroke.max(initial=-1)) + 1):
+            inside = np.flatnonzero(self.stroke == number)
+            first, last = int(inside[0]), int(inside[-1])
+            before, after = is_rest[max(first - reach, 0) : first], is_rest[last + 1 : last + 1 + reach]
+            ends.append((first, last, _is_rest(before, reach), _is_rest(after, reach)))
+        return ends
+
+    @cached_property
+    def stroke(self) -> IntArray:
+        """Return the number of the stroke of each sample (n,), counted from 0; -1 at rest and where it is unknown.
+
+        A stroke ends where the axis reverses or rests, or where samples are missing.
+        """
+        direction = np.where(np.abs(self.inner_speed) >= self.unknown_speed, np.sign(self.inner_speed), 0.0)
+        direction[np.isnan(self.inner_speed)] = 0.0
+        moving = np.flatnonzero(direction != 0.0)
+        number = np.full(len(direction), -1, dtype=np.int64)
+        if not len(moving):
+            return number
+        rests = np.diff(moving) > self.low_pass.reach
+        turns = np.diff(direction[moving]) != 0.0
+        stroke = np.concatenate(([0], np.cumsum(rests | turns)))
+        highest = np.zeros(stroke[-1] + 1)
+        np.maximum.at(highest, stroke, np.abs(self.inner_speed[moving]))
+        is_stroke = highest >= _STROKE_SHARE * _usual_highest(self.inner_speed)
+        number[moving] = np.where(is_stroke, np.cumsum(is_stroke) - 1, -1)[stroke]
+        return number
+
+
+def _is_rest(near: npt.NDArray[np.bool_], reach: int) -> bool:
+    """Whether the axis rests in all of the samples next to a stroke, and there are enough of them."""
+    return len(near) == reach and bool(np.all(near))
+
+
+def _usual_highest(speed: FloatArray) -> float:
+    """Return the 95 % quantile of |speed|; 0 without any."""
+    known = np.abs(speed[np.isfinite(speed)])
+    return float(np.quantile(known, 0.95)) if len(known) else 0.0
+
+
+def filter_run(
+    run: AxisRun, corner: float, unknown_speed: float | None = None, torque_lag: TorqueLag = NO_LAG
+) -> FilteredRun:
+    """Return a run's channels through a low-pass of `corner` [Hz].
+
+    Speed and acceleration come from the measured position, or from the speed if the position is missing or is
+    its integral. `unknown_speed` [m/s, rad/s]: below it the sign is unknown; by default 0.5 % of the usual highest
+    speed, or 4 standard deviations of the speed's noise. `torque_lag` is undone: F + lag F' for a low-pass, a shift
+    for a delay. Raises RecordingError without position and speed.
+    """
+    low_pass, inner = LowPass(corner, run.period), LowPass(2.0 * corner, run.period)
+    by_position = run.position is not None and ("position" not in run.derived or run.speed is None)
+    if by_position and run.position is not None:
+        source = run.position
+        speed, acceleration, inner_speed = low_pass.slope(source), low_pass.curvature(source), inner.slope(source)
+        noise = white_noise(source)
+        speed_noise, acceleration_noise = inner.slope_noise(noise), low_pass.curvature_noise(noise)
+    elif run.speed is not None:
+        source = run.speed
+        speed, acceleration, inner_speed = low_pass.value(source), low_pass.slope(source), inner.value(source)
+        noise = white_noise(source)
+        speed_noise, acceleration_noise = noise / math.sqrt(inner.steps), low_pass.slope_noise(noise)
+    else:
+        raise IdentificationError(f"{run.name}: no speed or position", "map one of them in [channels]")
+    if unknown_speed is None:
+        rounding = _ROUNDING * float(np.max(np.abs(source[np.isfinite(source)]), initial=0.0))
+        speed_noise += inner.slope_noise(rounding) if by_position else rounding
+        unknown_speed = max(_UNKNOWN_SHARE * _usual_highest(inner_speed), _UNKNOWN_DEVIATIONS * speed_noise)
+    reference = _filtered_reference(run, low_pass, inner)
+    position = run.position
+    if position is None:
+        position = np.cumsum(np.nan_to_num(source)) * run.period
+    force, slope, curvature = low_pass.value(run.torque), low_pass.slope(run.torque), low_pass.curvature(run.torque)
+    if torque_lag.form is LagForm.LOW_PASS:
+        force, slope = force + torque_lag.time * slope, slope + torque_lag.time * curvature
+    else:
+        force, slope = (shifted(item, torque_lag.time / run.period) for item in (force, slope))
+    return FilteredRun(
+        run,
+        low_pass,
+        force,
+        slope,
+        acceleration,
+        speed,
+        low_pass.value(position),
+        inner_speed,
+        *reference,
+        acceleration_noise,
+        unknown_speed,
+    )
+
+
+def _filtered_reference(
+    run: AxisRun, low_pass: LowPass, inner: LowPass
+) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
+    """Return acceleration, speed and inner speed of the reference; the position reference, if logged, comes first."""
+    position, speed = run.reference_position, run.reference_speed
+    if position is not None and "reference_position" not in run.derived and _is_mostly_known(position):
+        return low_pass.curvature(position), low_pass.slope(position), inner.slope(position)
+    if speed is not None and "reference_speed" not in run.derived and _is_mostly_known(speed):
+        return low_pass.slope(speed), low_pass.value(speed), inner.value(speed)
+    return None, None, None
+
+
+def _is_mostly_known(reference: FloatArray) -> bool:
+    return bool(np.isfinite(reference).mean() > _KNOWN_SHARE)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """Coefficients (p,) of a linear regression, with the weights and residuals (m,) of its equations.
+
+    `condition_number`: of the regressors (m, p) scaled to unit length (least squares), or of the equally scaled product
+    of instruments (m, p) and regressors.
+    """
+
+    coefficients: FloatArray
+    weights: FloatArray
+    residuals: FloatArray
+    condition_number: float
+    regressors: FloatArray = field(repr=False)
+    instruments: FloatArray = field(repr=False)
+
+    __repr__ = short_repr
+
+    @cached_property
+    def influence(self) -> FloatArray:
+        """Return (p, m) of coefficients = influence @ force, for the weights as they are."""
+        scale = _lengths(self.regressors)
+        weighted = (self.instruments * self.weights[:, None]).T
+        influence: FloatArray = np.linalg.solve(weighted @ (self.regressors / scale), weighted) / scale[:, None]
+        return influence
+
+
+def fit_linear(
+    regressors: FloatArray, force: FloatArray, instruments: FloatArray | None = None, loss: Loss = Loss.SQUARES
+) -> LinearFit:
+    """Fit force = regressors @ coefficients by least squares, or by instrumental variables.
+
+    Parameters
+    ----------
+    regressors : ndarray, shape (m, p)
+        One equation per row.
+    force : ndarray, shape (m,)
+        In N or N m.
+    instruments : ndarray, shape (m, p), optional
+        Correlated with the regressors, not with the noise. A controller feeds the noise back into the motion, so that
+        regressors from measurements are correlated with it, and those from references are not.
+    loss : Loss
+        Anything but SQUARES gives outliers less weight (iterated; the scale is 1.4826 times the median of |residual|).
+
+    Returns
+    -------
+    LinearFit
+
+    Raises
+    ------
+    IdentificationError
+        Fewer equations than coefficients, or regressors that depend on each other.
+
+    Notes
+    -----
+    Soderstrom and Stoica, "System Identification", 1989, chapter 8: Z' W (F - X c) = 0 with the instruments Z, for
+    least squares Z = X. W are the weights of iteratively re-weighted least squares (Holland and Welsch, 1977).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> regressors = np.column_stack((np.arange(4.0), np.ones(4)))
+    >>> fit_linear(regressors, np.array([1.0, 3.0, 5.0, 7.0])).coefficients.round(6).tolist()
+    [2.0, 1.0]
+    """
+    count, unknowns = regressors.shape
+    if count < max(unknowns, 1):
+        raise IdentificationError(
+            f"{count} equations for {unknowns} parameters", "the recordings need more motion at known speed"
+        )
+    scale = _lengths(regressors)
+    scaled = regressors / scale
+    given = scaled if instruments is None else instruments / _lengths(instruments)
+    weights = np.ones(count)
+    condition = _condition(given.T @ scaled, instruments is None)
+    if not condition < _DEPENDENT:
+        raise IdentificationError(
+            f"the regressors depend on each other (condition number {condition:.3g})",
+            "the recordings need more varied motion",
+        )
+    coefficients = _solved(scaled, force, given, weights)
+    for _ in range(_ITERATIONS if loss is not Loss.SQUARES else 0):
+        weights = _robust_weights(force - scaled @ coefficients, force, loss)
+        before = coefficients
+        coefficients = _solved(scaled, force, given, weights)
+        if np.max(np.abs(coefficients - before)) <= _SAME * np.max(np.abs(coefficients)):
+            break
+    residuals = force - scaled @ coefficients
+    return LinearFit(coefficients / scale, weights, residuals, condition, regressors, given)
+
+
+def _condition(product: FloatArray, is_square_of_regressors: bool) -> float:
+    """Return the condition number of the regressors from their Gram matrix, or that of a product with instruments."""
+    strengths = np.linalg.svd(product, compute_uv=False)
+    ratio = float(strengths[0] / strengths[-1]) if strengths[-1] > 0.0 else math.inf
+    return math.sqrt(ratio) if is_square_of_regressors else ratio
+
+
+def _lengths(columns: FloatArray) -> FloatArray:
+    lengths = np.asarray(np.sqrt(np.einsum("ij,ij->j", columns, columns)), dtype=np.float64)
+    lengths[lengths == 0.0] = 1.0
+    return lengths
+
+
+def _solved(regressors: FloatArray, force: FloatArray, instruments: FloatArray, weights: FloatArray) -> FloatArray:
+    weighted = (instruments * weights[:, None]).T
+    return np.asarray(np.linalg.solve(weighted @ regressors, weighted @ force), dtype=np.float64)
+
+
+def _robust_weights(residuals: FloatArray, force: FloatArray, loss: Loss) -> FloatArray:
+    """Return rho'(u) / u of each residual, u in units of 1.345 times the scatter (Huber's 95 % efficiency)."""
+    # No sensor resolves 1e-9 of its range: less scatter is rounding, which must not choose weights.
+    scatter = max(1.4826 * float(np.median(np.abs(residuals))), 1e-9 * float(np.max(np.abs(force)))) or 1.0
+    ratio = np.abs(residuals) / (1.345 * scatter)
+    if loss is Loss.HUBER:
+        return 1.0 / np.maximum(ratio, 1.0)
+    weights: FloatArray = 1.0 / np.sqrt(1.0 + ratio**2)
+    return weights
+
+
+def block_covariance(fit: LinearFit, block: IntArray) -> FloatArray:
+    """Return the covariance (p, p) of the coefficients for residuals that are correlated within blocks.
+
+    `block` (m,): the number of the block, such as a stroke, of each equation. It is the jackknife over blocks,
+
+        (G - 1)/G sum over g of (c - c_g)(c - c_g)',   c_g: without block g
+
+    which is exact enough with few blocks, where the plain sandwich estimate is too small (MacKinnon, Nielsen and Webb,
+    "Cluster-robust inference", Journal of Econometrics 232, 2023). What is the same in every block, such as friction
+    over position in equal strokes, is not in it: see `profile_covariance`. NaN with fewer than 2 blocks; the variance
+    of a coefficient that depends on a single block is infinite.
+    """
+    numbers = np.unique(block)
+    unknowns = len(fit.coefficients)
+    if len(numbers) < 2:
+        return np.full((unknowns, unknowns), np.nan)
+    changes = np.empty((len(numbers), unknowns))
+    scale = _lengths(fit.regressors)
+    lost = np.zeros(unknowns, dtype=np.bool_)
+    for row, number in enumerate(numbers):
+        inside = block == number
+        influence = fit.influence[:, inside]
+        # (A - A_g)^-1 u_g with A^-1 A_g = influence @ regressors of the block.
+        remaining = np.eye(unknowns) - (influence @ fit.regressors[inside]) * scale[:, None] / scale
+        left, strength, right = np.linalg.svd(remaining)
+        is_lost = strength < _LEAST_REMAINING
+        lost |= np.any(np.abs(right[is_lost]) > _INVOLVED, axis=0)
+        change = (influence @ fit.residuals[inside]) * scale
+        inverse = np.divide(1.0, strength, out=np.zeros(unknowns), where=~is_lost)
+        changes[row] = (right.T @ (inverse * (left.T @ change))) / scale
+    covariance: FloatArray = (len(numbers) - 1) / len(numbers) * changes.T @ changes
+    covariance[np.diag_indices(unknowns)] = np.where(lost, np.inf, np.diag(covariance))
+    return covariance

@@ -1,0 +1,379 @@
+"""`cdtool identify`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cdtool.base.errors import UsageError, nearest
+from cdtool.base.plain_text import counted, digits
+from cdtool.commands.console import completions
+from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
+from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption, QuietOption
+from cdtool.commands.console.place import Place, location
+
+if TYPE_CHECKING:
+    from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
+    from cdtool.commands.identify.estimate import NotIdentifiable
+    from cdtool.commands.identify.fleet_identification import FleetIdentification
+    from cdtool.commands.identify.identification_outputs import JointEvidence
+    from cdtool.commands.identify.identifying import IdentifiedMachine, JointIdentification
+    from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
+    from cdtool.execution.workers import Workers
+
+_DIVISIONS = ("machine", "day")
+# Error on unseen runs over the difference of equal strokes above which something is not in the model.
+_MUCH_MORE = 3.0
+_DOUBT = (
+    "times what equal strokes differ by: a spring, a lag of the torque or friction along the travel is not in it, and "
+    "its errors may be too small"
+)
+
+
+def identify(
+    logs: Annotated[
+        list[str], typer.Argument(help="Impact-free logs; patterns such as free/*.csv are allowed.", metavar="LOGS...")
+    ],
+    machine: Annotated[
+        Place,
+        typer.Option(
+            "--machine", "-m", parser=location, help="Machine file.", autocompletion=completions.files(".toml")
+        ),
+    ],
+    output: Annotated[
+        list[Place] | None,
+        typer.Option(
+            "--output",
+            "-o",
+            parser=location,
+            help="Output, repeatable: .toml (machine file: the same or a new one), .html, .json. Default: none.",
+        ),
+    ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option("--by", help="machine or day: one identification for each, and what changes; -o .html, .json."),
+    ] = None,
+    loaded_logs: Annotated[
+        list[str] | None,
+        typer.Option("--loaded-logs", help="Of a robot: logs with a known payload, for torque constants; repeatable."),
+    ] = None,
+    payload: Annotated[
+        float | None, typer.Option("--payload", help="With --loaded-logs: mass of the payload [kg].")
+    ] = None,
+    payload_link: Annotated[
+        str | None, typer.Option("--payload-link", help="Link that carries the payload. Default: the last one.")
+    ] = None,
+    payload_centre: Annotated[
+        str | None,
+        typer.Option("--payload-centre", help="Its centre of mass in the link's frame [m]. Default: not known."),
+    ] = None,
+    contacts: Annotated[
+        list[str] | None,
+        typer.Option("--contacts", help="Of an axis: logs of stiff hits on a load cell, for its drive; repeatable."),
+    ] = None,
+    presses: Annotated[
+        list[str] | None,
+        typer.Option("--presses", help="Logs of slow press and release on a load cell, for the torque's scale."),
+    ] = None,
+    lever_arm: Annotated[
+        float | None, typer.Option("--lever-arm", help="Of a rotary axis: distance of the load cell from it [m].")
+    ] = None,
+    force: ForceOption = False,
+    jobs: JobsOption = 1,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify the model of an axis or robot from impact-free logs, with honest standard errors.
+
+    Of an axis: mass, drive, friction and controller; with --contacts its drive beyond the starts, with --presses the
+    scale of its torque. Of a robot: friction, inertias, torque constants.
+    Every change of the machine file is shown; old values remain in its comments.
+
+    Example: cdtool identify 'sample_logs/gate/free/*.csv' -m sample_logs/gate/machine.toml -o machine.toml
+    """
+    from cdtool.commands.identify.files import check_identification_files
+    from cdtool.execution.workers import Workers
+
+    targets = output or []
+    if by is not None and by not in _DIVISIONS:
+        raise UsageError(f"--by is '{by}'", nearest(by, _DIVISIONS))
+    check_identification_files(targets, machine, force=force, of_fleet=by is not None)
+    loaded = _loaded_runs(loaded_logs, payload, payload_link, payload_centre)
+    struck = _contact_logs(contacts or (), presses or (), lever_arm)
+    if loaded is not None and struck is not None:
+        raise UsageError("--loaded-logs with --contacts or --presses", "these are for robots, those for axes")
+    if by is not None and (loaded or struck) is not None:
+        raise UsageError("--by with logs of a payload or of contacts", "identify one machine at a time with them")
+    if by is not None:
+        _identify_fleet(logs, machine, by, targets, Workers(jobs), as_json=as_json, quiet=quiet)
+    else:
+        _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
+
+
+def _loaded_runs(
+    logs: Sequence[str] | None, mass: float | None, link: str | None, centre: str | None
+) -> LoadedRuns | None:
+    """Return the runs with a payload; None without any. Raises UsageError for options that do not belong together."""
+    from cdtool.commands.identify.identifying_robot import LoadedRuns
+
+    if bool(logs) != (mass is not None):
+        raise UsageError("--loaded-logs and --payload belong together", "give both, or neither")
+    if not logs or mass is None:
+        for name, value in (("--payload-link", link), ("--payload-centre", centre)):
+            if value is not None:
+                raise UsageError(f"{name} without --payload", "give --payload and --loaded-logs too")
+        return None
+    if not 0.0 < mass < math.inf:
+        raise UsageError(f"--payload is {mass:g}", "give its mass in kg, above 0")
+    if link == "":
+        raise UsageError("--payload-link is empty", "give the name of a link, or leave the option out")
+    return LoadedRuns(tuple(logs), mass, link or "", _centre(centre))
+
+
+def _contact_logs(contacts: Sequence[str], presses: Sequence[str], lever_arm: float | None) -> ContactLogs | None:
+    """Return the logs with a load cell; None without any. Raises UsageError for a lever arm that does not fit."""
+    from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
+
+    if lever_arm is not None and not 0.0 < lever_arm < math.inf:
+        raise UsageError(f"--lever-arm is {lever_arm:g}", "give it in m, above 0")
+    if not contacts and not presses:
+        if lever_arm is not None:
+            raise UsageError("--lever-arm without --contacts or --presses", "give logs of contacts too")
+        return None
+    return ContactLogs(tuple(contacts), tuple(presses), lever_arm)
+
+
+def _centre(text: str | None) -> tuple[float, float, float] | None:
+    """Return the numbers of --payload-centre, None without it; raises UsageError."""
+    if text is None:
+        return None
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        x = y = z = math.nan
+    if not all(math.isfinite(item) for item in (x, y, z)):
+        raise UsageError(f"--payload-centre is '{text}'", "give three numbers in m separated by commas, as 0,0,0.1")
+    return (x, y, z)
+
+
+def _identify_machine(
+    logs: Sequence[str],
+    machine: Path,
+    targets: Sequence[Path],
+    workers: Workers,
+    other_logs: LoadedRuns | ContactLogs | None,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    from cdtool.commands.identify.files import MACHINE, PAGE, write_identification
+    from cdtool.commands.identify.identification_outputs import evidence_of, identification_summary
+    from cdtool.commands.identify.identifying import identify as run
+    from cdtool.commands.judging.runs import find_logs
+
+    with progress("identifying", quiet=quiet) as advance:
+        done = run(logs, machine, workers=workers, progress=advance, other_logs=other_logs)
+    # The plan of a robot has numbers that only the samples have.
+    needs_samples = done.robot is not None or any(target.suffix.lower() == PAGE for target in targets)
+    evidence = evidence_of(done, logs, machine, workers) if needs_samples else ()
+    written = write_identification(done, evidence, targets, find_logs(logs, Path(), "LOGS"))
+    done = replace(done, written=", ".join(str(path) for path in written if path.suffix.lower() == MACHINE))
+    print_skipped(done.skipped, done.findings)
+    if as_json:
+        print_json(identification_summary(done, evidence, written))
+    else:
+        _show(done, evidence, written, targets, quiet=quiet)
+    leave(done.skipped)
+
+
+def _identify_fleet(
+    logs: Sequence[str],
+    machine: Path,
+    by: str,
+    targets: Sequence[Path],
+    workers: Workers,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    from cdtool.commands.identify.files import write_fleet
+    from cdtool.commands.identify.fleet_identification import Division, identify_fleet
+    from cdtool.commands.judging.runs import find_logs
+
+    with progress("identifying", quiet=quiet) as advance:
+        fleet = identify_fleet(logs, machine, Division(by), workers=workers, progress=advance)
+    write_fleet(fleet, targets, [machine, *find_logs(logs, Path(), "LOGS")])
+    print_skipped(fleet.skipped, fleet.findings)
+    if as_json:
+        print_json(fleet.summary)
+    else:
+        _show_fleet(fleet, targets, quiet=quiet)
+    leave(fleet.skipped)
+
+
+def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path], *, quiet: bool) -> None:
+    rows = [
+        (
+            item.machine,
+            series.name,
+            number(series.values[0], 4),
+            number(series.values[-1], 4),
+            series.unit,
+            number(series.drift.standard_errors),
+        )
+        for item in fleet.machines
+        for series in item.changed
+    ]
+    if rows and not quiet:
+        columns = [("machine", "left"), ("parameter", "left"), ("first", "right"), ("last", "right"), ("unit", "left")]
+        table([*columns, ("change in\nstandard errors", "right")], rows)
+    changed = sum(bool(item.changed) for item in fleet.machines)
+    assessable = sum(any(len(series.periods) > 1 for series in item.series) for item in fleet.machines)
+    typer.echo(
+        f"{counted(len(fleet.machines), 'machine')} identified, {assessable} assessable over time, {changed} changed "
+        f"beyond 3 standard errors"
+    )
+    for target in targets:
+        typer.echo(f"written: {plain(target)}")
+
+
+def _show(
+    done: IdentifiedMachine,
+    evidence: Sequence[JointEvidence],
+    written: Sequence[Path],
+    targets: Sequence[Path],
+    *,
+    quiet: bool,
+) -> None:
+    for joint in done.joints:
+        left = joint.rigid.cross_validation.left_over if joint.rigid and joint.rigid.cross_validation else math.nan
+        if left > _MUCH_MORE:
+            typer.echo(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
+    runs = counted(len(done.runs), "impact-free run")
+    typer.echo(f"{plain(done.machine)}: identified from {runs}")
+    if done.changes and not quiet:
+        _show_changes(done)
+    if done.robot is not None:
+        _show_robot(done, done.robot, evidence, quiet=quiet)
+    else:
+        for joint in done.joints:
+            _show_axis(joint, is_named=len(done.joints) > 1)
+    _show_files(done, written, targets)
+
+
+def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
+    from cdtool.commands.identify.identification_outputs import plan_of
+    from cdtool.commands.identify.words import words_of_plan
+
+    if is_named:
+        typer.echo(f"joint {plain(joint.joint)}")
+    _show_quality(joint)
+    for item in joint.not_identifiable:
+        typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
+    for plan in plan_of(joint):
+        typer.echo(f"plan: {words_of_plan(plan, joint.units[2])}: for {', '.join(plan.keys)}")
+    for method, reason in joint.refused.items():
+        typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
+
+
+def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
+    kinds = {
+        ".toml": "machine file",
+        ".urdf": "URDF with the identified inertias",
+        ".html": "report",
+        ".json": "values",
+    }
+    for path in written:
+        typer.echo(f"written: {plain(path)} ({kinds[path.suffix.lower()]})")
+    for target in targets:
+        if target not in written:
+            typer.echo(f"not written: {plain(target)}: nothing new predicts unseen runs better")
+    if not targets and done.changes:
+        typer.echo("nothing is written: give -o machine.toml")
+
+
+def _show_robot(
+    done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence], *, quiet: bool
+) -> None:
+    """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
+    from cdtool.commands.identify.robot.robot_evidence import decision_of
+    from cdtool.commands.identify.words import words_of_decision
+
+    rows = []
+    for place, (joint, shown) in enumerate(zip(done.joints, evidence, strict=True)):
+        decision = decision_of(done, place)
+        if decision is None or shown.robot is None:
+            continue
+        unit = shown.robot.units[0]
+        errors = [number(item) for item in (decision.torque, decision.before, decision.after, decision.floor)]
+        rows.append([joint.joint, unit, *errors, words_of_decision(decision)])
+    headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
+    columns = [("joint", "left"), ("unit", "left"), *((heading, "right") for heading in headings), ("used", "left")]
+    if not quiet:
+        say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
+        table(columns, rows)
+    for place, shown in enumerate(evidence):
+        _show_robot_joint(done.joints[place], shown)
+    _show_whole_robot(done, robot, evidence)
+
+
+def _show_robot_joint(joint: JointIdentification, shown: JointEvidence) -> None:
+    from cdtool.commands.identify.words import words_of_joint_plan
+
+    name, robot = plain(joint.joint), shown.robot
+    for item in joint.not_identifiable:
+        typer.echo(f"{name}: not identifiable: {item.section}.{item.key}{_needed(item)}")
+    for plan in shown.plan if robot else ():
+        words = words_of_joint_plan(plan, robot.motion, robot.units[1]) if robot else ""
+        typer.echo(f"{name}: plan: {words}: for {', '.join(plan.keys)}")
+    for reason in joint.refused.values():
+        typer.echo(f"{name}: {plain(reason)}")
+
+
+def _show_whole_robot(done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence]) -> None:
+    from cdtool.commands.identify.identification_outputs import robot_plan_of
+    from cdtool.commands.identify.words import words_of_robot
+
+    travel = [item.robot.units[1] if item.robot else "rad" for item in evidence]
+    names = [joint.joint for joint in done.joints]
+    for line in words_of_robot(robot, robot_plan_of(done, evidence), names, travel, len(done.runs)):
+        typer.echo(plain(line))
+
+
+def _show_changes(done: IdentifiedMachine) -> None:
+    rows = [("key", "old", "new", "standard error", "unit")]
+    for change in done.changes:
+        old = "-" if change.old[0] is None else _numbers([item or 0.0 for item in change.old])
+        errors = _numbers([float(f"{item:.2g}") for item in change.standard_errors])
+        rows.append((f"{change.section}.{change.key}", old, _numbers(change.values), errors, change.unit))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        typer.echo("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _numbers(values: Any) -> str:
+    texts = [digits(float(f"{value:.6g}")) if math.isfinite(value) else "-" for value in values]
+    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
+
+
+def _show_quality(joint: JointIdentification) -> None:
+    validation = joint.rigid.cross_validation if joint.rigid else None
+    if validation is not None:
+        best = validation.errors[validation.best]
+        floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
+        moving = f"while moving {number(best.moving)}{floor} ({validation.best.value})"
+        typer.echo(f"force on unseen runs: {number(best.all)} {joint.units[1]} RMS, {moving}")
+    for level in joint.rigid.levels if joint.rigid else ():
+        way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
+        force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
+        typer.echo(f"friction {way} at {speed}: {force}")
+
+
+def _needed(item: NotIdentifiable) -> str:
+    needs = ", ".join(missing.value for missing in item.missing)
+    return f": add {needs}" if needs else ""

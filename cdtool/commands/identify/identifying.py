@@ -1,0 +1,573 @@
+"""`cdtool identify`: parameters of a machine's model from its impact-free logs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
+from cdtool.base.files.bounded_loading import read_text
+from cdtool.base.files.writing import replaced
+from cdtool.base.notebook.same_values import equal_by_values
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.plain_text import counted
+from cdtool.base.remote.remote_path import location
+from cdtool.base.tables import read_toml
+from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
+from cdtool.commands.identify.axis.speed_controller import ControllerFit, ControllerSettings, identify_controller
+from cdtool.commands.identify.axis.torque_constant import TorqueScale
+from cdtool.commands.identify.axis.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
+from cdtool.commands.identify.contact.contact_fit import ContactFit
+from cdtool.commands.identify.contact.identifying_contacts import (
+    ContactLogs,
+    LoadCellLogs,
+    identify_struck,
+    read_contacts,
+    scale_estimates,
+    scaled,
+    torque_scale,
+)
+from cdtool.commands.identify.estimate import Estimate, IdentificationError, Method, NotIdentifiable
+from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification, identify_joints, joint_summary
+from cdtool.commands.identify.machine_update import MachineChange, changes_of, described_runs, robot_files, updated_text
+from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction
+from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
+from cdtool.commands.judging.runs import RunReading, Runs, find_logs, load_runs, several_logs
+from cdtool.commands.judging.scoring_rules import ScoringRules
+from cdtool.commands.judging.true_contacts import any_contacts
+from cdtool.commands.scoring.benchmark_file import GUARD, read_benchmark_file
+from cdtool.execution.workers import Progress, Workers
+from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
+from cdtool.machines.axis_model.model_table import ModelTable, finite_values
+from cdtool.machines.axis_model.parameters import Sensors
+from cdtool.machines.coupled import CoupledMachine
+from cdtool.recordings.recording import Contact, Recording
+from cdtool.results.results import RecordingFinding, Skipped
+from cdtool.truth.onset_rule import OnsetRule
+
+# Reasons that the message of an error lists.
+_MOST_REASONS = 3
+# Constant force above this share of the Coulomb friction that the model of the starts cannot leave out, and the
+# standard errors by which it must be known.
+_MOST_CONSTANT, _SIGNIFICANT = 0.2, 3.0
+_COULOMB = ("coulomb_friction", "coulomb_forward", "coulomb_backward")
+_CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
+
+
+@dataclass(frozen=True, eq=False)
+class JointIdentification:
+    """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
+
+    `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`:
+    of a joint of a robot or planar arm, which has none of the others. `contacts`: what contacts with a load cell add.
+    `torque_scale`: the factor by which all torques were multiplied before; None without presses.
+    """
+
+    joint: str
+    rigid: RigidAxisFit | None = None
+    two_mass: TwoMassFit | None = None
+    controller: ControllerFit | None = None
+    units: tuple[str, str, str, str] = ("kg", "N", "m", "N s/m")
+    has_torque_filter: bool = False
+    refused: Mapping[str, str] = field(default_factory=dict)
+    robot: JointFriction | None = None
+    contacts: ContactFit | None = None
+    torque_scale: TorqueScale | None = None
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Return the estimates that the machine file gets.
+
+        The load's mass is that of the contacts, else that of the elastic drive if there is one, else that of the rigid
+        axis. Friction is rather that of several speeds than that of the starts. Friction of the load that the contacts
+        show to act on the motor is among the values known only together.
+        """
+        found: dict[tuple[str, str], Estimate] = {}
+        for fit in (self.two_mass, self.rigid, self.controller, self.robot, self.contacts):
+            for estimate in fit.identified.estimates if fit else ():
+                if fit is not self.rigid or not (self.two_mass and estimate.key == "load_mass"):
+                    found[estimate.section, estimate.key] = estimate
+        if ("model.controller", "speed_gain") not in found:  # a table without it cannot be read
+            found = {key: item for key, item in found.items() if key[0] != "model.controller"}
+        if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
+            # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
+            found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
+        for item in self.contacts.together if self.contacts else ():
+            found.pop((item.section, item.key), None)
+        return tuple(map(self._with_scale_error, found.values()))
+
+    def _with_scale_error(self, estimate: Estimate) -> Estimate:
+        """Return an estimate whose standard error has that of the torque's scale, on which masses and forces depend."""
+        if self.torque_scale is None or not estimate.unit.startswith(("kg", "N")):
+            return estimate
+        relative = self.torque_scale.standard_error / self.torque_scale.factor
+        return replace(estimate, standard_error=math.hypot(estimate.standard_error, relative * estimate.value))
+
+    @property
+    def together(self) -> tuple[Estimate, ...]:
+        """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
+        of_contacts = self.contacts.together if self.contacts else ()
+        known = {(item.section, item.key) for item in (*self.estimates, *of_contacts)}
+        found: list[Estimate] = [*(self.robot.together if self.robot else ()), *self._friction_of_starts()]
+        found += [*self._of_starts(), *self._of_controller()]
+        if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
+            # The difference of the directions contains the constant force: it must not count twice.
+            found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
+        known |= {(item.section, item.key) for item in self.not_identifiable if not self.robot}
+        return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
+
+    def _friction_of_starts(self) -> list[Estimate]:
+        """Return Coulomb and viscous friction where only their sum is known: without both a model has neither."""
+        units = dict.fromkeys(("coulomb_forward", "coulomb_backward"), self.units[1]) | {"viscous": self.units[3]}
+        found = {item.key for item in self.estimates if item.section == "model.friction"}
+        if not self.two_mass or "load_mass" not in self.two_mass.identified or found & units.keys():
+            return []
+        refused = {item.key for item in self.two_mass.identified.not_identifiable} & units.keys()
+        values = vars(self.two_mass.model.friction)
+        return [_exact("model.friction", key, values[key], units[key]) for key in units if key in refused]
+
+    def _of_starts(self) -> list[Estimate]:
+        """Return what the starts show together with the identified values: how far they go."""
+        if not self.two_mass:
+            return []
+        found, identified, drive = [], self.two_mass.identified, self.contacts.drive if self.contacts else None
+        if drive or "stiffness" in identified:
+            wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
+            found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
+        if "static" in identified:
+            values, unit = vars(self.two_mass.model.friction), f"{self.units[2]}/s"
+            found += [_exact("model.friction", key, values[key], unit) for key in ("stribeck_speed", "smoothing_speed")]
+        return found
+
+    def _of_controller(self) -> list[Estimate]:
+        """Return what is needed to simulate the identified controller."""
+        fit = self.controller
+        if fit is None or fit.controller is None:
+            return []
+        found: list[Estimate] = []
+        for key, value in finite_values(fit.controller).items():
+            if value or key == "speed_filter_order":
+                found.append(_exact("model.controller", key, value, _CONTROLLER_UNITS.get(key, "")))
+        slope = {item.key: item.numbers for item in fit.identified.not_identifiable}.get("slew_limit", {})
+        if slope.get("largest_n_per_s", 0.0) > 0.0:
+            found.append(_exact("model.controller", "observed_slope", slope["largest_n_per_s"], f"{self.units[1]}/s"))
+        if math.isfinite(fit.lag) and fit.lag > 0.0 and not self.has_torque_filter:
+            found.append(_exact("model.sensors", "torque_filter_time", fit.lag, "s"))
+        return found
+
+    @property
+    def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
+        """Return the parameters that no method could identify."""
+        known = {(item.section, item.key) for item in self.estimates}
+        together = (*self._friction_of_starts(), *(self.contacts.together if self.contacts else ()))
+        known |= {(item.section, item.key) for item in together}
+        found: dict[tuple[str, str], NotIdentifiable] = {}
+        for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
+            for item in fit.identified.not_identifiable if fit else ():
+                if (item.section, item.key) not in known:
+                    found.setdefault((item.section, item.key), item)
+        return tuple(found.values())
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedMachine:
+    """The identification of a machine: by joint, the changes of its file, and the text of the updated file.
+
+    `robot`: what belongs to all joints of a robot or planar arm. `source`: the machine file that was read.
+    """
+
+    machine: str
+    joints: tuple[JointIdentification, ...]
+    changes: tuple[MachineChange, ...]
+    text: str
+    runs: tuple[str, ...]
+    skipped: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
+    written: str = ""
+    robot: RobotIdentification | None = None
+    source: Path | None = None
+
+    __repr__ = short_repr
+    __eq__ = equal_by_values
+
+    def files_for(self, target: Path) -> tuple[tuple[Path, str], ...]:
+        """Return the files of an updated machine file `target`, and their texts; none if nothing changes.
+
+        That is the machine file, and for a robot with new inertias its URDF, under a name that does not exist yet.
+        """
+        if not self.changes:
+            return ()
+        if self.source is None or self.robot is None:
+            return ((target, self.text),)
+        return robot_files(self.text, self.robot.urdf, self.source, target)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return everything but the samples as JSON values."""
+        return {
+            "machine": self.machine,
+            "runs": list(self.runs),
+            "changes": [{**asdict(change), "method": change.method.value} for change in self.changes],
+            "joints": [_joint_summary(joint) for joint in self.joints],
+            "skipped": [asdict(item) for item in self.skipped],
+            "findings": [asdict(item) for item in self.findings],
+            "written": self.written or None,
+            "robot": self.robot.summary if self.robot else None,
+        }
+
+
+def identify(
+    logs: Sequence[str | Path],
+    machine: str | Path,
+    output: str | Path | None = None,
+    *,
+    force: bool = False,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+    other_logs: LoadedRuns | ContactLogs | None = None,
+) -> IdentifiedMachine:
+    """Identify the parameters of a machine's model from impact-free logs, and update its machine file.
+
+    Parameters
+    ----------
+    logs : sequence of str or Path
+        Impact-free logs, and logs with a contact that the load cell shows: they are used up to 0.2 s before it. Or one
+        benchmark file: what it learns from is used.
+    machine : str or Path
+        The machine file: the motor's inertia and what is known of the sensors are used.
+    output : str or Path, optional
+        The machine file to write; may be `machine` itself. Every value has its standard error and origin as a
+        comment, and the old value. New inertias of a robot are written as a URDF beside it. A robot of which nothing
+        new predicts unseen runs better is not written.
+    force : bool, optional
+        Overwrite an existing file other than `machine`.
+    workers : Workers, optional
+        How the logs are read.
+    progress : callable, optional
+        Called after each log with the number done and the total.
+    other_logs : LoadedRuns or ContactLogs, optional
+        Of a robot: logs of motion with a known payload, which show the torque constants of its joints. Of an axis: logs
+        of contacts with a load cell, which show its drive beyond the starts and its load, and of slow presses, which
+        show the scale of its torque.
+
+    Returns
+    -------
+    IdentifiedMachine
+        What was identified with standard errors, what these logs cannot show, and the changes of the machine file.
+
+    Raises
+    ------
+    IdentificationError
+        Nothing can be identified from these logs; nothing is written.
+    ConfigurationError
+        The machine file is wrong.
+    SignatureError
+        No log is left.
+    UsageError
+        The output exists, a payload is given for an axis, or contacts for a robot or several joints.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> logs = ["sample_logs/gate/free/*.csv"]
+    >>> done = cdtool.identify(logs, "sample_logs/gate/machine.toml", "identified.toml")
+    >>> [change.key for change in done.changes][:2]
+    ['load_mass', 'stiffness']
+    """
+    target = None if output is None else location(output)
+    path = location(machine)
+    if target is not None and target.exists() and not force and not _same(target, path):
+        raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
+    machine_file = read_machine_file(path)
+    payload, contacts = _for_this_machine(other_logs, machine_file)
+    paths, reading = read_until(logs, "LOGS", workers)
+    runs, recordings = _impact_free(paths, machine_file, replace(reading, progress=progress))
+    given = read_toml(path, "a machine file")
+    robot = _identify_robot(machine_file, recordings, given, payload, reading)
+    if robot is not None:
+        rows = zip(machine_file.machine.joints, robot.joints, robot.refused, strict=True)
+        joints = tuple(JointIdentification(name, refused=refused, robot=item) for name, item, refused in rows)
+    else:
+        count = len(machine_file.machine.joints)
+        struck = read_contacts(contacts, machine_file) if contacts else LoadCellLogs()
+        joints = tuple(_identify_joint(machine_file, joint, recordings, struck) for joint in range(count))
+    estimates = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.estimates]
+    together = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.together]
+    if robot is not None and robot.gains is not None:
+        estimates += robot.gains.estimates
+    for number, joint in enumerate(joints):
+        estimates += scale_estimates(joint.torque_scale, given, number) if joint.torque_scale else []
+    if not estimates and not together and not _was_compared(joints):
+        raise IdentificationError(
+            f"nothing can be identified from {counted(len(recordings), 'log')}: {'; '.join(_reasons(joints))}",
+            "see docs/identification.md for the motion that is needed",
+        )
+    changes = changes_of(machine_file.machine, given, estimates, together)
+    origin = described_runs(len(recordings), date.today().isoformat())
+    text = updated_text(read_text(path, ConfigurationError), changes, origin)
+    identified = IdentifiedMachine(
+        machine_file.machine.name,
+        joints,
+        changes,
+        text,
+        tuple(recording.name for recording in recordings),
+        (*runs.skipped, *(struck.skipped if robot is None else ())),
+        runs.findings,
+        robot=robot,
+        source=path,
+    )
+    files = identified.files_for(target) if target is not None else ()
+    if not files:
+        return identified
+    with replaced(*(file for file, _ in files)) as parts:
+        for part, (_, content) in zip(parts, files, strict=True):
+            part.write_bytes(content.encode("utf-8", "replace"))
+    return replace(identified, written=str(target))
+
+
+def _for_this_machine(
+    logs: LoadedRuns | ContactLogs | None, machine_file: MachineFile
+) -> tuple[LoadedRuns | None, ContactLogs | None]:
+    """Return the runs with a payload of a robot, and the contacts of an axis; raises UsageError if they do not fit."""
+    machine = machine_file.machine
+    if isinstance(logs, LoadedRuns):
+        if not isinstance(machine, CoupledMachine):
+            raise UsageError("a payload is given for an axis", "press and release a load cell to identify its torque")
+        return logs, None
+    if logs is not None and (isinstance(machine, CoupledMachine) or len(machine.joints) > 1):
+        raise UsageError("contacts with a load cell are given for several joints", "they are used for one axis only")
+    return None, logs
+
+
+def read_until(logs: Sequence[str | Path], key: str, workers: Workers | None = None) -> tuple[list[Path], RunReading]:
+    """Return the paths of the logs and how they are read: each up to its first contact, if its load cell shows one.
+
+    In place of logs one benchmark file may be given: its [learn] logs are read as `cdtool benchmark` reads them, with
+    its labels, sections and `until`.
+    """
+    given = [location(item) for item in several_logs(logs)]
+    if len(given) == 1 and given[0].suffix.lower() == ".toml":
+        benchmark = read_benchmark_file(given[0])
+        return list(benchmark.learn), replace(benchmark.run_reading(workers), operations="whole")
+    reading = RunReading("whole", onset=OnsetRule(), part=_up_to_contact, workers=workers or Workers())
+    return find_logs(map(str, logs), Path(), key), reading
+
+
+def _up_to_contact(listed: Path, recording: Recording) -> tuple[Recording, Sequence[Contact]]:
+    part = PartToLearnFrom(ScoringRules(), guard=GUARD)
+    return part(listed, recording) if any_contacts(recording, part.rules) else (recording, ())
+
+
+def _impact_free(paths: Sequence[Path], machine_file: MachineFile, reading: RunReading) -> tuple[Runs, list[Recording]]:
+    """Return the runs of some logs, and their recordings; raises IdentificationError if none can be used."""
+    runs = load_runs(paths, machine_file, reading)
+    recordings = [operation.recording for operation in runs.operations]
+    if not recordings:
+        reason = runs.skipped[0].reason if runs.skipped else "no log is given"
+        raise IdentificationError(f"no impact-free log is left: {reason}", "give other logs")
+    for check in runs.ranges.all.contradicted:
+        if check.numbers["found"] != "inertia":  # that of the machine file is what is to be identified
+            raise IdentificationError(f"{machine_file.path}: {check}")
+    return runs, recordings
+
+
+def _identify_robot(
+    machine_file: MachineFile,
+    recordings: Sequence[Recording],
+    given: Mapping[str, Any],
+    payload: LoadedRuns | None,
+    reading: RunReading,
+) -> RobotIdentification | None:
+    """Return what was identified of a robot; None for an axis."""
+    machine = machine_file.machine
+    if not isinstance(machine, CoupledMachine):
+        return None
+    loaded = None
+    if payload is not None:
+        body = payload.payload(machine)
+        paths, _ = read_until(payload.logs, "payload")
+        loaded = _impact_free(paths, machine_file, reading)[1], body
+    return identify_joints(recordings, machine, given, machine_file.path.parent, loaded)
+
+
+def _was_compared(joints: Sequence[JointIdentification]) -> bool:
+    """Return whether the friction of a robot's joint was fitted, even if it predicts worse than the present one."""
+    fitted = (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE)
+    return any(form in joint.robot.errors for joint in joints if joint.robot for form in fitted)
+
+
+def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
+    """Return why nothing was identified, each reason once: the motion that is too weak, not what a controller needs."""
+    reasons = [text for joint in joints for name, text in joint.refused.items() if name != "controller"]
+    missing = [item for joint in joints for item in joint.not_identifiable if item.section != "model.controller"]
+    reasons += [f"{item.key} needs {', '.join(kind.value for kind in item.missing)}" for item in missing]
+    return list(dict.fromkeys(reasons))[:_MOST_REASONS]
+
+
+def _joint_summary(joint: JointIdentification) -> dict[str, Any]:
+    validation = joint.rigid.cross_validation if joint.rigid else None
+    return {
+        "joint": joint.joint,
+        "estimates": [{**asdict(item), "method": item.method.value} for item in joint.estimates],
+        "not_identifiable": [
+            {**asdict(item), "missing": [missing.name.lower() for missing in item.missing]}
+            for item in joint.not_identifiable
+        ],
+        "refused": dict(joint.refused),
+        "force_error_on_unseen_runs": validation
+        and {
+            "floor": validation.floor,
+            "repeats": validation.repeats,
+            "forms": {form.value: asdict(error) for form, error in validation.errors.items()},
+        },
+        "friction_at_speed": [asdict(level) for level in joint.rigid.levels] if joint.rigid else [],
+        "two_mass": joint.two_mass
+        and {
+            "condition_number": joint.two_mass.condition_number,
+            "relative_error": dict(joint.two_mass.relative_error),
+            "largest_wind_up": joint.two_mass.largest_wind_up,
+        },
+        "controller": joint.controller
+        and {"kind": joint.controller.kind.value, "residual_rms": joint.controller.residual_rms},
+        "robot": joint.robot and joint_summary(joint.robot),
+        "contacts": joint.contacts
+        and {
+            "condition_number": joint.contacts.condition_number,
+            "relative_error": dict(joint.contacts.relative_error),
+            "delays_of_load_cell": list(joint.contacts.delays),
+            "largest_wind_up": joint.contacts.wind_up,
+            "largest_drive_force": joint.contacts.drive_force,
+        },
+        "torque_scale": joint.torque_scale and asdict(joint.torque_scale),
+    }
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.resolve() == other.resolve()
+
+
+def _identify_joint(
+    machine_file: MachineFile, joint: int, recordings: Sequence[Recording], struck: LoadCellLogs
+) -> JointIdentification:
+    machine: Any = machine_file.machine
+    name = machine.joints[joint]
+    refused: dict[str, str] = {}
+    scale, recordings, struck = _by_presses(recordings, struck, float(machine.nominal_inertia[joint]), refused)
+    runs: list[AxisRun] = []
+    for recording in recordings:
+        try:
+            runs.append(axis_run(recording, joint))
+        except RecordingError as fault:
+            refused.setdefault("log", str(fault))
+    if not runs:
+        return JointIdentification(name, refused=refused)
+    is_rotary = machine.force_unit != "N"
+    motor_mass = float(machine.reflected_inertia[joint])
+    table: ModelTable | None = machine_file.model
+    if motor_mass == 0.0 and table is not None:
+        motor_mass = table.of_joint("drive", joint).get("motor_mass", 0.0)
+    stated = table.of_joint("sensors", joint) if table else {}
+    sensors = Sensors(**stated)
+    force, travel = ("N m", "rad") if is_rotary else ("N", "m")
+    mass = "kg m2" if is_rotary else "kg"
+    found: dict[str, Any] = {}
+    methods: dict[str, Callable[[], Any]] = {
+        "rigid": lambda: identify_rigid_axis(
+            runs,
+            motor_mass,
+            RigidAxisSettings(rotary=is_rotary, torque_filter_time=stated.get("torque_filter_time")),
+        ),
+        "two_mass": lambda: identify_two_mass(
+            runs, TwoMassSettings(motor_mass=motor_mass, sensors=sensors, units=(mass, force, travel))
+        ),
+        "controller": lambda: identify_controller(
+            runs,
+            # A stated 0 is known: the torque is measured without a low-pass.
+            ControllerSettings(torque_filter_time=stated.get("torque_filter_time"), units=(force, travel)),
+        ),
+    }
+    for method, run_method in methods.items():
+        try:
+            if method == "two_mass":
+                _refuse_constant_force(found.get("rigid"), force)
+            found[method] = run_method()
+        except CdtoolError as fault:
+            refused[method] = str(fault)
+        if method == "rigid" and _has_opposite_sign(found.get("rigid")):
+            reason = "the torque falls where the acceleration rises: check the signs (scale) of torque and speed"
+            return JointIdentification(name, refused={"sign": reason})
+    units = (mass, force, travel, f"{force} s/{travel}")
+    identified = JointIdentification(
+        name,
+        units=units,
+        has_torque_filter="torque_filter_time" in stated,
+        refused=refused,
+        torque_scale=scale,
+        **found,
+    )
+    return _with_contacts(identified, struck, machine_file, joint) if struck.struck else identified
+
+
+def _has_opposite_sign(fit: RigidAxisFit | None) -> bool:
+    """Whether a negative total mass and negative friction are certain: torque or speed has the opposite sign."""
+    numbers = {item.key: item.numbers for item in fit.identified.not_identifiable} if fit else {}
+    signs = (("load_mass", "total_mass"), ("coulomb_friction", "value"))
+    return all(
+        numbers.get(key, {}).get(name, 0.0) < -_SIGNIFICANT * numbers.get(key, {}).get("standard_error", math.inf)
+        for key, name in signs
+    )
+
+
+def _refuse_constant_force(fit: RigidAxisFit | None, unit: str) -> None:
+    """Raise IdentificationError where a constant force acts: the elastic drive has none, and would bend to fit it."""
+    if fit is None or "constant_force" not in fit.identified:
+        return
+    constant = fit.identified["constant_force"]
+    friction = [item.value for item in fit.identified.estimates if item.key in _COULOMB]
+    known = abs(constant.value) > _SIGNIFICANT * constant.standard_error
+    if known and friction and abs(constant.value) > _MOST_CONSTANT * float(np.mean(friction)):
+        raise IdentificationError(
+            f"a constant force of {constant.value:.3g} {unit} acts, which the elastic drive's model does not have",
+            "a vertical axis or one with a spring or counterweight: state [model.drive] stiffness from its data sheet",
+        )
+
+
+def _by_presses(
+    recordings: Sequence[Recording], logs: LoadCellLogs, total_mass: float, refused: dict[str, str]
+) -> tuple[TorqueScale | None, Sequence[Recording], LoadCellLogs]:
+    """Return the scale of the torque that presses show, and the recordings with torques by it."""
+    try:
+        scale = torque_scale(logs, total_mass, 0)
+    except CdtoolError as fault:
+        refused["torque_scale"] = str(fault)
+        return None, recordings, logs
+    if scale is None:
+        return None, recordings, logs
+    struck = tuple((scaled(item, scale.factor, 0), contact) for item, contact in logs.struck)
+    return scale, [scaled(item, scale.factor, 0) for item in recordings], replace(logs, struck=struck)
+
+
+def _with_contacts(
+    identified: JointIdentification, logs: LoadCellLogs, machine_file: MachineFile, joint: int
+) -> JointIdentification:
+    """Return an axis with what its contacts show, or with the reason why they show nothing."""
+    refused = dict(identified.refused)
+    if identified.two_mass is None:
+        refused["contacts"] = f"contacts need the drive that starts show: {refused.get('two_mass', '')}"
+        return replace(identified, refused=refused)
+    try:
+        fits = (identified.two_mass, identified.controller)
+        return replace(identified, contacts=identify_struck(logs, machine_file, joint, fits, identified.units[:3]))
+    except CdtoolError as fault:
+        return replace(identified, refused={**refused, "contacts": str(fault)})
+
+
+def _exact(section: str, key: str, value: float, unit: str) -> Estimate:
+    return Estimate(section, key, value, math.nan, unit, Method.OUTPUT_ERROR)

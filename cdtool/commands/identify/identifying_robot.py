@@ -1,0 +1,360 @@
+"""`cdtool identify` of a robot or planar arm: torque constants, friction, and inertias where the motion shows them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError
+from cdtool.base.files.bounded_loading import read_text
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.remote.remote_path import joined
+from cdtool.commands.identify.estimate import Estimate, IdentificationError, Identified, Method, NotIdentifiable
+from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
+from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
+from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
+from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction, choose_friction
+from cdtool.commands.identify.robot.planar_links import planar_links
+from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
+from cdtool.commands.identify.robot.robot_dynamics import (
+    HALF_WIDTH,
+    RobotFit,
+    RobotParameters,
+    TorqueError,
+    identify_robot,
+    joint_estimates,
+)
+from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
+from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
+from cdtool.commands.identify.robot.updated_urdf import updated_urdf
+from cdtool.machines.coupled import CoupledMachine
+from cdtool.machines.kinematic_tree import KinematicTree
+from cdtool.machines.urdf_robot import UrdfRobot
+from cdtool.recordings.recording import Recording
+
+# A joint of whose torque the best model explains less than this share has a wrong channel, or the robot a wrong URDF.
+_EXPLAINED = 0.5
+# More unexplained moments than this share of the motion are no exceptions.
+_MOST_UNEXPLAINED = 0.1
+# Physical links may raise the residual of least squares by this share, and shift a base parameter by so many errors.
+_MOST_RISE, _MOST_SHIFT = 0.1, 3.0
+
+
+@dataclass(frozen=True)
+class LoadedRuns:
+    """Logs of motion with a known payload: `mass` [kg], fixed to a link, its `centre` of mass in the link's frame [m].
+
+    `centre` None: not known, then it is free. `link`: of the URDF, or "arm" or "forearm"; empty: the link that the last
+    joint moves.
+    """
+
+    logs: tuple[str | Path, ...]
+    mass: float
+    link: str = ""
+    centre: tuple[float, float, float] | None = None
+
+    def payload(self, machine: CoupledMachine) -> Payload:
+        """Return the payload on its link; raises ConfigurationError for a mass that is not above 0."""
+        link = self.link
+        if not link and isinstance(machine, UrdfRobot):
+            last = len(machine.tree.joints) - 1
+            link = next(item.name for item in machine.tree.links if item.joint == last)
+        return Payload(link=link or machine.joints[-1], mass=self.mass, centre=self.centre)
+
+
+@dataclass(frozen=True, eq=False)
+class InertiaIdentification:
+    """The inertial parameters of all links: whether the runs determine them, and whether they replace the present ones.
+
+    `base`: the base parameters by least squares, with `condition_number` of the scaled equations and the `errors` of
+    their torques. `not_identifiable`: why they are no complete set; empty if they are. `refused`: why a complete set
+    does not replace the present inertias. `residual_rise`: relative, by links that are physical.
+    """
+
+    base: BaseParameterSet
+    condition_number: float
+    errors: TorqueError
+    not_identifiable: tuple[NotIdentifiable, ...]
+    refused: str = ""
+    is_new: bool = False
+    residual_rise: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class RobotIdentification:
+    """What was identified of a robot; `joints` and `refused` (reason by method) in the order of the machine's joints.
+
+    `inertias` None: they could not be looked at. `gains`: torque constants, None without loaded runs; with them the
+    logged torques are multiplied by `torque_factors` (J,).
+    `unexplained_share`: of the equations left out, because no friction explains their torque. `urdf`: the text of the
+    updated URDF, empty if it stays as it is.
+    """
+
+    joints: tuple[JointFriction, ...]
+    refused: tuple[Mapping[str, str], ...]
+    inertias: InertiaIdentification | None
+    gains: Identified | None
+    torque_factors: FloatArray
+    repeated: RepeatedRuns
+    unexplained_share: float
+    urdf: str = ""
+
+    __repr__ = short_repr
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return what belongs to the whole robot as JSON values."""
+        inertias = self.inertias
+        return {
+            "base_parameters": inertias
+            and {
+                "names": list(inertias.base.names),
+                "values": inertias.base.values.tolist(),
+                "standard_errors": inertias.base.standard_errors.tolist(),
+                "excitation": inertias.base.excitation.tolist(),
+                "identifiable": list(inertias.base.identifiable),
+                "condition_number": inertias.condition_number,
+                "not_identifiable": [missing_as_json(item) for item in inertias.not_identifiable],
+                "torque_error": {key: value.tolist() for key, value in vars(inertias.errors).items()},
+                "refused": inertias.refused or None,
+                "is_new": inertias.is_new,
+                "residual_rise": inertias.residual_rise,
+            },
+            "torque_constants": self.gains
+            and {
+                "estimates": [{**asdict(item), "method": item.method.value} for item in self.gains.estimates],
+                "not_identifiable": [missing_as_json(item) for item in self.gains.not_identifiable],
+            },
+            "run_to_run_torque": self.repeated.floor.tolist(),
+            "repeated_pairs": self.repeated.pairs,
+            "unexplained_share": self.unexplained_share,
+        }
+
+
+def missing_as_json(item: NotIdentifiable) -> dict[str, Any]:
+    """Return a parameter that is not identifiable as JSON values."""
+    return {**asdict(item), "missing": [missing.name.lower() for missing in item.missing]}
+
+
+def joint_summary(friction: JointFriction) -> dict[str, Any]:
+    """Return the friction of a joint as JSON values: RMS of the torque on parts left out of the fit by form."""
+    return {
+        "form": friction.form.name.lower(),
+        "torque_error_on_unseen_parts": {form.name.lower(): error for form, error in friction.errors.items()},
+        "torque": friction.torque,
+        "refitted": [{**asdict(item), "method": item.method.value} for item in friction.refitted],
+    }
+
+
+def identify_joints(
+    recordings: Sequence[Recording],
+    machine: CoupledMachine,
+    given: Mapping[str, Any],
+    folder: Path,
+    loaded: tuple[Sequence[Recording], Payload] | None = None,
+) -> RobotIdentification:
+    """Return what contact-free recordings show of a robot.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        On the load side.
+    machine : CoupledMachine
+        The robot of the machine file.
+    given : Mapping
+        The values of the machine file.
+    folder : Path
+        The folder of the machine file.
+    loaded : tuple, optional
+        Recordings with a known payload, and the payload.
+
+    Returns
+    -------
+    RobotIdentification
+        New friction only where it predicts better than the present one.
+
+    Raises
+    ------
+    IdentificationError
+        No usable recording, or torques that neither the robot's links nor friction explain.
+    """
+    runs, first_fault = _runs_of(recordings)
+    if not runs:
+        raise IdentificationError(f"nothing can be identified: {first_fault}", "see docs/identification.md")
+    gains, factors = None, np.ones(len(machine.joints))
+    if loaded is not None:
+        with_payload, fault = _runs_of(loaded[0])
+        if not with_payload:
+            raise IdentificationError(f"no usable run with the payload: {fault}", "see docs/identification.md")
+        present = _present_scale(given, len(machine.joints))
+        gains = drive_gains(runs, with_payload, loaded[1], machine, present)
+        for item in gains.estimates:
+            factors[item.joint] = item.value / present[item.joint]
+        runs = [replace(run, torque=run.torque * factors) for run in runs]
+    explained = without_unexplained(runs, machine, HALF_WIDTH)
+    if explained.share > _MOST_UNEXPLAINED:
+        raise IdentificationError(
+            f"no friction explains the torque during {100.0 * explained.share:.0f} % of the motion",
+            "leave out logs with contacts and stops; check the order, signs and units of the channels",
+        )
+    joints = choose_friction(explained.runs, machine, HALF_WIDTH)
+    inertias, joints, urdf = _with_inertias(explained.runs, machine, joints, given, folder)
+    refused: tuple[Mapping[str, str], ...] = ({},) * len(joints)
+    if not (inertias and inertias.is_new):
+        joints, refused = _refuse_unexplained(joints, machine)
+    floor = repeated_runs(runs, HALF_WIDTH)
+    return RobotIdentification(joints, refused, inertias, gains, factors, floor, explained.share, urdf)
+
+
+def _runs_of(recordings: Sequence[Recording]) -> tuple[list[RobotRun], str]:
+    """Return the usable runs, and why the first of the others is not."""
+    runs, fault = [], ""
+    for recording in recordings:
+        try:
+            runs.append(robot_run(recording))
+        except RecordingError as error:
+            fault = fault or str(error)
+    return runs, fault
+
+
+def torque_table(given: Mapping[str, Any]) -> str:
+    """Return the table of the machine file that maps the torque; raises ConfigurationError if there is not one only."""
+    channels = given.get("channels", {})
+    found = ["channels.torque"] if "torque" in channels else []
+    found += ["channels.mcap.torque"] if "torque" in channels.get("mcap", {}) else []
+    if len(found) != 1:
+        raise ConfigurationError(
+            f"torque is mapped in {' and '.join(found) or 'no table'}",
+            "to identify torque constants, give a machine file with one table for the torque",
+        )
+    return found[0]
+
+
+def _present_scale(given: Mapping[str, Any], count: int) -> list[float]:
+    table: Any = given
+    for name in torque_table(given).split("."):
+        table = table[name]
+    scale = table.get("scale", 1.0)
+    return [float(item) for item in scale] if isinstance(scale, list) else [float(scale)] * count
+
+
+def _refuse_unexplained(
+    joints: Sequence[JointFriction], machine: CoupledMachine
+) -> tuple[tuple[JointFriction, ...], tuple[Mapping[str, str], ...]]:
+    """Return the joints with the old friction where the model explains little; raises IdentificationError if half do.
+
+    A joint without motion is no such joint.
+    """
+    shares = [friction.explained_share for friction in joints]
+    known = [share for share in shares if math.isfinite(share)]
+    bad = [joint for joint, share in enumerate(shares) if share < _EXPLAINED]
+    if bad and 2 * len(bad) >= len(known):
+        name, share = machine.joints[bad[0]], shares[bad[0]]
+        raise IdentificationError(
+            f"the machine explains {100.0 * max(share, 0.0):.0f} % of the torque of joint '{name}' "
+            f"(below {100.0 * _EXPLAINED:.0f} % in {len(bad)} of {len(known)} joints)",
+            "check order, signs and units of the channels, and the inertias of the machine",
+        )
+    kept = tuple(_as_before(friction) if joint in bad else friction for joint, friction in enumerate(joints))
+    reasons: list[Mapping[str, str]] = [{} for _ in joints]
+    for joint in bad:
+        reasons[joint] = {"friction": f"the machine explains {100.0 * max(shares[joint], 0.0):.0f} % of the torque"}
+    return kept, tuple(reasons)
+
+
+def _as_before(friction: JointFriction) -> JointFriction:
+    nothing = Identified((), friction.identified.not_identifiable)
+    return replace(friction, form=FrictionForm.PREVIOUS, identified=nothing, together=())
+
+
+def _with_inertias(
+    runs: Sequence[RobotRun],
+    machine: CoupledMachine,
+    joints: tuple[JointFriction, ...],
+    given: Mapping[str, Any],
+    folder: Path,
+) -> tuple[InertiaIdentification | None, tuple[JointFriction, ...], str]:
+    """Return the inertias, the joints, and the text of the URDF, new where the runs determine the inertias."""
+    fit = identify_robot(runs, machine, RobotParameters(inertial=True, half_width=HALF_WIDTH))
+    missing = tuple(item for item in fit.identified.not_identifiable if item.key == "base_parameters")
+    found = InertiaIdentification(fit.base, fit.condition_number, fit.torque_error, missing)
+    if missing:
+        return found, joints, ""
+    if not _predicts_better(fit, joints):
+        return replace(found, refused="the present inertias predict unseen parts as well"), joints, ""
+    try:
+        if isinstance(machine, UrdfRobot):
+            return _new_urdf(fit, found, joints, joined(folder, str(given["machine"]["urdf"])))
+        return _new_links(fit, found, joints)
+    except CdtoolError as fault:
+        return replace(found, refused=str(fault)), joints, ""
+
+
+def _predicts_better(fit: RobotFit, joints: Sequence[JointFriction]) -> bool:
+    """Return whether inertias and friction predict no joint clearly worse than before, and one clearly better.
+
+    And no joint worse than new friction alone does.
+    """
+    moving = [item.joint for item in joints if math.isfinite(item.errors[FrictionForm.PREVIOUS])]
+    previous: dict[int, FloatArray] = {joint: fit.left_out.of_joint(joint, is_previous=True) for joint in moving}
+    if any(fit.left_out.is_worse(joint, previous[joint], 1.0) for joint in moving):
+        return False
+    new, alone = fit.torque_error.cross_validated, [joints[joint].errors[joints[joint].form] for joint in moving]
+    gain = sum(math.log(max(new[joint], 1e-300) / max(own, 1e-300)) for joint, own in zip(moving, alone, strict=True))
+    return gain < 0.0 and any(fit.left_out.is_better(joint, previous[joint], 1.0) for joint in moving)
+
+
+def _new_urdf(
+    fit: RobotFit, found: InertiaIdentification, joints: tuple[JointFriction, ...], path: Path
+) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
+    consistent = consistent_fit(fit)
+    if consistent.residual_rise > _MOST_RISE:
+        raise IdentificationError(
+            f"no physical links explain the torques: their residual is {100.0 * consistent.residual_rise:.0f} % higher",
+            "check the signs and units of the channels, and the kinematics of the URDF",
+        )
+    tree: KinematicTree = consistent.robot.tree
+    text = updated_urdf(read_text(path, ConfigurationError), tree)
+    found = replace(found, is_new=True, residual_rise=consistent.residual_rise)
+    return found, _joints_with_inertias(consistent.fit, joints, ()), text
+
+
+def _new_links(
+    fit: RobotFit, found: InertiaIdentification, joints: tuple[JointFriction, ...]
+) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
+    links = planar_links(fit)
+    if links.shift > _MOST_SHIFT:
+        raise IdentificationError(
+            f"coupling and gravity of the forearm contradict each other by {links.shift:.1f} standard errors",
+            "check link_length and the order of the channels",
+        )
+    return replace(found, is_new=True), _joints_with_inertias(fit, joints, links.estimates), ""
+
+
+def _joints_with_inertias(
+    fit: RobotFit, joints: Sequence[JointFriction], links: Sequence[Estimate]
+) -> tuple[JointFriction, ...]:
+    """Return the joints with the friction that belongs to the new inertias."""
+    complete = []
+    for item in joints:
+        known, together = joint_estimates(fit, item.joint, Method.FEASIBLE_LEAST_SQUARES)
+        own = tuple(estimate for estimate in links if estimate.joint == item.joint)
+        refused = fit.identified.not_identifiable
+        missing = tuple(entry for entry in refused if entry.joint == item.joint and entry.key != "base_parameters")
+        errors = {**item.errors, FrictionForm.WITH_INERTIAS: float(fit.torque_error.cross_validated[item.joint])}
+        complete.append(
+            replace(
+                item,
+                form=FrictionForm.WITH_INERTIAS,
+                identified=Identified((*own, *known), missing),
+                together=together,
+                errors=errors,
+            )
+        )
+    return tuple(complete)

@@ -1,0 +1,187 @@
+"""Write identified parameters into the text of a machine file: values, standard errors and origin, old values kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeGuard
+
+from cdtool.base.plain_text import counted, digits
+from cdtool.base.remote.remote_path import joined, relative_name
+from cdtool.base.toml_text import opened_table
+from cdtool.commands.identify.estimate import Estimate, Method
+from cdtool.machines.dynamics import Machine
+from cdtool.machines.joint_machine import JointMachine
+from cdtool.machines.urdf_robot import UrdfRobot
+
+# Keys of whole numbers.
+_WHOLE = ("speed_filter_order",)
+# Digits of a written value beyond the first digit of its standard error.
+_MORE_DIGITS = 1
+_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class MachineChange:
+    """A value of the machine file: the key's table, name, old values (None where it was not given) and new ones.
+
+    `values`, `standard_errors` in `unit` as the file has them: friction of [machine] at the motor in motor coordinates.
+    One per joint; a joint without a new value keeps the old one. A value that is not `is_known_alone` belongs to the
+    other values of its table: together they describe the logs.
+    """
+
+    section: str
+    key: str
+    old: tuple[float | None, ...]
+    values: tuple[float, ...]
+    standard_errors: tuple[float, ...]
+    unit: str
+    method: Method
+    is_known_alone: bool = True
+
+
+def changes_of(
+    machine: Machine, given: Mapping[str, Any], estimates: Sequence[Estimate], together: Sequence[Estimate] = ()
+) -> tuple[MachineChange, ...]:
+    """Return the changes to a machine file with the values `given` that the estimates make, in their order.
+
+    The estimates `together` are not identifiable alone; a key of which one joint has such a value is one of them.
+    """
+    joints = len(machine.joints)
+    grouped: dict[tuple[str, str], dict[int, Estimate]] = {}
+    for estimate in (*estimates, *together):
+        grouped.setdefault((estimate.section, estimate.key), {}).setdefault(estimate.joint, estimate)
+    not_alone = {(estimate.section, estimate.key) for estimate in together}
+    changes = []
+    for (section, name), by_joint in grouped.items():
+        key = _key_in_file(machine, section, name)
+        old = _old_values(given, section, key, joints)
+        values, errors = [], []
+        for joint in range(joints):
+            estimate_here = by_joint.get(joint)
+            factor = _factor(machine, section, name, joint)
+            error = math.nan if estimate_here is None else estimate_here.standard_error * abs(factor)
+            kept = old[joint] or 0.0
+            values.append(kept if estimate_here is None else _rounded(estimate_here.value * factor, error))
+            errors.append(error)
+        first = next(iter(by_joint.values()))
+        unit = _unit_in_file(machine, section, name, first.unit)
+        alone = (section, name) not in not_alone
+        changes.append(MachineChange(section, key, old, tuple(values), tuple(errors), unit, first.method, alone))
+    return tuple(changes)
+
+
+def updated_text(text: str, changes: Sequence[MachineChange], origin: str) -> str:
+    """Return the text of a machine file with the changes, each with a comment; everything else is kept.
+
+    `origin` states the logs and the day, for example "14 runs, 2026-11-27".
+    """
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    for change in changes:
+        table = opened_table(document, change.section)
+        value: Any = change.values[0] if len(set(change.values)) == 1 else list(change.values)
+        before = table.get(change.key)
+        item = tomlkit.item(int(value) if change.key in _WHOLE else value)
+        item.comment(_comment(change, before, origin))
+        table[change.key] = item
+    return tomlkit.dumps(document)
+
+
+def robot_files(text: str, urdf: str, source: Path, target: Path) -> tuple[tuple[Path, str], ...]:
+    """Return the updated machine file of a robot at `target` and its URDF, each with its text.
+
+    `text` of the machine file `source` with its changes; `urdf`: the text of the updated URDF, empty if it stays. The
+    new URDF is named after the target, with a number if that file exists: no URDF is overwritten. One that stays is
+    named from the folder of the target.
+    """
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    table: Any = document["machine"]
+    if "urdf" not in table:
+        return ((target, text),)
+    before = str(table["urdf"])
+    if not urdf:
+        if target.absolute().parent != source.absolute().parent:
+            table["urdf"] = relative_name(joined(source.parent, before), target.parent)
+        return ((target, tomlkit.dumps(document)),)
+    name = _free_name(target)
+    item = tomlkit.item(name.name)
+    item.comment(f"identified inertias; was {before}")
+    table["urdf"] = item
+    return ((target, tomlkit.dumps(document)), (name, urdf))
+
+
+def _free_name(target: Path) -> Path:
+    names = (target.with_name(f"{target.stem}{part}.urdf") for part in ("", *(f"_{i}" for i in range(2, 10_000))))
+    return next(name for name in names if not name.exists())
+
+
+def _comment(change: MachineChange, before: Any, origin: str) -> str:
+    errors = [digits(float(f"{item:.2g}")) if math.isfinite(item) else "-" for item in change.standard_errors]
+    spread = errors[0] if len(set(errors)) == 1 else f"[{', '.join(errors)}]"
+    parts = [f"+- {spread} {change.unit}" if spread != "-" else change.unit, change.method.value, origin]
+    was = ""
+    if before is not None:
+        earlier = before.trivia.comment.strip("# ") if hasattr(before, "trivia") else ""
+        plain = before.unwrap() if hasattr(before, "unwrap") else before
+        was = f"; was {plain}" + (f" ({earlier})" if earlier else "")
+    if not change.is_known_alone:
+        parts.append("valid only together with the other values of this table")
+    return ", ".join(part for part in parts if part) + was
+
+
+def _rounded(value: float, error: float) -> float:
+    """Return a value with one digit more than its standard error has, and at least six."""
+    if not math.isfinite(error) or error <= 0.0 or value == 0.0:
+        return float(f"{value:.{_DIGITS}g}")
+    needed = math.ceil(math.log10(abs(value) / error)) + 1 + _MORE_DIGITS
+    return float(f"{value:.{max(needed, _DIGITS)}g}")
+
+
+def _key_in_file(machine: Machine, section: str, name: str) -> str:
+    if (section, name) == ("machine", "drive_inertia") and not isinstance(machine, UrdfRobot):
+        return "motor_inertia"
+    return str(getattr(machine, "inertia_key", name)) if (section, name) == ("machine", "load_mass") else name
+
+
+def _old_values(given: Mapping[str, Any], section: str, key: str, joints: int) -> tuple[float | None, ...]:
+    table: Any = given
+    for name in section.split("."):
+        table = table.get(name, {})
+    value = table.get(key)
+    if isinstance(value, list):
+        return tuple(float(item) for item in value)
+    return (None if value is None else float(value),) * joints
+
+
+# How a load-side value of [machine] is written in motor coordinates: times the transmission ratio to this power.
+_POWERS = {"viscous_friction": 2, "coulomb_friction": 1, "constant_force": 1, "drive_inertia": 2}
+_MOTOR_UNITS = {"viscous_friction": "N m s/rad", "drive_inertia": "kg m2"}
+
+
+def _factor(machine: Machine, section: str, name: str, joint: int) -> float:
+    if not _is_at_motor(machine, section, name):
+        return 1.0
+    ratio = machine.transmission_ratio[joint]
+    return {2: ratio**2, 1: abs(ratio) if name == "coulomb_friction" else ratio}.get(_POWERS.get(name, 0), 1.0)
+
+
+def _unit_in_file(machine: Machine, section: str, name: str, unit: str) -> str:
+    return _MOTOR_UNITS.get(name, "N m") if _is_at_motor(machine, section, name) else unit
+
+
+def _is_at_motor(machine: Machine, section: str, name: str) -> TypeGuard[JointMachine]:
+    """Return whether the file has a value of [machine] at the motor; the drives of a URDF are on the load side."""
+    if not isinstance(machine, JointMachine) or machine.coordinates != "motor":
+        return False
+    return section == "machine" and name in _POWERS and not (name == "drive_inertia" and isinstance(machine, UrdfRobot))
+
+
+def described_runs(count: int, day: str) -> str:
+    """Return the origin of identified values in words."""
+    return f"{counted(count, 'run')}, {day}"

@@ -1,0 +1,245 @@
+"""Torque constants of a robot's joints from runs with and without a known payload.
+
+A log with motor currents i has torques only up to a factor per joint, k i. Free motion alone leaves it open: twice the
+masses and twice the factor look alike. A known payload does not (Gautier, Briot, 2014):
+
+    i_j = (1 / k_j) [Y_j beta_j + payload torque_j]
+
+with an unknown beta_j of the unloaded robot and its friction. Each joint is fitted on its own, with the noisy current
+on the left: as a regressor, its noise would make the constant too small. The payload's inertia is free, and so is its
+centre of mass unless it is given. So is the friction with the payload: it may grow with the load, and from day to day.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.commands.identify.estimate import (
+    Estimate,
+    IdentificationError,
+    Identified,
+    Method,
+    Missing,
+    NotIdentifiable,
+)
+from cdtool.commands.identify.robot.robot_dynamics import (
+    HALF_WIDTH,
+    Equations,
+    Window,
+    jackknife_blocks,
+    jackknife_covariance,
+    resting_windows,
+    window_of_column,
+)
+from cdtool.commands.identify.robot.robot_regressor import Group, Regressor, TreeRegressor, regressor_of
+from cdtool.commands.identify.robot.robot_run import RobotRun
+from cdtool.machines.coupled import CoupledMachine
+from cdtool.machines.planar_arm import PlanarArm
+
+# Directions of the unloaded robot's parameters that are excited less than this, relative to the most, are not fitted.
+_UNSEEN = 1e-7
+# The payload's torque must have a part of at least this share that nothing else explains.
+_INDEPENDENT = 0.05
+# A joint that the payload loads by less than this share of the most loaded one is not loaded: that is rounding.
+_LOADED = 1e-6
+# A centre of mass from a drawing, or found by balancing, is this uncertain along each axis [m].
+_CENTRE_ERROR = 5e-3
+# A constant with a larger relative standard error says nothing.
+_WORST_ERROR = 0.2
+# Of these a joint has its own with the payload.
+_FRICTION = (Group.VISCOUS, Group.COULOMB)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Payload:
+    """A known body fixed to a link: `mass` [kg], `centre` of mass (3) in the link's frame [m], None if not known.
+
+    A planar arm's links are "arm" and "forearm", x along the link. Raises ConfigurationError for a mass that is not
+    above 0.
+    """
+
+    link: str
+    mass: float
+    centre: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.mass < math.inf:
+            raise ConfigurationError(f"payload: mass is {self.mass} kg", "weigh it; it must be above 0")
+
+
+def drive_gains(
+    unloaded: Sequence[RobotRun],
+    loaded: Sequence[RobotRun],
+    payload: Payload,
+    machine: CoupledMachine,
+    scale: Sequence[float] | None = None,
+) -> Identified:
+    """Return the torque constant of each joint: section "channels.torque", key "scale".
+
+    `unloaded`, `loaded`: contact-free runs without and with the payload. `scale`: the present scale of the torque
+    channel, one per joint; without it the estimates are factors of the logged torque. NotIdentifiable for a joint that
+    the payload does not load, or not independently of its other torques, as with an unknown centre of mass. Raises
+    IdentificationError without runs of both kinds, ConfigurationError for an unknown link.
+    """
+    if not unloaded or not loaded:
+        raise IdentificationError("torque constants need runs with and without the payload", "give both")
+    present = np.ones(len(machine.joints)) if scale is None else np.array(scale, dtype=np.float64)
+    if present.shape != (len(machine.joints),):
+        raise UsageError(f"{len(present)} values of scale", f"the machine has {len(machine.joints)} joints")
+    regressor = regressor_of(machine)
+    columns = _payload_columns(machine, regressor, payload)
+    parts = [_part(run, index, regressor, index >= len(unloaded)) for index, run in enumerate((*unloaded, *loaded))]
+    joints = [_Joint.of(joint, parts, regressor, columns) for joint in range(len(machine.joints))]
+    most = max(float(np.linalg.norm(joint.load)) for joint in joints)
+    unit = "N m/A" if scale is not None else "1"
+    found = [
+        item.constant(float(value), unit, most, has_centre=payload.centre is not None)
+        for item, value in zip(joints, present, strict=True)
+    ]
+    estimates = tuple(item for item in found if isinstance(item, Estimate))
+    return Identified(estimates, tuple(item for item in found if isinstance(item, NotIdentifiable)))
+
+
+@dataclass(frozen=True, eq=False)
+class _PayloadColumns:
+    """The regressor's columns, as weights (k, P), of a payload's `mass` (1) where it is said to be.
+
+    `shifts`: of a mass that is off by one standard error of its centre; `free`: of what of the payload is not known.
+    """
+
+    mass: FloatArray
+    shifts: FloatArray
+    free: FloatArray
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The windows of a run: `rows` (K, J, P), `torques`, `moves` (K, J), `times` and the run's `index` (K,)."""
+
+    rows: FloatArray
+    torques: FloatArray
+    moves: BoolArray
+    times: FloatArray
+    index: FloatArray
+    is_loaded: bool
+
+    __repr__ = short_repr
+
+
+def _part(run: RobotRun, index: int, regressor: Regressor, is_loaded: bool) -> _Part:
+    if run.joint_count != len(regressor.machine.joints):
+        raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(regressor.machine.joints)}")
+    window = Window.of(HALF_WIDTH, run.period)
+    columns = [window_of_column(run, regressor, window, column) for column in range(len(regressor.columns))]
+    rows, torques = np.stack(columns, axis=2), window.average(run.torque)
+    times = run.start + run.period * (np.arange(len(torques)) * float(window.step) + len(window.weights) // 2)
+    known = np.isfinite(torques) & np.isfinite(rows).all(axis=2)
+    moves = known & ~resting_windows(run, regressor.machine, window)
+    return _Part(rows, torques, moves, np.asarray(times, np.float64), np.full(len(times), float(index)), is_loaded)
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """A joint's windows: what they contain beside the payload, its `load` (m,), that of its `shifts` (m, k)."""
+
+    joint: int
+    rows: FloatArray
+    load: FloatArray
+    shifts: FloatArray
+    equations: Equations
+
+    __repr__ = short_repr
+
+    @classmethod
+    def of(cls, joint: int, parts: Sequence[_Part], regressor: Regressor, columns: _PayloadColumns) -> _Joint:
+        # Friction of its own for the runs with the payload.
+        own = [column.joint == joint and column.group in _FRICTION for column in regressor.columns]
+        free = np.concatenate((columns.free, np.eye(len(own))[own]))
+        rows, torques, times, runs = (
+            np.concatenate([getattr(part, name)[part.moves[:, joint]] for part in parts])
+            for name in ("rows", "torques", "times", "index")
+        )
+        plain = rows[:, joint]
+        loaded = plain * np.isin(runs, [part.index[0] for part in parts if part.is_loaded])[:, np.newaxis]
+        equations = Equations(plain, torques[:, joint], np.full(len(times), float(joint)), times, runs, 0.0 * times)
+        everything = np.column_stack((plain, loaded @ free.T))
+        return cls(joint, everything, loaded @ columns.mass, loaded @ columns.shifts.T, equations)
+
+    def constant(self, present: float, unit: str, most: float, *, has_centre: bool) -> Estimate | NotIdentifiable:
+        """Return the torque constant; `most`: the norm of the load of the joint with the largest."""
+        load, torques = self.load, self.equations.torques
+        size = float(np.linalg.norm(load))
+        if size <= _LOADED * most:
+            return self._refused(Missing.PAYLOAD, {"equations": float(len(load))})
+        basis = _basis(self.rows)
+        rest = load - basis @ (basis.T @ load)
+        share = float(np.linalg.norm(rest)) / size
+        if share < _INDEPENDENT:
+            missing = Missing.OTHER_MOTION if has_centre else Missing.PAYLOAD_CENTRE
+            return self._refused(missing, {"independent_share": share})
+        # With the part of the load that nothing else explains, 1 / k does not depend on the basis.
+        inverse = float(rest @ torques / (rest @ rest))
+        values = np.append(basis.T @ (torques - inverse * load), inverse)
+        whole = replace(self.equations, rows=np.column_stack((basis, load)))
+        blocks = jackknife_blocks(whole, torques - whole.rows @ values)
+        spread = math.sqrt(float(jackknife_covariance(whole, values, blocks)[-1, -1]))
+        error = math.hypot(spread, inverse * float(np.linalg.norm(rest @ self.shifts / (rest @ rest))))
+        if not error < _WORST_ERROR * inverse:
+            return self._refused(Missing.PAYLOAD, {"inverse": inverse, "standard_error_of_inverse": error})
+        value = present / inverse
+        relative = error / inverse
+        return Estimate("channels.torque", "scale", value, abs(value) * relative, unit, Method.LOADED_RUNS, self.joint)
+
+    def _refused(self, missing: Missing, numbers: dict[str, float]) -> NotIdentifiable:
+        return NotIdentifiable("channels.torque", "scale", (missing,), numbers, self.joint)
+
+
+def _basis(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (m, r) of the columns."""
+    norms = np.linalg.norm(rows, axis=0)
+    seen = norms > 1e-12 * max(float(norms.max(initial=0.0)), 1e-300)
+    left, values, _ = np.linalg.svd(rows[:, seen] / norms[seen], full_matrices=False)
+    return np.asarray(left[:, values > _UNSEEN * values[0]])
+
+
+def _refused(joint: int, missing: Missing, numbers: dict[str, float]) -> NotIdentifiable:
+    return NotIdentifiable("channels.torque", "scale", (missing,), numbers, joint)
+
+
+def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Payload) -> _PayloadColumns:
+    """Return what a payload adds to the regressor: its mass, first moments and inertias are columns of its link."""
+    unit = np.eye(len(regressor.columns))
+    if isinstance(regressor, TreeRegressor):
+        link = next((item for item in regressor.tree.links if item.name == payload.link), None)
+        if link is None or link.joint < 0:
+            moving = [item.name for item in regressor.tree.links if item.joint >= 0]
+            raise ConfigurationError(f"payload: no moving link '{payload.link}'", nearest(payload.link, moving))
+        own = unit[10 * link.joint : 10 * (link.joint + 1)]
+        mass, moments, inertias = own[0], own[1:4], own[4:]
+        turn, shift = np.reshape(link.rotation, (3, 3)), np.array(link.translation)
+        centre = None if payload.centre is None else turn @ np.array(payload.centre) + shift
+    else:
+        assert isinstance(machine, PlanarArm)
+        if payload.link not in machine.joints:
+            raise ConfigurationError(f"payload: unknown link '{payload.link}'", nearest(payload.link, machine.joints))
+        if payload.centre is not None and any(payload.centre[1:]):
+            raise ConfigurationError("payload: its centre is off the link's axis", "give y = z = 0")
+        place, length, gravity = machine.joints.index(payload.link), machine.link_length, machine.gravity_acceleration
+        # On the forearm its mass moves with the end of the arm, and couples both links.
+        mass = place * (length**2 * unit[0] + length * gravity * unit[3])
+        moments = (place * length * unit[2] + gravity * unit[3 + place])[np.newaxis]
+        inertias = unit[place : place + 1]
+        centre = None if payload.centre is None else np.array(payload.centre[:1])
+    if centre is None:
+        return _PayloadColumns(payload.mass * mass, np.zeros((0, len(unit))), np.concatenate((moments, inertias)))
+    shifts = payload.mass * _CENTRE_ERROR * moments
+    return _PayloadColumns(payload.mass * (mass + centre @ moments), shifts, inertias)

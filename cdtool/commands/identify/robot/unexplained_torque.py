@@ -1,0 +1,67 @@
+"""Times at which no friction explains a robot's torque, as in a contact or an abrupt stop that no channel shows.
+
+A few such moments would move least squares more than all the rest of the logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.base.arrays import BoolArray
+from cdtool.commands.identify.robot.robot_dynamics import RobotFit, RobotParameters, identify_robot
+from cdtool.commands.identify.robot.robot_run import RobotRun
+from cdtool.machines.coupled import CoupledMachine
+
+# A residual beyond so many robust standard deviations is no friction and no noise.
+_BEYOND = 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class ExplainedRuns:
+    """Runs with NaN for the torque near unexplained moments; `share` of the equations of motion left out [-]."""
+
+    runs: tuple[RobotRun, ...]
+    share: float
+
+
+def without_unexplained(runs: Sequence[RobotRun], machine: CoupledMachine, half_width: float) -> ExplainedRuns:
+    """Return the runs without the times at which the friction fitted to all of them explains a torque by no means.
+
+    That is a residual beyond eight robust standard deviations of its joint; its window of `half_width` [s] to either
+    side is left out for all joints. Contacts that last for much of the logs pass for friction. Raises what
+    identify_robot raises.
+    """
+    fit = identify_robot(runs, machine, RobotParameters(half_width=half_width))
+    is_outside = _outside(fit)
+    equations, cleaned = fit.equations, []
+    for index, run in enumerate(runs):
+        times = np.unique(equations.times[is_outside & (equations.runs == index)])
+        cleaned.append(run.without(_near(run, times, half_width)) if len(times) else run)
+    return ExplainedRuns(tuple(cleaned), float(np.mean(is_outside)))
+
+
+def _outside(fit: RobotFit) -> BoolArray:
+    """Return which equations (m,) are unexplained by the fit to all of them; one without a run may be a worse fit."""
+    from scipy.stats import norm
+
+    equations, joints = fit.equations, fit.left_out.joints
+    size = np.abs(equations.torques - equations.rows @ fit.base.values)
+    outside: BoolArray = np.zeros(len(size), dtype=np.bool_)
+    for joint in np.unique(joints).tolist():
+        own = joints == joint
+        # No sensor resolves 1e-9 of its range: less is rounding.
+        least = 1e-9 * float(np.max(np.abs(equations.torques[own])))
+        outside[own] = size[own] > _BEYOND * max(float(np.median(size[own])), least) / norm.ppf(0.75)
+    return outside
+
+
+def _near(run: RobotRun, times: np.ndarray[tuple[int], np.dtype[np.float64]], half_width: float) -> BoolArray:
+    """Return which samples (n,) are within `half_width` of one of the sorted times."""
+    clock = run.time
+    after = np.clip(np.searchsorted(times, clock), 1, len(times)) if len(times) > 1 else np.ones(len(clock), np.int64)
+    before = times[after - 1]
+    behind = times[np.minimum(after, len(times) - 1)]
+    return np.asarray(np.minimum(np.abs(clock - before), np.abs(clock - behind)) <= half_width)

@@ -1,0 +1,146 @@
+"""`cdtool init`."""
+
+from __future__ import annotations
+
+import shlex
+import tomllib
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cdtool.base.errors import UsageError
+from cdtool.commands.console.console import leave, leave_with, plain, print_json, print_skipped, with_findings
+from cdtool.commands.console.late_progress import late_progress
+from cdtool.commands.console.logs_argument import logs_argument
+from cdtool.commands.console.options import JsonOption, QuietOption
+from cdtool.commands.console.place import Place, location
+
+if TYPE_CHECKING:
+    from cdtool.commands.init.drafting import Drafted, DraftedStudy
+
+
+def init(
+    logs: Annotated[list[Place], logs_argument("Recordings of one machine.")],
+    output: Annotated[
+        Place,
+        typer.Option(
+            "--output",
+            "-o",
+            parser=location,
+            help="Machine file to write (.toml); or a folder for a machine file and a benchmark file.",
+        ),
+    ] = Path("machine.toml"),
+    machine: Annotated[
+        Place | None,
+        typer.Option(
+            "--machine", "-m", parser=location, help="With a folder: use this machine file, draft only the benchmark."
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
+    csv: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--csv",
+            help="A key of [csv] in the machine file, for a table that is not read without: header=false, decimal=,",
+            metavar="KEY=VALUE",
+        ),
+    ] = None,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Draft a machine file from a log, or with a folder as output also a benchmark file from several logs.
+
+    Channels and units are guessed from names and numbers, groups from the ground truth; each guess is marked.
+
+    Example: cdtool init sample_logs/gate/stiff/*.csv -o study
+    """
+    from cdtool.commands.init.drafting import init as draft
+    from cdtool.commands.init.drafting import init_study
+
+    settings = _settings(csv or [])
+    if settings and machine is not None:
+        raise UsageError("--csv and --machine: both state how tables are read", "write [csv] into the machine file")
+    if output.suffix == ".toml":
+        if len(logs) > 1 or machine is not None:
+            what = "--machine" if machine is not None else f"{len(logs)} logs"
+            raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
+        with late_progress("analysing the log", quiet=quiet):
+            drafted = draft(logs[0], output, force=force, csv=settings)
+        if as_json:
+            print_json(with_findings(drafted))
+        else:
+            if not quiet:
+                typer.echo(drafted.text)
+            first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
+            typer.echo(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
+            typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(drafted.path)}")
+        _warn(drafted)
+        leave_with(drafted.findings)
+        return
+    with late_progress("analysing the logs", quiet=quiet):
+        study = init_study(logs, output, machine=machine, force=force, csv=settings)
+    if as_json:
+        print_json(asdict(study))
+    else:
+        _show(study, logs, output, quiet=quiet)
+    if study.machine:
+        _warn(study.machine)
+    print_skipped(study.skipped)
+    leave(study.skipped)
+
+
+def _settings(given: list[str]) -> dict[str, Any]:
+    """Return KEY=VALUE as values of TOML; what is not one is a text."""
+    values: dict[str, Any] = {}
+    for text in given:
+        key, mark, value = text.partition("=")
+        if not mark or not key.strip():
+            raise UsageError(f"--csv {text}: is no KEY=VALUE", "for example --csv header=false")
+        try:
+            values[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            values[key.strip()] = value
+    return values
+
+
+def _show(study: DraftedStudy, logs: list[Path], output: Path, *, quiet: bool) -> None:
+    from cdtool.commands.init.benchmark_draft import patterns
+
+    if not quiet:
+        typer.echo(study.text)
+    names = [*([study.machine_path] if study.machine else []), study.path, *study.beside]
+    typer.echo(
+        f"{', '.join(map(plain, names))} written: drafts based on guesses. Check each line marked CHECK, then run"
+    )
+    typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(study.machine_path)}")
+    for name in study.kept:
+        typer.echo(f"{plain(name)} kept as it is: delete it for an empty one")
+    if study.beside:
+        typer.echo(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
+        some = " ".join("*".join(part and _quoted(part) for part in item.split("*")) for item in patterns(logs, Path()))
+        typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
+    if study.has_detectors:
+        typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
+    if not study.beside and not study.kept:
+        typer.echo("for a test protocol of the contact forces:")
+        typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
+
+
+def _warn(drafted: Drafted) -> None:
+    """Print what is wrong with a draft to stderr."""
+    if not drafted.channels:
+        typer.echo(
+            "warning: no column's name or values indicate a torque, speed or position: all are comments", err=True
+        )
+    for name in drafted.left_out:
+        typer.echo(f"warning: {name}: the log contradicts the guess: written as a comment", err=True)
+    for finding in drafted.findings:
+        if finding.severity == "loss" or finding.kind == "steady_header":
+            typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
+
+
+def _quoted(path: object) -> str:
+    """Return a path quoted for a shell."""
+    return shlex.quote(plain(path))

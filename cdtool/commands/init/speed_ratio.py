@@ -1,0 +1,229 @@
+"""Find the units of clock, position and speed that fit the ratio of the position's derivative to the speed.
+
+With the logged values x of the position and v of the speed, dx / (v dt) = f_speed f_clock / f_position, where f are
+the factors to SI. Several combinations can fit: ms with m and m/s give 0.001, as do s with m and mm/s. All are named.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdtool.commands.init import motion_evidence as motion
+from cdtool.commands.init.names.quantity_words import is_twist, motion_of, words
+from cdtool.commands.init.names.units_in_names import factor_of, label, own_name, si_of, unit_in_name
+from cdtool.commands.init.stream import Stream
+from cdtool.commands.init.streams import Channels
+from cdtool.commands.init.table_clock import TableClock
+from cdtool.recordings.units import find_unit
+
+# Units of position and speed that belong together, the likelier first; the first of each kind are both SI.
+_PAIRS = (
+    ("rad", "rad/s"), ("m", "m/s"), ("mm", "mm/s"), ("deg", "deg/s"), ("rad", "rpm"), ("deg", "rpm"), ("rev", "rpm"),
+    ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("mm", "mm/min"), ("m", "m/min"),
+    ("rad", "deg/s"), ("um", "mm/s"), ("deg", "deg/min"),
+)  # fmt: skip
+# Largest deviation of a ratio that fits; below the second one the fit is certain.
+_NEAR, _SURE = 0.02, 0.01
+# Combinations less likely than the best by this much are not listed: stamps in minutes at 17 Hz.
+_FAR = 2.5
+# Largest positions and speeds of axes, and of the joints of robots.
+_LIMITS = {"m": 30.0, "m/s": 20.0}
+_ROBOT_LIMITS = {"rad": 4.0 * math.pi, "rad/s": 25.0, "m": 30.0, "m/s": 20.0}
+_SI = {"length": "m", "angle": "rad"}
+_RPM = ("n", "rpm", "motor")
+_RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
+
+
+@dataclass(frozen=True)
+class Stated:
+    """The unit that a log states for a channel; `by`: "log" (its header), "name", or "" without a stated unit."""
+
+    unit: str = ""
+    by: str = ""
+
+    @property
+    def si(self) -> str:
+        """Return the SI unit of its dimension, or an empty text if unknown."""
+        return si_of(self.unit)
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Units that fit together, how unlikely they are, and the relative deviation of the ratio from theirs.
+
+    `named`: unit or name of the position indicate an angle or a travel, as these units do. Empty clock: stated.
+    """
+
+    clock: str
+    position: str
+    speed: str
+    unlikely: float
+    off: float
+    named: bool
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Result for position and speed: `raw` is dx / (v dt) in the log's units of both and in assumed seconds.
+
+    `fitting` are the units that fit, the likeliest first; `correlation` states how reliably one follows the other.
+    `tick` [s] is the step per count that the likeliest units require; 0 if the clock is not just a counter.
+    """
+
+    raw: float
+    assumed: float
+    correlation: float
+    fitting: tuple[Combination, ...] = ()
+    tick: float = 0.0
+
+    def per_second(self, clock: str) -> float:
+        """Return dx / (v dt), the time in seconds if the clock is in this unit (empty: as assumed, or its ticks)."""
+        if self.tick:
+            return self.raw * self.assumed / self.tick
+        return self.raw * self.assumed / factor_of(clock) if clock else self.raw
+
+    @property
+    def certain(self) -> bool:
+        """Whether only one combination fits, well, and the names indicate the same.
+
+        Without the names a gear might have that ratio: 1 m per turn is that of turns and 1/min. The rate of a counter
+        follows from the ratio: it fits any units.
+        """
+        first = self.fitting[0]
+        return not self.tick and len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
+
+
+def stated(channel: str, stream: Stream) -> Stated:
+    """Return the unit in the header, else the unit at the end of the name."""
+    if stream.unit and find_unit(stream.unit):
+        return Stated(stream.unit, "log")
+    unit = unit_in_name(channel.removeprefix("reference_"), own_name(stream))
+    return Stated(unit, "name" if unit else "")
+
+
+def motion_kind(channel: str, channels: Channels) -> str:
+    """Return "angle" or "length" by unit or name; "raw" for counts, percent and volts; empty if unknown."""
+    if channel not in channels.found:
+        return ""
+    stream = channels.found[channel].stream
+    si = stated(channel, stream).si
+    if si:
+        return {"m": "length", "m/s": "length", "rad": "angle", "rad/s": "angle"}.get(si, "raw")
+    return motion_of(label(stream))
+
+
+def seems_to_turn(channels: Channels) -> bool:
+    """Whether a single joint turns by the name of its torque: no more than two turns, no name or unit of a length."""
+    if channels.joints > 1 or "torque" not in channels.found:
+        return False
+    drive = channels.found["torque"].stream
+    if not is_twist(label(drive)) or stated("torque", drive).si == "N":
+        return False
+    if any(motion_kind(name, channels) for name in ("position", "speed")):
+        return False
+    position = channels.found.get("position")
+    return position is None or float(np.nanmax(np.abs(position.stream.values))) < 4.0 * math.pi
+
+
+def ratio_of(channels: Channels, clock: TableClock | None, messages_si: bool) -> Ratio | None:
+    """Return position over speed and all units that fit; None if one is missing or does not follow the other.
+
+    `messages_si`: the type of the messages implies SI units.
+    """
+    if not {"position", "speed"} <= channels.found.keys():
+        return None
+    position, speed = (channels.found[name].stream for name in ("position", "speed"))
+    fit = motion.integral_fit(position, speed)
+    if not math.isfinite(fit.slope) or fit.slope == 0.0:
+        return None
+    bare = Ratio(fit.slope, clock.assumed if clock is not None else 1.0, fit.correlation)
+    pairs = _pairs(channels, messages_si)
+    if clock is not None and clock.counts and not clock.told:
+        bare = replace(bare, tick=_tick(channels, bare, pairs))
+        clocks: tuple[str, ...] = ("",) if bare.tick else ()
+    else:
+        clocks = clock.units() if clock is not None else ("",)
+    found = [
+        made
+        for unit in clocks
+        for rank, pair in enumerate(pairs)
+        if (made := _combination(channels, clock, unit, pair, rank, bare)) is not None
+    ]
+    found.sort(key=lambda item: item.unlikely)
+    likely = tuple(item for item in found if item.unlikely < found[0].unlikely + _FAR)
+    return replace(bare, fitting=likely)
+
+
+def rotation_unit(stream: Stream) -> str:
+    """Return the unit of a speed of rotation, by its name."""
+    parts = words(label(stream))
+    if any(part in _RPM or "drehzahl" in part or "motor" in part for part in parts):
+        return "rpm"
+    return "rad/s" if any(part in _RAD_S for part in parts) else ""
+
+
+def whole_numbers(stream: Stream) -> bool:
+    """Whether the values are counts: all integers, and many different ones."""
+    seen = stream.values[np.isfinite(stream.values)]
+    return bool(np.array_equal(seen, np.rint(seen))) and len(np.unique(seen)) > 50
+
+
+def _pairs(channels: Channels, messages_si: bool) -> list[tuple[str, str]]:
+    """Return possible units of position and speed: the header's if stated, a name's together with the usual ones."""
+    if messages_si:
+        return list(_PAIRS[:2])
+    position, speed = (stated(name, channels.found[name].stream) for name in ("position", "speed"))
+    known = [(position.unit if position.by == "log" else p, speed.unit if speed.by == "log" else s) for p, s in _PAIRS]
+    named = [(position.unit or p, speed.unit or s) for p, s in known]
+    kinds = {motion_kind(name, channels) for name in ("position", "speed")}
+    told = kinds & {"length", "angle"} if not {"length", "angle"} <= kinds or (position.si and speed.si) else set()
+    return [
+        pair
+        for pair in dict.fromkeys((*known, *named))
+        if si_of(pair[1]) == f"{si_of(pair[0])}/s"
+        and all(si_of(pair[0]) == {"length": "m", "angle": "rad"}[x] for x in told)
+    ]
+
+
+def _tick(channels: Channels, bare: Ratio, pairs: list[tuple[str, str]]) -> float:
+    """Return the step [s] of a counter for which the likeliest units fit."""
+    ticks = [bare.raw * bare.assumed * factor_of(position) / factor_of(speed) for position, speed in pairs]
+    made = [
+        _combination(channels, None, "", pair, rank, replace(bare, tick=tick))
+        for rank, (pair, tick) in enumerate(zip(pairs, ticks, strict=True))
+        if tick > 0.0
+    ]
+    likely = [(item.unlikely, tick) for item, tick in zip(made, ticks, strict=False) if item is not None]
+    return min(likely)[1] if likely else 0.0
+
+
+def _combination(
+    channels: Channels, clock: TableClock | None, unit: str, pair: tuple[str, str], rank: int, bare: Ratio
+) -> Combination | None:
+    off = abs(bare.per_second(unit) * factor_of(pair[0]) / factor_of(pair[1]) - 1.0)
+    if off > _NEAR:
+        return None
+    unlikely = 0.05 * rank + (clock.unlikely(unit) if clock is not None and unit and not clock.told else 0.0)
+    kind = "length" if si_of(pair[0]) == "m" else "angle"
+    if kind == "length" and not pair[1].startswith(f"{pair[0]}/"):
+        unlikely += 0.5  # m with mm/s
+    # If no word indicates otherwise, one joint slides and several rotate.
+    unlikely += 0.5 * (kind != ("angle" if channels.joints > 1 or seems_to_turn(channels) else "length"))
+    for channel, logged in zip(("position", "speed"), pair, strict=True):
+        stream = channels.found[channel].stream
+        told = stated(channel, stream)
+        unlikely += 1.0 * (not told.by and implausible(logged, stream, channels.joints))
+        if told.by == "name":
+            unlikely += 2.0 * (find_unit(told.unit) != find_unit(logged))
+        elif not told.by and channel == "speed" and (usual := rotation_unit(stream)):
+            unlikely += 1.0 * (usual != logged)
+    return Combination(unit, *pair, unlikely, off, motion_kind("position", channels) == kind)
+
+
+def implausible(unit: str, stream: Stream, joints: int) -> bool:
+    """Whether values in this unit are beyond what machines reach: a travel of 50 m, a robot's joint at 90 rad."""
+    limit = _ROBOT_LIMITS.get(unit) if joints > 1 and unit in _ROBOT_LIMITS else _LIMITS.get(unit)
+    return limit is not None and float(np.nanmax(np.abs(stream.values))) > limit

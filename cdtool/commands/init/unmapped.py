@@ -1,0 +1,110 @@
+"""List the columns that a draft does not map, each with the next best guess: none is dropped silently."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.commands.init import motion_evidence as motion
+from cdtool.commands.init.channel_guess import force_strength, name_strength
+from cdtool.commands.init.names.quantity_words import is_clock, is_reference, what_else
+from cdtool.commands.init.names.units_in_names import is_foreign, label
+from cdtool.commands.init.stream import Stream
+from cdtool.commands.init.streams import Channels
+from cdtool.recordings.recording import MEASURED
+
+_FOLLOWS = 0.97
+_REFERENCED = ("position", "speed", "torque")
+
+
+@dataclass(frozen=True)
+class Unmapped:
+    """Columns of one name, or a topic's field, that no channel uses.
+
+    `guess` is the channel that they may be, or an empty text; `why` is the reason, also for not being one. `low` and
+    `high` are the smallest and the largest value, NaN without values.
+    """
+
+    columns: tuple[str, ...]
+    topic: str
+    field: str
+    guess: str
+    why: str
+    low: float
+    high: float
+
+
+def unmapped_columns(channels: Channels) -> tuple[Unmapped, ...]:
+    """Return every column that is not mapped, those that differ only by a number or a joint together.
+
+    Parameters
+    ----------
+    channels : Channels
+        The channels found, with all streams of the log.
+
+    Returns
+    -------
+    tuple of Unmapped
+        In the order of the log; a family of columns is at the place of its first one.
+    """
+    mapped = {column for found in channels.found.values() for column in found.stream.columns}
+    fields = {(found.stream.topic, found.stream.field) for found in channels.found.values() if found.stream.topic}
+    families = [s for s in channels.streams if len(s.columns) > 1 and not mapped & set(s.columns)]
+    if channels.joints == 1:  # numbered channels of an amplifier are not alike
+        families = [family for family in families if what_else(family.name) or not family.moves]
+    families.sort(key=lambda family: family.width != channels.joints)
+    left: list[Stream] = []
+    listed = set(mapped)
+    for stream in channels.streams:
+        if stream.topic:
+            left += [] if (stream.topic, stream.field) in fields else [stream]
+        elif len(stream.columns) == 1 and stream.columns[0] not in listed:
+            unlisted = [family for family in families if not listed & set(family.columns)]
+            whole = next((family for family in unlisted if stream.columns[0] in family.columns), stream)
+            left.append(whole)
+            listed |= set(whole.columns)
+    return tuple(_described(stream, channels) for stream in left)
+
+
+def _described(stream: Stream, channels: Channels) -> Unmapped:
+    known = stream.values[np.isfinite(stream.values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (float("nan"), float("nan"))
+    guess, why = _next_best(stream, channels) if len(known) else ("", "no values")
+    return Unmapped(stream.columns, stream.topic, stream.field, guess, why, low, high)
+
+
+def _next_best(stream: Stream, channels: Channels) -> tuple[str, str]:
+    """Return the channel that a stream may be, with the reason; an empty text for neither."""
+    if reason := what_else(stream.name):
+        return "", f"{reason}, by its name"
+    if stream.unit and is_foreign(stream.unit):
+        return "", f"its unit is {stream.unit}"
+    if not stream.moves:
+        return "", "constant"
+    if is_clock(label(stream)) and not any(name_strength(quantity, stream)[0] for quantity in MEASURED):
+        return "", "a time, by its name"
+    strength, word = force_strength(stream)
+    if stream.width == 1 and strength and not name_strength("torque", stream)[0]:
+        return "force", word if word == "its unit" else f"name ({word})"
+    named = {quantity: name_strength(quantity, stream) for quantity in MEASURED}
+    quantity = max(named, key=lambda name: named[name][0])
+    strength, word = named[quantity]
+    if strength:
+        set_value = is_reference(stream.name)
+        if set_value and quantity not in _REFERENCED:
+            return "", f"a set value of the {quantity}, by its name"
+        return (f"reference_{quantity}" if set_value else quantity), word if word == "its unit" else f"name ({word})"
+    return _by_values(stream, channels)
+
+
+def _by_values(stream: Stream, channels: Channels) -> tuple[str, str]:
+    alike = [
+        (abs(motion.likeness(channels.found[name].stream, stream)), name)
+        for name in _REFERENCED
+        if name in channels.found and channels.found[name].stream.width == stream.width
+    ]
+    correlation, quantity = max(alike, default=(0.0, ""))
+    if correlation > _FOLLOWS:
+        return quantity, f"follows '{channels.found[quantity].stream.name}', r = {correlation:.3f}"
+    return "", "neither name nor values indicate a channel"

@@ -1,0 +1,64 @@
+"""What `cdtool benchmark` makes of its section [protocol], or of a protocol file: the protocol among its outputs."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from cdtool.base.errors import UsageError
+from cdtool.base.plain_text import plain
+from cdtool.commands.protocol.assessment.protocol import Protocol
+from cdtool.commands.protocol.document.names import protocol_names
+from cdtool.commands.protocol.protocol_file import has_protocol, read_protocol_file
+from cdtool.commands.scoring.benchmark import Benchmark
+from cdtool.report.outputs import check_outputs, write_outputs
+from cdtool.results.evaluated import Evaluated
+
+
+class ProtocolOfBenchmark:
+    """The protocol among the `outputs` of a benchmark; `reports` are the other outputs.
+
+    `given` is the protocol file; None: [protocol] of the benchmark file. Raises UsageError for a protocol without a
+    file, or a file without a protocol to write. With `force` a file that cdtool did not write is replaced.
+    """
+
+    def __init__(self, benchmark: Path, given: Path | None, outputs: Sequence[Path], force: bool) -> None:
+        self._force = force
+        self._documents, self.reports = protocol_names(outputs, given is not None)
+        if not self._documents:
+            if given is not None:
+                raise UsageError("-p: no output is the protocol", "add -o protocol.pdf or -o protocol.html")
+            return
+        if given is None and not has_protocol(benchmark):
+            draft = f"cdtool protocol init {shlex.quote(plain(benchmark))} -o protocol.toml"
+            raise UsageError(
+                f"--output is {plain(self._documents[0])}, and {plain(benchmark)} has no [protocol]",
+                f"draft one, {draft}, then -p protocol.toml",
+            )
+        self._file = read_protocol_file(benchmark if given is None else given)
+
+    def check(self) -> None:
+        """Raise UsageError for a document that cannot be written."""
+        check_outputs(self._documents, force=self._force, subject="protocol")
+
+    def write(self, done: Benchmark, command: str) -> tuple[Evaluated, list[str]]:
+        """Write the protocol of a finished benchmark; return its evaluation with the verdict, and what to show."""
+        if not self._documents:
+            return done.evaluated, []
+        from cdtool.commands.protocol.document.document import ProtocolReport, protocol_statement
+        from cdtool.commands.protocol.making import make_protocol
+
+        made = make_protocol(self._file, done, command)
+        inputs = (*done.inputs, self._file.path)
+        write_outputs(ProtocolReport(made), self._documents, force=self._force, inputs=inputs, subject="protocol")
+        return done.evaluated.with_protocol(*protocol_statement(made)), written_lines(made, self._documents)
+
+
+def written_lines(made: Protocol, written: Sequence[Path]) -> list[str]:
+    """Return the files of a protocol, and the next step."""
+    if made.verdict.outcome == "incomplete":
+        step = "settle what is incomplete, and write the protocol again"
+    else:
+        step = "check entries, curves and limits against the standard, print and sign"
+    return [*(f"written: {plain(path)}" for path in written), f"next: {step}"]

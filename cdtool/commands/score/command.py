@@ -1,0 +1,87 @@
+"""`cdtool score`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from cdtool.commands.console import completions
+from cdtool.commands.console.console import print_skipped, progress
+from cdtool.commands.console.options import (
+    ClusterOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    OutputOption,
+    QuietOption,
+    RetriesOption,
+    TimeoutOption,
+)
+from cdtool.commands.console.place import Place, location
+from cdtool.commands.console.summary_table import finish
+from cdtool.commands.console.written_reports import show_results, write_reports
+
+
+def score(
+    triggers: Annotated[
+        Place,
+        typer.Argument(
+            parser=location,
+            help="CSV with columns recording, time_s and, for several detectors, detector.",
+            metavar="TRIGGERS",
+            autocompletion=completions.files(".csv"),
+        ),
+    ],
+    benchmark: Annotated[
+        Place,
+        typer.Option(
+            "--benchmark",
+            "-b",
+            parser=location,
+            help="Benchmark file: recordings, contacts and rules.",
+            autocompletion=completions.files(".toml"),
+        ),
+    ],
+    output: OutputOption = None,
+    force: ForceOption = False,
+    clock: Annotated[
+        Literal["recording", "source"],
+        typer.Option(
+            "--clock", help="Clock of the trigger times: the recording's, as cdtool shows it, or the source's."
+        ),
+    ] = "recording",
+    listed_only: Annotated[
+        bool, typer.Option("--listed-only", help="Skip recordings without a row instead of counting them as no alarm.")
+    ] = False,
+    jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Score the trigger times of any controller or program by the same rules as `cdtool benchmark`.
+
+    Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
+    """
+    from cdtool.commands.score.score_triggers import score as run
+    from cdtool.execution.workers import Workers
+    from cdtool.report.outputs import check_outputs
+    from cdtool.report.writers.base import Report
+    from cdtool.results.files.results_file import to_json
+
+    workers = Workers(jobs, timeout, retries, cluster)
+    targets = output or []
+    check_outputs(targets, force=force)
+    with progress("scoring", quiet=quiet) as advance:
+        done = run(triggers, benchmark, clock=clock, listed_only=listed_only, workers=workers, progress=advance)
+    results = done.evaluated.results
+    report = Report(done.evaluated, done.traces)
+    written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
+    print_skipped(results.skipped, results.findings)
+    if as_json:
+        typer.echo(to_json(results), nl=False)
+    else:
+        show_results(done.evaluated, written, quiet=quiet)
+    finish(done.evaluated)

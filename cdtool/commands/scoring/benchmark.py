@@ -1,0 +1,336 @@
+"""Many recordings, many detectors: learn, detect, match, count."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.registry import plugin_packages
+from cdtool.base.version import __version__
+from cdtool.commands.judging.runs import to_be_seen
+from cdtool.commands.learning.normal_runs import NormalsWithout
+from cdtool.commands.learning.threshold_settings import set_by_hand
+from cdtool.commands.scoring.benchmark_file import (
+    HOLDOUT,
+    BenchmarkFile,
+    read_benchmark_file,
+    refuse_limits_by_hand,
+    with_detectors,
+    with_only,
+)
+from cdtool.commands.scoring.gathering import Gathering
+from cdtool.commands.scoring.learned import Learned, Teaching
+from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
+from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
+from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
+from cdtool.commands.scoring.scoring import Detect, Scored, detect_with, score_runs
+from cdtool.commands.scoring.store.stored_learned import StoreOfRun
+from cdtool.commands.scoring.store.stored_outcomes import StoreReport
+from cdtool.detectors.base import Detector
+from cdtool.execution.store.digest import code_version, digest_of
+from cdtool.execution.store.use import StoreUse
+from cdtool.execution.workers import Progress, Workers
+from cdtool.recordings.operations import Operation
+from cdtool.recordings.plausible import LearnedRanges
+from cdtool.results.curves.false_alarm_budget import Budget
+from cdtool.results.curves.sweep import MULTIPLES
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.limits import LimitRule, unchecked
+from cdtool.results.results import RecordingFinding, Results, Skipped
+from cdtool.results.traces.trace import Trace
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.normal_choice import NormalMotions
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """The results with their statistics, the selected traces, the time per step [s], and the files read.
+
+    `stored` is how much of them was in the store; None without one.
+    """
+
+    evaluated: Evaluated
+    traces: tuple[Trace, ...]
+    seconds: Mapping[str, float]
+    inputs: tuple[Path, ...] = ()
+    stored: StoreReport | None = None
+
+    __repr__ = short_repr
+
+    @property
+    def results(self) -> Results:
+        """Return all verdicts with raw numbers and provenance."""
+        return self.evaluated.results
+
+
+def benchmark(
+    file: str | Path | BenchmarkFile,
+    *,
+    detectors: Sequence[str | Detector] = (),
+    false_alarm_budget: str | None = None,
+    jobs: int = 1,
+    workers: Workers | None = None,
+    store: StoreUse | None = None,
+    progress: Progress | None = None,
+) -> Benchmark:
+    """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
+
+    Parameters
+    ----------
+    file : str, Path or BenchmarkFile
+        The benchmark file.
+    detectors : sequence of str or Detector, optional
+        Detectors in place of the file's: names, or objects with their gains, as `Momentum(bandwidth=20.0)`. Only "all":
+        every registered detector that can learn from these logs; the others are listed in `results.findings`.
+    false_alarm_budget : str, optional
+        As "1/1000op" or "0.1/h": sets each detector's safety factor on the runs learned from.
+    jobs : int, optional
+        Number of logs processed at a time; the results do not depend on it.
+    workers : Workers, optional
+        In place of `jobs`: also the longest time for a log, and how often one that ended its worker is tried again;
+        or a Dask cluster.
+    store : StoreUse, optional
+        Where outcomes are kept: a log is computed only if something that determines its outcome has changed.
+    progress : callable, optional
+        Called after each log with the number done and the total.
+
+    Returns
+    -------
+    Benchmark
+        The results and their statistics. Logs that cannot be read or scored are listed in `results.skipped`; so is a
+        detector without one of its channels, all contacts of which are not assessable.
+
+    Raises
+    ------
+    ConfigurationError
+        The benchmark file, the machine file or the store is wrong; the message names the key.
+    SignatureError
+        Nothing can be learned.
+    RecordingError
+        No log could be scored.
+    UsageError
+        There are too few runs for the false-alarm budget.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> done = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
+    >>> [(row.group, row.detected, row.missed) for row in done.evaluated.summaries]
+    [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
+    """
+    workers = workers or Workers(jobs)
+    work = BenchmarkWork.of(file, detectors, false_alarm_budget)
+    work = replace(work, setup=work.setup.with_made(workers, progress))
+    with ExitStack() as stack:
+        folder = stack.enter_context(store.opened()) if store else None
+        logs = [path for item in work.setup.impacts.values() for path in item.logs]
+        stack.enter_context(workers.ready(to_be_seen([*work.setup.learn, *logs])))
+        if store is None or folder is None:
+            return _run(work, workers, None, progress)
+        return _run(work, workers, StoreOfRun(folder, store, workers), progress)
+
+
+@dataclass(frozen=True)
+class BenchmarkWork:
+    """A benchmark file with the options of the command; `limits` are those in the file."""
+
+    setup: BenchmarkFile
+    limits: tuple[LimitRule, ...]
+    every_detector: bool
+
+    @classmethod
+    def of(
+        cls, file: str | Path | BenchmarkFile, detectors: Sequence[str | Detector], budget: str | None
+    ) -> BenchmarkWork:
+        """Read a benchmark file unless it has been read; raises as `benchmark`."""
+        setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
+        limits = setup.limits
+        setup = with_detectors(setup, detectors) if detectors else setup
+        setup = replace(setup, budget=Budget.parse(budget)) if budget is not None else setup
+        refuse_limits_by_hand(setup)
+        return cls(setup, limits, list(detectors) == ["all"])
+
+
+def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> Benchmark:
+    begin = perf_counter()
+    setup, measured = with_synchronisation(work.setup, workers)
+    teaching = Teaching(setup, workers, every_detector=work.every_detector)
+    learned = store.learned(teaching) if store else teaching.learned
+    setup = with_only(setup, learned.about.detectors)
+    seconds = perf_counter() - begin
+    factors = sweep_factors(setup, learned.thresholds)
+    gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
+    gathered.skipped += (*setup.not_made, *learned.about.skipped)
+    gathered.findings += [*measured, *learned.about.findings]
+    gathered.findings += unchecked(work.limits, setup.detectors, str(setup.path))
+    gathered.skipped += [
+        Skipped(name, f"{group}: not tested by injected contacts: {reason}")
+        for group, item in setup.impacts.items()
+        for name, reason in item.refused.items()
+    ]
+    logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
+    used = [setup.machine_file.detector(name) for name in setup.detectors]
+    provenance = _provenance(setup, used, learned)
+    stored = store.outcomes(setup, learned, factors) if store else None
+    plan = stored.plan(logs, workers) if stored else ()
+    beside_logs = _digest_beside_logs(gathered, learned, provenance, stored.determinants.normals) if stored else ""
+    found = stored.finished(beside_logs, provenance) if stored else None
+    if found is None:
+        gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
+        gathered.skipped += _labels_without_run(setup, gathered.scored)
+        provenance["units"] |= gathered.units
+        evaluated = evaluate(gathered.results(provenance, learned.about.calibration), setup.limits)
+        traces = gathered.traces
+    else:
+        evaluated, traces = found[0].evaluated, found[1]
+        if progress:
+            progress(len(logs), len(logs))
+    report = stored.finish() if stored else None
+    if stored and found is None:
+        stored.add_finished(beside_logs, evaluated, gathered.trace_keys)
+    times = {"reading": learned.seconds + gathered.reading, "detecting": seconds - learned.seconds + gathered.detecting}
+    return Benchmark(evaluated, traces, times, setup.inputs, report)
+
+
+def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mapping[str, Any], normals: str) -> str:
+    """Return the digest of what determines the results beside the outcome of each log, before the first is scored.
+
+    `normals` is the digest of the normal motion.
+    """
+    setup = gathered.setup
+    return digest_of(
+        code_version(),
+        provenance,
+        str(setup.path),
+        setup.limits,
+        setup.labels,
+        {name: group.force for name, group in setup.impacts.items()},
+        list(gathered.skipped),
+        list(gathered.findings),
+        learned.about.calibration,
+        learned.about.sources,
+        normals,
+    )
+
+
+@dataclass(frozen=True)
+class _LogScoring:
+    """Scores one log with every detector: what `score_runs` needs for any log of the benchmark."""
+
+    setup: BenchmarkFile
+    detectors: tuple[Detector, ...]
+    thresholds: ThresholdsByLog
+    unusable: Mapping[str, str]
+    factors: Mapping[str, FloatArray]
+    ranges: LearnedRanges
+    normals: NormalMotions
+    runs: tuple[Operation, ...]
+
+    __repr__ = short_repr
+
+    def __call__(
+        self, group: str, path: Path, wanted: Wanted | None, detectors: tuple[str, ...] | None
+    ) -> list[LogOutcome]:
+        refused = self.setup.impacts[group].refused if group in self.setup.impacts else {}
+        if refused:
+            wanted_here = detectors or tuple(item.name for item in self.detectors)
+            detectors = tuple(name for name in wanted_here if name not in refused)
+        chosen = self if detectors is None else self._with_only(detectors)
+        scored = score_runs(chosen.setup, group, path, chosen._detection_of, chosen.factors, chosen.ranges)
+        return [outcome_of(item, chosen.setup, chosen._normals_for(item), wanted) for item in scored]
+
+    def _with_only(self, names: tuple[str, ...]) -> _LogScoring:
+        chosen = tuple(detector for detector in self.detectors if detector.name in names)
+        return replace(self, detectors=chosen, thresholds=self.thresholds.with_only(names))
+
+    def _normals_for(self, scored: Scored) -> NormalMotions | NormalsWithout:
+        """Return the normal motion that a log is compared with: without its own."""
+        if not self.runs or scored.log is None:
+            return self.normals
+        return NormalsWithout(self.runs, scored.log.name, self.setup.rule)
+
+    def _detection_of(self, log: Path) -> tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]:
+        thresholds, untaught = self.thresholds.without(log)
+        return detect_with(self.setup, self.detectors, thresholds, self.unusable), untaught
+
+
+def _scoring(
+    setup: BenchmarkFile, learned: Learned, teaching: Teaching, factors: Mapping[str, FloatArray]
+) -> _LogScoring:
+    """Return how a log is scored; the runs themselves are needed only for a log that is learned from, too."""
+    return _LogScoring(
+        setup,
+        tuple(setup.machine_file.detector(name) for name in setup.detectors),
+        ThresholdsByLog(setup, learned.thresholds, teaching.pairs if setup.both else {}),
+        learned.about.unusable,
+        factors,
+        learned.ranges,
+        learned.normals,
+        teaching.operations if setup.both else (),
+    )
+
+
+def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[Skipped]:
+    """Return the names in the label file that no run has; rows about whole logs were checked before reading."""
+    if setup.labels is None or not setup.has_runs:
+        return []
+    used = {setup.labels.name_of(name) for name in scored}
+    return [
+        Skipped(name, f"no such run is scored: {', '.join(lines)} left out")
+        for name, lines in setup.labels.lines.items()
+        if name not in used
+    ]
+
+
+def sweep_factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, FloatArray]:
+    """Return the safety factors of the sweep by detector; empty without an impact-free group."""
+    if HOLDOUT not in setup.impacts:
+        return {}
+    return {name: items[0].safety_factor * MULTIPLES for name, items in thresholds.items() if items}
+
+
+def _provenance(
+    setup: BenchmarkFile,
+    detectors: Sequence[Any],
+    learned: Learned,
+) -> dict[str, Any]:
+    injected = {name: dict(group.injected) for name, group in setup.impacts.items() if group.injected}
+    return {
+        "tool": "cdtool",
+        "tool_version": __version__,
+        "benchmark_sha256": setup.digest,
+        "machine": setup.machine_file.machine.name,
+        "machine_sha256": setup.machine_file.digest,
+        "gains": {detector.name: asdict(detector) for detector in detectors},
+        "threshold": setup.threshold,
+        "threshold_rule": asdict(setup.rule),
+        "signature_rule": {
+            **asdict(setup.signature),
+            "safety_factor": None if setup.budget else setup.signature.factor,
+        },
+        "signature_sha256": {name: _digest(items) for name, items in learned.thresholds.items()},
+        "learned_runs": list(learned.about.names),
+        **setup.learned_parts,
+        "safety_factor_set": "by budget" if setup.budget else "by hand" if set_by_hand(setup.rule) else "by default",
+        **setup.activation.described,
+        **setup.scoring,
+        "false_alarm_budget": str(setup.budget) if setup.budget else None,
+        "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},
+        "short_names": {detector.name: detector.short_name for detector in detectors},
+        "learned_sha256": dict(sorted(learned.about.digests.items())),
+        "plugins": plugin_packages(),
+        **({"injected": injected} if injected else {}),
+    }
+
+
+def _digest(thresholds: Sequence[FittedThreshold]) -> str:
+    text = json.dumps([item.to_dict() for item in thresholds], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,300 @@
+"""The result of a benchmark for Python: rows as DataFrames, the figures of its reports, and the reports themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cdtool.base.errors import UsageError, nearest
+from cdtool.base.notebook.html_table import html_table
+from cdtool.base.notebook.near_attributes import NearAttributes
+from cdtool.base.notebook.presenting import described
+from cdtool.base.notebook.same_values import equal_by_values
+from cdtool.base.plain_text import counted, first_of, shorten
+from cdtool.base.remote.remote_path import location
+from cdtool.commands.scoring.benchmark import Benchmark
+from cdtool.commands.scoring.store.stored_outcomes import StoreReport
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.frames import results_as_frame
+from cdtool.results.results import Results
+from cdtool.results.summary import FIGURES
+from cdtool.results.traces.trace import Trace
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+# A repr is one line.
+_LONGEST_HEADLINE = 100
+_COUNTS = ("contacts", "detected", "missed", "not_assessable", "false_alarms", "operations", "hours")
+_SHOWN = ("group", "detector", "detected", "missed", "not assessable", "median [ms]", "mean [ms]", "false alarms")
+
+
+@dataclass(frozen=True, repr=False)
+class BenchmarkResult(NearAttributes):
+    """What a benchmark measured: DataFrames, figures and reports.
+
+    `contacts`, `false_alarms` and the other frames have a column per field of `results.json`, under the same names,
+    with units. `results` are the same rows as plain values, `evaluated` these with all statistics. `traces` are the
+    curves that the trigger plots show. A frame is made at its first use, and is the same one from then on.
+
+    Parameters
+    ----------
+    evaluated : Evaluated
+        The rows with their statistics.
+    traces : tuple of Trace
+        The curves that were kept.
+    inputs : tuple of Path
+        The files that were read; they are never overwritten.
+    seconds : mapping of str to float
+        The time of each step [s]; empty for results that were read from a file.
+    stored : StoreReport, optional
+        How much was in the store; None without one.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> result = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
+    >>> result.headline
+    '4 of 8 limits not checked (pure_inertia, friction_ekf not run); all 9 limits are met'
+    >>> result.contacts.groupby("group", observed=True).latency_ms.median().round().astype(int).to_dict()
+    {'stiff': 63, 'soft': 119}
+    >>> result.summary().loc[("stiff", "momentum"), ["detected", "missed"]].tolist()
+    [4.0, 0.0]
+    """
+
+    evaluated: Evaluated
+    traces: tuple[Trace, ...] = ()
+    inputs: tuple[Path, ...] = field(default=(), compare=False)
+    seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
+    stored: StoreReport | None = field(default=None, compare=False)
+
+    __eq__ = equal_by_values
+
+    @classmethod
+    def of(cls, done: Benchmark) -> BenchmarkResult:
+        """Return the result of a finished benchmark."""
+        return cls(done.evaluated, done.traces, done.inputs, done.seconds, done.stored)
+
+    @property
+    def results(self) -> Results:
+        """The rows and their provenance as plain values."""
+        return self.evaluated.results
+
+    @property
+    def headline(self) -> str:
+        """The conclusion in one line, as every report shows it."""
+        return self.results.conclusion.headline
+
+    @cached_property
+    def contacts(self) -> pd.DataFrame:
+        """A row per contact and detector; `latency_ms` is NaN unless `outcome` is "detected"."""
+        return self.frame("contacts")
+
+    @cached_property
+    def false_alarms(self) -> pd.DataFrame:
+        """A row per alarm without a contact."""
+        return self.frame("false_alarms")
+
+    @cached_property
+    def exposure(self) -> pd.DataFrame:
+        """A row per group and detector: how long and how often it was monitored."""
+        return self.frame("exposure")
+
+    @cached_property
+    def recordings(self) -> pd.DataFrame:
+        """A row per log that was scored."""
+        return self.frame("recordings")
+
+    @cached_property
+    def limits(self) -> pd.DataFrame:
+        """A row per limit that was checked."""
+        return self.frame("limits")
+
+    @cached_property
+    def skipped(self) -> pd.DataFrame:
+        """A row per log or detector that was left out, with the reason."""
+        return self.frame("skipped")
+
+    @cached_property
+    def findings(self) -> pd.DataFrame:
+        """A row per finding about a log that was used."""
+        return self.frame("findings")
+
+    def frame(self, table: str) -> pd.DataFrame:
+        """Return one kind of rows as a new DataFrame.
+
+        Parameters
+        ----------
+        table : str
+            The name of the rows in `results.json`: "contacts", "forces", "sweep", and so on.
+
+        Returns
+        -------
+        DataFrame
+            A column per field, all columns even without a row.
+
+        Raises
+        ------
+        UsageError
+            There are no rows of that name.
+        """
+        from cdtool.results.files.results_folder import tables
+
+        if table not in tables():
+            raise UsageError(f"no table '{table}' in the results", nearest(table, tuple(tables())))
+        return results_as_frame(self.results, table)
+
+    def summary(self) -> pd.DataFrame:
+        """Return the statistics of each detector in each group: the metrics that `[limits]` may name.
+
+        Returns
+        -------
+        DataFrame
+            Index: group and detector, in the order of the benchmark file, changed conditions last. All columns are
+            floats, NaN where a metric is not known. The counts are first, because a latency means nothing without
+            them: `median_ms` and `p95_ms` count a missed contact as later than all others, `mean_ms` and `std_ms` are
+            those of the detected contacts.
+        """
+        import pandas as pd
+
+        items = (*self.evaluated.summaries, *self.evaluated.conditions)
+        names = [*_COUNTS, *(name for name in FIGURES if name not in _COUNTS)]
+        values = {name: [float(FIGURES[name](item)) for item in items] for name in names}
+        of_rows = {"group": self.results.every_group, "detector": self.results.detectors}
+        index = [pd.Categorical([getattr(item, name) for item in items], of_rows[name]) for name in of_rows]
+        return pd.DataFrame(values, index=pd.MultiIndex.from_arrays(index, names=list(of_rows)), dtype="float64")
+
+    @property
+    def plot(self) -> BenchmarkPlots:
+        """The figures of the reports, for a notebook: `result.plot.latency()`."""
+        return BenchmarkPlots(self)
+
+    def save(self, *targets: str | Path, force: bool = False) -> list[Path]:
+        """Write reports, as `cdtool benchmark -o` does.
+
+        Parameters
+        ----------
+        *targets : str or Path
+            A folder for all reports, or names that end in .html, .md, .json, .xml, .csv, .png, .parquet ...
+        force : bool, optional
+            Replace files that cdtool did not write.
+
+        Returns
+        -------
+        list of Path
+            The files; of a folder, its report.
+
+        Raises
+        ------
+        UsageError
+            A target cannot be written, or is a file that cdtool did not write.
+        """
+        from cdtool.report.outputs import write_outputs
+        from cdtool.report.writers.base import Report
+
+        report = Report(self.evaluated, self.traces)
+        return write_outputs(report, [location(target) for target in targets], force=force, inputs=self.inputs)
+
+    def __repr__(self) -> str:
+        results = self.results
+        size = ", ".join(
+            counted(len(rows), name)
+            for rows, name in (
+                (results.detectors, "detector"),
+                (results.every_group, "group"),
+                (results.recordings, "recording"),
+            )
+        )
+        return f"BenchmarkResult({size}: {shorten(self.headline, _LONGEST_HEADLINE)})"
+
+    def _repr_html_(self) -> str:
+        """Return the statistics as a table, which a notebook shows."""
+        rows = [
+            (
+                item.group,
+                item.detector,
+                item.detected if item.contacts else None,
+                item.missed if item.contacts else None,
+                item.not_assessable if item.contacts else None,
+                item.median_ms,
+                item.mean_ms,
+                item.false_alarms if item.watched else None,
+            )
+            for item in self.evaluated.summaries
+        ]
+        return html_table(f"Benchmark: {self.headline}", _SHOWN, rows)
+
+
+@dataclass(frozen=True)
+class BenchmarkPlots(NearAttributes):
+    """The plots of a benchmark's reports: each a `matplotlib.figure.Figure`, which Jupyter shows without pyplot."""
+
+    result: BenchmarkResult
+
+    def latency(self) -> Figure:
+        """Return the latency of every contact, by group and detector, with the counts to read it with."""
+        from cdtool.report.plots.latency_plot import latency_figure
+
+        return described(latency_figure(self.result.evaluated), "latency of every contact by group and detector")
+
+    def survival(self) -> Figure:
+        """Return the share of the contacts that are still undetected over the time since their onset."""
+        from cdtool.report.plots.survival_plot import survival_figure
+
+        return described(survival_figure(self.result.evaluated), "share of the contacts still undetected over time")
+
+    def amoc(self) -> Figure:
+        """Return the median latency against the false alarms, with all limits moved; needs an impact-free group."""
+        from cdtool.report.plots.amoc_plot import amoc_figure
+
+        return described(amoc_figure(self.result.evaluated), "median latency against false alarms")
+
+    def triggers(self, recording: str | None = None, *, group: str | None = None) -> Figure:
+        """Return all detectors below the load-cell curve of one recording.
+
+        Parameters
+        ----------
+        recording : str, optional
+            A recording whose curves were kept, as `contacts.recording` names it or by any ending of this name that no
+            other has, such as "03.csv"; by default the one that shows most.
+        group : str, optional
+            Of one group only.
+
+        Returns
+        -------
+        Figure
+            The load cell, and a row per detector, the fastest first.
+
+        Raises
+        ------
+        UsageError
+            No curves of the recording or the group were kept.
+        """
+        from cdtool.report.plots.trigger_plot import most_informative, trigger_figure
+
+        found = [
+            trace
+            for trace in self.result.traces
+            if group in (None, trace.group)
+            and (recording is None or any(f"/{name}".endswith(f"/{recording}") for name in _names_of(trace)))
+        ]
+        found = [trace for trace in found if recording in _names_of(trace)] or found
+        several = dict.fromkeys(_names_of(trace)[-1] for trace in found)
+        if recording is not None and len(several) > 1:
+            raise UsageError(f"'{recording}' fits {first_of(list(several))}", "give more of its path")
+        if not found:
+            asked = recording or group or ""
+            known = dict.fromkeys(trace.recording if recording else trace.group for trace in self.result.traces)
+            hint = nearest(asked, tuple(known)) if known else "run the benchmark, or keep results.traces.json.gz"
+            raise UsageError(f"no curves of '{asked}' were kept" if asked else "no curves were kept", hint)
+        trace = most_informative(found)
+        return described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
+
+
+def _names_of(trace: Trace) -> tuple[str, str]:
+    """Return the name of an operation, and that of its log."""
+    return trace.recording, trace.recording.partition("#")[0]

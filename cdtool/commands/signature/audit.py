@@ -1,0 +1,118 @@
+"""The result of an audit of a season: runs, joints, and the changes that are shown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.commands.signature.deviation import Axis
+from cdtool.recordings.motion import MotionClass
+from cdtool.statistics.interval import Interval
+from cdtool.statistics.trends import ChangeOverRuns
+
+
+@dataclass(frozen=True)
+class AuditedRun:
+    """One run and one joint: see `Deviations` for what is in spreads, and its signs.
+
+    `overall`: shift of the whole stroke. `local`: the largest one beyond it, at the place `local_at`; NaN where none is
+    valid. `critical_factor`: the safety factor at which this joint would alarm; `margin_used` is its share of the one
+    in use, 1 at an alarm. `alarm`: whether this joint does.
+    """
+
+    name: str
+    overall: float
+    local: float
+    local_at: float
+    critical_factor: float
+    margin_used: float
+    alarm: bool
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A change that is shown: its trend over the runs, its location (None: the whole stroke), and the runs left.
+
+    `outward`: it goes towards a limit. `runs_left`: after how many more runs a typical run would raise an alarm if the
+    change continues; infinite if it does not approach the limit.
+    """
+
+    course: ChangeOverRuns
+    place: float | None
+    outward: bool
+    runs_left: Interval
+
+
+@dataclass(frozen=True)
+class JointDrift:
+    """One joint over the season: runs, deviation (runs, locations), and changes of the whole stroke and of a location.
+
+    `course` is the change of the runs' `overall`; `overall` and `local` are None if no change is shown. `deviation` is
+    in spreads, at the `places` along `axis`, in its `unit`.
+    """
+
+    joint: str
+    two_sided: bool
+    axis: Axis
+    unit: str
+    places: FloatArray
+    runs: tuple[AuditedRun, ...]
+    deviation: FloatArray
+    course: ChangeOverRuns
+    overall: Shown | None
+    local: Shown | None
+
+    __repr__ = short_repr
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The changes shown, a location first: it must be inspected before anything is learned."""
+        return tuple(item for item in (self.local, self.overall) if item is not None)
+
+    def at_place(self, place: float) -> FloatArray:
+        """Return the runs' deviation (runs,) at the nearest location."""
+        column: FloatArray = self.deviation[:, int(np.argmin(np.abs(self.places - place)))]
+        return column
+
+    @property
+    def runs_left(self) -> float:
+        """The number of runs until a typical run alarms if the changes continue; infinite if it never does."""
+        return min((item.runs_left.value for item in self.shown), default=math.inf)
+
+
+@dataclass(frozen=True)
+class DriftAudit:
+    """Runs of one class of motion in order of time, compared with one signature, which does not change meanwhile.
+
+    `places` (m,) along `axis`, in its `unit`: m or rad of travel, or s since the motion began. `not_assessable`: runs
+    that were nowhere assessable, and why; they are in no row.
+    """
+
+    motion: MotionClass
+    safety_factor: float
+    axis: Axis
+    unit: str
+    places: FloatArray
+    joints: tuple[JointDrift, ...]
+    not_assessable: tuple[tuple[str, str], ...]
+
+    __repr__ = short_repr
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The runs that were assessed."""
+        return tuple(item.name for item in self.joints[0].runs)
+
+    @property
+    def alarms(self) -> tuple[int, ...]:
+        """The runs in which any joint alarms, by their index in `names`."""
+        return tuple(i for i in range(len(self.names)) if any(joint.runs[i].alarm for joint in self.joints))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether a change of any joint is shown."""
+        return any(item.shown for item in self.joints)

@@ -1,0 +1,234 @@
+"""`cdtool signature show|check|update`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdtool.base.errors import UsageError
+from cdtool.base.exit_status import Fact, statuses_words
+from cdtool.base.plain_text import counted
+from cdtool.commands.console import completions
+from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress
+from cdtool.commands.console.logs_argument import logs_argument
+from cdtool.commands.console.options import (
+    ClusterOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    MachineOption,
+    OnsetAboveOption,
+    QuietOption,
+    RetriesOption,
+    TimeoutOption,
+    figure_name,
+)
+from cdtool.commands.console.place import Place, location
+from cdtool.commands.signature.shown import checked_as_json, file_as_json, show_class, show_file
+
+if TYPE_CHECKING:
+    from cdtool.commands.signature.audit import DriftAudit
+    from cdtool.commands.signature.upkeep import Checked
+
+signature = typer.Typer(
+    help="Show a signature, check it against runs, add runs to it.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+)
+
+
+@signature.callback()
+def _signature() -> None:
+    """Show a signature, check it against runs, add runs to it."""
+
+
+FileArgument = Annotated[
+    Place,
+    typer.Argument(
+        parser=location,
+        help="Signature file from cdtool learn-signature.",
+        metavar="SIGNATURE",
+        autocompletion=completions.files(".json"),
+    ),
+]
+CutOption = Annotated[
+    str | None,
+    typer.Option(
+        "--operations",
+        help="How to divide a log into operations. Default: as for learning.",
+        autocompletion=completions.operations,
+    ),
+]
+PlotOption = Annotated[Place | None, typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw.")]
+
+
+@signature.command("show", epilog=statuses_words("signature show"))
+def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False, as_json: JsonOption = False) -> None:
+    """Show a signature file: machine, detector, threshold, classes of motion, runs, and how far the limits have moved.
+
+    Example: cdtool signature show gate.feekf.json --plot signature.png
+    """
+    from cdtool.commands.learning.normal_runs import notes_on
+    from cdtool.commands.signature.upkeep import signatures_in
+    from cdtool.formats.signature_store import read_signature
+
+    drawn = figure_name(plot, force=force) if plot else None
+    stored = read_signature(file)
+    print_skipped((), notes_on(stored))
+    pairs = signatures_in(stored) if drawn else ()
+    if as_json:
+        print_json(file_as_json(stored))
+    else:
+        show_file(stored)
+    if drawn:
+        from cdtool.commands.signature.signature_plot import plot_signature
+
+        plot_signature(
+            [current for current, _ in pairs], [first for _, first in pairs], stored.unit, stored.detector, drawn
+        )
+        if not as_json:
+            typer.echo(f"plot written to {plain(drawn)}")
+
+
+@signature.command("check", epilog=statuses_words("signature check"))
+def check(
+    file: FileArgument,
+    logs: Annotated[
+        list[Place],
+        logs_argument("Impact-free recordings: the runs learned from and later ones, in order."),
+    ],
+    machine: MachineOption,
+    operations: CutOption = None,
+    target: Annotated[
+        float, typer.Option("--target", help="False-alarm probability per operation that the runs must demonstrate.")
+    ] = 1e-3,
+    plot: Annotated[
+        Place | None,
+        typer.Option(
+            "--plot", parser=location, help="PNG, SVG or PDF file of the drift; a folder for several classes."
+        ),
+    ] = None,
+    force: ForceOption = False,
+    onset_above: OnsetAboveOption = None,
+    jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    quiet: QuietOption = False,
+    retries: RetriesOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Check whether a signature was learned from enough runs and whether the machine has drifted since.
+
+    Runs in the signature are checked against a signature of all the others (leave one out). Other runs are treated as a
+    season, in the given order.
+
+    Example: cdtool signature check gate.feekf.json free/*.csv april.mcap -m machine.toml --plot drift.png
+    """
+    from cdtool.commands.learning.normal_runs import notes_on
+    from cdtool.commands.signature.upkeep import check_signature
+    from cdtool.execution.workers import Workers
+    from cdtool.truth.onset import OnsetRule
+
+    if plot is not None and not plot.is_dir():
+        figure_name(plot, force=force)
+    with progress("reading runs", quiet=quiet) as advance:
+        checked = check_signature(
+            file,
+            logs,
+            machine,
+            operations=operations,
+            target=target,
+            onset=OnsetRule(above=onset_above),
+            workers=Workers(jobs, timeout, retries, cluster),
+            progress=advance,
+        )
+    names = _plot_names(plot, checked, force=force)
+    print_skipped(checked.skipped, [*checked.findings, *notes_on(checked.file)])
+    if as_json:
+        print_json(checked_as_json(checked))
+    else:
+        for item in checked.classes:
+            show_class(item, quiet=quiet)
+    for path, audit in names:
+        from cdtool.commands.signature.drift_plot import plot_drift
+
+        plot_drift(audit, path)
+        if not as_json:
+            typer.echo(f"plot written to {plain(path)}")
+    nothing = all(item.coverage is None and item.drift is None for item in checked.classes)
+    leave(checked.skipped, checked.findings, [Fact.NOTHING_USABLE] if nothing else ())
+
+
+@signature.command("update", epilog=statuses_words("signature update"))
+def update(
+    file: FileArgument,
+    logs: Annotated[list[Place], logs_argument("Impact-free recordings to add.")],
+    machine: MachineOption,
+    operations: CutOption = None,
+    forget: Annotated[
+        float | None, typer.Option("--forget", help="Forget old runs: effective number of runs to keep, 20 to 50.")
+    ] = None,
+    cap: Annotated[
+        float | None, typer.Option("--cap", help="Limit the deviation of a run to this many spreads.")
+    ] = None,
+    reserve: Annotated[
+        float | None, typer.Option("--reserve", help="Spreads by which a limit may move from its first learned value.")
+    ] = None,
+    onset_above: OnsetAboveOption = None,
+    jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    quiet: QuietOption = False,
+    retries: RetriesOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Add impact-free runs to a signature without learning a slowly growing fault.
+
+    Example: cdtool signature update gate.feekf.json april/*.csv -m machine.toml --forget 30
+    """
+    from cdtool.commands.learning.normal_runs import notes_on
+    from cdtool.commands.signature.upkeep import update_with_runs
+    from cdtool.execution.workers import Workers
+    from cdtool.thresholds.guarded_update import CAP, RESERVE
+    from cdtool.truth.onset import OnsetRule
+
+    with progress("reading runs", quiet=quiet) as advance:
+        done = update_with_runs(
+            file,
+            logs,
+            machine,
+            operations=operations,
+            forget=forget,
+            cap=CAP if cap is None else cap,
+            reserve=RESERVE if reserve is None else reserve,
+            onset=OnsetRule(above=onset_above),
+            workers=Workers(jobs, timeout, retries, cluster),
+            progress=advance,
+        )
+    print_skipped(done.refused, [*done.findings, *notes_on(done.file)])
+    if as_json:
+        refused, findings = [asdict(item) for item in done.refused], [asdict(item) for item in done.findings]
+        print_json({"file": str(file), "added": list(done.added), "refused": refused, "findings": findings})
+    else:
+        counts = f"{len(done.refused)} refused; {len(done.file.runs)} in total"
+        typer.echo(f"{counted(len(done.added), 'run')} added to {plain(file)}, {counts}")
+    leave(done.refused, done.findings, () if done.added else [Fact.NOTHING_USABLE])
+
+
+def _plot_names(plot: Path | None, checked: Checked, *, force: bool) -> list[tuple[Path, DriftAudit]]:
+    """Return the plot file of each class with a season; raises UsageError if --plot does not fit."""
+    audits = [item.drift for item in checked.classes if item.drift]
+    if plot is not None and not audits:
+        raise UsageError(
+            "--plot shows the drift over a season, but no log is new", "give logs that are not in the signature"
+        )
+    if plot is None:
+        return []
+    if plot.is_dir():
+        return [(figure_name(plot / f"drift_{number}.png", force=force), item) for number, item in enumerate(audits, 1)]
+    if len(audits) > 1:
+        raise UsageError(f"--plot names one file for {len(audits)} classes of motion", "give an existing folder")
+    return [(figure_name(plot, force=force), audits[0])]

@@ -1,0 +1,182 @@
+"""`cdtool study`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cdtool.base.errors import UsageError
+from cdtool.base.exit_status import statuses_words
+from cdtool.commands.console.console import number, plain, print_json, table
+from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption
+from cdtool.commands.console.place import Place, location
+
+if TYPE_CHECKING:
+    from cdtool.commands.study.study import SensorStudy
+
+study = typer.Typer(
+    help="Study an impact before the machine is built.", no_args_is_help=True, rich_markup_mode="markdown"
+)
+
+NOT_SEEN = "not seen"
+
+
+@study.callback()
+def _study() -> None:
+    """Study an impact before the machine is built."""
+
+
+@study.command("sensors", epilog=statuses_words("study sensors"))
+def sensors(
+    machine: MachineOption,
+    file: Annotated[
+        Place | None,
+        typer.Option(
+            "--study", parser=location, help="TOML: [impact], [drive], [controller], [sensors.*]; docs/study.md."
+        ),
+    ] = None,
+    joint: Annotated[str, typer.Option("--joint", help="Joint to study; required if there are several.")] = "",
+    speed: Annotated[float | None, typer.Option("--speed", help="Load speed at contact [m/s].")] = None,
+    stiffness: Annotated[float | None, typer.Option("--stiffness", help="Obstacle stiffness [N/m].")] = None,
+    lever: Annotated[
+        float | None,
+        typer.Option("--lever", help="Rotary axis, arm, robot: distance from the axis to the contact [m]."),
+    ] = None,
+    drive_stiffness: Annotated[
+        float | None, typer.Option("--drive-stiffness", help="Drive stiffness at the load [N/m, N m/rad].")
+    ] = None,
+    factor: Annotated[
+        float, typer.Option("--k", help="Detection limit: k sigma of the noise plus the resolution.")
+    ] = 5.0,
+    as_json: JsonOption = False,
+    output: Annotated[
+        Place | None, typer.Option("--output", "-o", parser=location, help="A figure: .png, .svg, .pdf.")
+    ] = None,
+    force: ForceOption = False,
+) -> None:
+    """Rank the sensors by when they detect an impact, with the force and the limiting factor (thesis figure 4.10).
+
+    Example: cdtool study sensors -m sample_logs/gate/machine.toml --speed 0.2 --stiffness 5e5
+    """
+    from cdtool.commands.study.study import study_sensors
+
+    if output:
+        from cdtool.base.files.foreign import refuse_foreign_figure
+        from cdtool.report.plots.figures import SUFFIXES
+
+        if output.suffix.lower() not in SUFFIXES:
+            raise UsageError(f"--output is '{output}'", f"the name must end in {', '.join(SUFFIXES)}")
+        refuse_foreign_figure(output, force=force)
+    given = {
+        "impact.speed": speed,
+        "impact.stiffness": stiffness,
+        "impact.lever": lever,
+        "drive.stiffness": drive_stiffness,
+    }
+    options = {key: value for key, value in given.items() if value is not None}
+    done = study_sensors(machine, file, joint=joint, factor=factor, options=options)
+    if output:
+        from cdtool.commands.study.sensor_plot import plot_ranking
+
+        plot_ranking(done.ranking, output)
+    if as_json:
+        print_json(_as_dict(done))
+    else:
+        _show(done)
+
+
+@study.command("figures", epilog=statuses_words("study figures"))
+def figures(
+    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")],
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw the thesis's figures of impacts: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
+
+    Example: cdtool study figures -o figures
+    """
+    from cdtool.commands.study.impact_plots import draw_impact_figures
+
+    written = draw_impact_figures(output, force=force)
+    if as_json:
+        print_json([str(path) for path in written])
+        return
+    for path in written:
+        typer.echo(plain(path))
+
+
+def _show(done: SensorStudy) -> None:
+    ranking = done.ranking
+    case = ranking.case
+    typer.echo(
+        f"{plain(done.machine)}, joint {plain(done.joint)}: {case.transmission.load_mass:.4g} kg at {case.speed:g} m/s "
+        f"on {case.obstacle.stiffness:g} N/m: {0.5 * case.transmission.load_mass * case.speed**2:.3g} J"
+    )
+    columns = [("sensor", "left"), ("where", "left")]
+    columns += [
+        ("limit", "right"),
+        ("", "left"),
+        ("seen\nms", "right"),
+        ("force then\nN", "right"),
+        ("largest so far\nN", "right"),
+    ]
+    columns += [("limited by", "left"), ("what helps most", "left")]
+    rows = []
+    for item in ranking.responses:
+        time = NOT_SEEN if item.time is None else f"{1e3 * item.time:.1f}"
+        saving = "" if item.saving is None else f": {1e3 * item.saving:.1f} ms earlier"
+        cells = (item.sensor.name, item.sensor.place, number(item.threshold), item.sensor.unit, time)
+        rows.append(
+            (*cells, _newtons(item.force), _newtons(item.peak_so_far), item.limited_by, f"{item.remedy}{saving}")
+        )
+    table(columns, rows)
+    typer.echo()
+    typer.echo(
+        f"seen: beyond {ranking.factor:g} sigma and the resolution, at the least favourable sampling instants, "
+        "without the machine's own variation"
+    )
+    peak = f"{ranking.peak_force:.4g} N at {1e3 * ranking.peak_time:.3g} ms"
+    typer.echo(f"if the drive is not stopped, the force reaches {peak} (analysed for {1e3 * case.window:g} ms)")
+    typer.echo(ranking.rigidity.words)
+    if done.waves:
+        typer.echo(done.waves.words)
+    for words in done.assumptions:
+        typer.echo(f"assumed: {plain(words)}")
+
+
+def _newtons(force: float | None) -> str:
+    return "-" if force is None else f"{force:.0f}"
+
+
+def _as_dict(done: SensorStudy) -> dict[str, Any]:
+    ranking = done.ranking
+    rows = [
+        {
+            "sensor": item.sensor.name,
+            "where": item.sensor.place,
+            "limit": item.threshold,
+            "unit": item.sensor.unit,
+            "time_ms": None if item.time is None else 1e3 * item.time,
+            "force_n": item.force,
+            "peak_so_far_n": item.peak_so_far,
+            "limited_by": item.limited_by,
+            "remedy": item.remedy,
+            "saving_ms": None if item.saving is None else 1e3 * item.saving,
+        }
+        for item in ranking.responses
+    ]
+    rigidity = ranking.rigidity
+    return {
+        "machine": done.machine,
+        "joint": done.joint,
+        "speed": ranking.case.speed,
+        "stiffness": ranking.case.obstacle.stiffness,
+        "k": ranking.factor,
+        "sensors": rows,
+        "peak_force_n": ranking.peak_force,
+        "peak_time_ms": 1e3 * ranking.peak_time,
+        "rigidity": {"share": rigidity.share, "rigid": rigidity.rigid, "motion_ratio": rigidity.motion_ratio},
+        "waves": None if done.waves is None else {"ratio": done.waves.ratio, "warning": done.waves.warning},
+        "assumptions": list(done.assumptions),
+    }

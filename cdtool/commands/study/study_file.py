@@ -1,0 +1,315 @@
+"""Read the impact to simulate and the sensors to rank from a machine and a study file; defaults are reported.
+
+All values are on the load side. A rotary axis is referred to the contact: with the lever l inertia J/l^2, ratio n l,
+stiffness k/l^2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.remote.remote_path import location
+from cdtool.base.tables import Table, read_toml
+from cdtool.formats.machine_file import MachineFile
+from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
+from cdtool.impact.drives import SpeedController
+from cdtool.impact.sensor_ranking import ImpactCase
+from cdtool.impact.sensors import Sensor
+from cdtool.impact.transmissions.transmission import ElasticTransmission
+from cdtool.machines.axis import Axis
+from cdtool.machines.coupled import CoupledMachine
+from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS, JointMachine
+
+_DRIVE_FREQUENCY = 10.0
+_LOOP_FREQUENCY = 2.0
+_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class Study:
+    """What to simulate and rank, the load's first natural frequency [Hz] if known, and the assumptions made."""
+
+    joint: str
+    case: ImpactCase
+    sensors: tuple[Sensor, ...]
+    first_frequency: float | None
+    assumptions: tuple[str, ...]
+
+
+def read_study(
+    machine: MachineFile, file: str | Path | None, joint: str = "", options: Mapping[str, float] | None = None
+) -> Study:
+    """Read the impact and the sensors; `options` by key (impact.speed) override the file.
+
+    Raises UsageError, or ConfigurationError naming file and key; the inertias are required.
+    """
+    options = options or {}
+    for name, value in options.items():
+        if not 0.0 < value < math.inf:
+            raise UsageError(f"{name} is {value:g}", "give a number above 0")
+    root = Table(_merged(read_toml(location(file), "a study file") if file else {}, options), str(file or "study"))
+    reader = StudyReader(root)
+    part = _studied_joint(machine, joint, reader)
+    case = _case(part, reader)
+    frequency = reader.optional("impact", "first_frequency", "the load is rigid except for its drive")
+    sensors = _sensors(part, reader)
+    reader.finish()
+    return Study(part.name, case, sensors, frequency, tuple(reader.assumed))
+
+
+def _merged(values: dict[str, Any], options: Mapping[str, float]) -> dict[str, Any]:
+    merged = dict(values)
+    for name, value in options.items():
+        table, _, key = name.partition(".")
+        known = merged.get(table, {})
+        if isinstance(known, dict):
+            merged[table] = {**known, key: value}
+    return merged
+
+
+def _case(part: StudiedJoint, reader: StudyReader) -> ImpactCase:
+    speed = reader.number("impact", "speed", 0.2, "m/s", "at the contact", above=0.0)
+    stiffness = reader.number("impact", "stiffness", 5e5, "N/m", above=0.0)
+    factor = reader.number("impact", "damping_factor", 0.0, "s/m", minimum=0.0)
+    obstacle = HuntCrossley(stiffness, factor * stiffness, 1.0)
+    window = reader.number("impact", "window", 0.5, "s", "length of the simulation", above=0.0)
+    angular = 2.0 * math.pi * _DRIVE_FREQUENCY
+    why = f"the load oscillates at {_DRIVE_FREQUENCY:g} Hz on the drive with the motor at rest"
+    default = part.load_mass * angular**2 * part.square
+    drive = reader.number("drive", "stiffness", default, part.unit("N/m"), why, above=0.0) / part.square
+    ratio = reader.number("drive", "damping_ratio", 0.05, "", "of that oscillation", minimum=0.0)
+    square = part.ratio**2
+    transmission = ElasticTransmission(
+        part.motor_inertia,
+        part.load_mass,
+        part.ratio,
+        drive * square,
+        2.0 * ratio * math.sqrt(drive * part.load_mass) * square,
+        part.motor_friction,
+    )
+    controller = _controller(part, reader)
+    needed = transmission.steady_torque(speed)
+    if controller.torque_limit < needed:
+        unit = part.unit("N")
+        limit, steady = (value / part.ratio * part.lever for value in (controller.torque_limit, needed))
+        raise UsageError(
+            f"controller.force_limit is {limit:.4g} {unit}, but steady motion requires {steady:.4g} {unit}",
+            "use a larger limit, or less friction or speed",
+        )
+    return ImpactCase(transmission, controller, obstacle, speed, window)
+
+
+def _controller(part: StudiedJoint, reader: StudyReader) -> SpeedController:
+    angular = 2.0 * math.pi * _LOOP_FREQUENCY
+    why = f"a speed loop of {_LOOP_FREQUENCY:g} Hz for the whole mass"
+    default = part.mass * angular * part.square
+    proportional = reader.number("controller", "proportional", default, part.unit("N s/m"), why, above=0.0)
+    default = 0.25 * angular * proportional
+    integral = reader.number("controller", "integral", default, part.unit("N/m"), "critically damped", minimum=0.0)
+    lag = reader.number("controller", "actuator_time", 0.002, "s", "lag of the current loop", above=0.0)
+    derivative = reader.number("controller", "derivative", 0.0, part.unit("N s2/m"), minimum=0.0)
+    filtered = reader.number("controller", "derivative_time", 0.002, "s", "low-pass of the derivative", above=0.0)
+    table = reader.table("controller")
+    slew = table.number("slew_limit", above=0.0) if "slew_limit" in table else math.inf
+    limit = reader.optional("controller", "force_limit", "the drive is not stopped") or math.inf
+    to_motor, to_torque = part.ratio**2 / part.square, part.ratio / part.lever
+    return SpeedController(
+        0.0,
+        proportional * to_motor,
+        integral * to_motor,
+        lag,
+        slew_limit=slew * to_torque,
+        derivative=derivative * to_motor,
+        derivative_time=filtered,
+        torque_limit=limit * to_torque,
+    )
+
+
+def _sensors(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, ...]:
+    """Return the sensors from the contact to the controller, with stated or assumed noise, steps and filters.
+
+    An encoder counts as two sensors: the motor's position and its speed.
+    """
+    lever = part.lever
+    why = f"accelerates the whole mass by 1 m/s2{' at the contact' if part.rotary else ''}"
+    rated = reader.number("drive", "rated_force", part.mass * lever, part.unit("N"), why, above=0.0) / lever
+    torque = (part, reader, rated, lever)
+    return (
+        _force_sensor("load_cell", "at the contact", "contact_force", (part, reader, rated, 1.0), 0.001, 500.0),
+        _force_sensor("torque_sensor", "in the drive", "drive_force", torque, 0.002, 500.0),
+        _accelerometer(reader),
+        *_encoder(part, reader),
+        _force_sensor("motor_torque", "control action", "motor_force", torque, 0.01, 200.0),
+    )
+
+
+def _force_sensor(
+    name: str,
+    place: str,
+    quantity: str,
+    scales: tuple[StudiedJoint, StudyReader, float, float],
+    share: float,
+    bandwidth: float,
+) -> Sensor:
+    part, reader, rated, lever = scales
+    table, unit = f"sensors.{name}", "N" if lever == 1.0 and name == "load_cell" else part.unit("N")
+    why = f"{100.0 * share:g} % of the rated force"
+    return Sensor(
+        name,
+        place,
+        quantity,
+        "N",
+        reader.number(table, "noise", share * rated * lever, unit, why, minimum=0.0) / lever,
+        reader.number(table, "resolution", 0.0, unit, minimum=0.0) / lever,
+        reader.number(table, "bandwidth", bandwidth, "Hz", above=0.0),
+        reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0),
+    )
+
+
+def _accelerometer(reader: StudyReader) -> Sensor:
+    table, unit = "sensors.accelerometer", "m/s2"
+    bandwidth = reader.number(table, "bandwidth", 100.0, "Hz", above=0.0)
+    density = reader.number(table, "noise_density", 300e-6 * _GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)", minimum=0.0)
+    vibration = reader.number(table, "vibration", 0.1, unit, "of the moving structure, rms", minimum=0.0)
+    # A first-order low-pass has a noise bandwidth of pi/2 times its corner frequency.
+    noise = math.hypot(density * math.sqrt(0.5 * math.pi * bandwidth), vibration)
+    resolution = reader.number(table, "resolution", _GRAVITY / 4096, unit, "1/4096 g", minimum=0.0)
+    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
+    return Sensor("accelerometer", "on the load", "load_acceleration", unit, noise, resolution, bandwidth, rate)
+
+
+def _encoder(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, Sensor]:
+    table = "sensors.encoder"
+    counts = reader.number(table, "counts_per_turn", 4096.0, "", "12 bit, on the motor", minimum=1.0)
+    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
+    bandwidth = reader.number(table, "speed_bandwidth", 60.0, "Hz", "low-pass after the difference", above=0.0)
+    speed_noise = reader.number(table, "speed_noise", 0.0, "m/s", "ripple of the speed", minimum=0.0)
+    noise = reader.number(table, "position_noise", 0.0, "m", "variation of the impact-free position", minimum=0.0)
+    step = 2.0 * math.pi * part.ratio / counts
+    return (
+        Sensor("motor_position", "on the motor", "motor_position", "m", noise, step, math.inf, rate),
+        Sensor("motor_speed", "on the motor", "motor_position", "m/s", speed_noise, step, bandwidth, rate, True),
+    )
+
+
+@dataclass(frozen=True)
+class StudiedJoint:
+    """A joint referred to the contact: `load_mass` [kg], `motor_inertia` [kg m2], `ratio` [m/rad], `motor_friction`.
+
+    `motor_friction` is at the motor [N m s/rad]. The contact with a rotary joint is at `lever` l [m] from its axis, so
+    its inertia there is J/l^2 and its ratio n l; the lever of a linear joint is 1.
+    """
+
+    name: str
+    load_mass: float
+    motor_inertia: float
+    ratio: float
+    motor_friction: float
+    lever: float
+    rotary: bool
+
+    @property
+    def square(self) -> float:
+        """Return l^2 [m2]: a joint stiffness [N m/rad] divided by it is that at the contact [N/m]."""
+        return self.lever**2
+
+    @property
+    def mass(self) -> float:
+        """Return the mass of load and motor at the contact [kg]."""
+        return self.load_mass + self.motor_inertia / self.ratio**2
+
+    def unit(self, linear: str) -> str:
+        """Return the load-side unit: N/m of a linear axis is N m/rad of a rotary one."""
+        return linear.replace("/m", "/rad").replace("N", "N m") if self.rotary else linear
+
+
+def _studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> StudiedJoint:
+    """Return the joint `wanted` ("" if there is only one) of a machine with joints.
+
+    For an arm or a robot with coupled joints, the others are assumed at rest: the inertia is the diagonal of M. Raises
+    UsageError for an unknown joint and a missing or meaningless lever, ConfigurationError for a missing inertia.
+    """
+    machine = file.machine
+    if not isinstance(machine, Axis | CoupledMachine) or machine.load_units not in (LINEAR_UNITS, ROTARY_UNITS):
+        raise ConfigurationError(
+            f"{file.path}: no joint of this machine can be studied", "its joints must all rotate or all slide"
+        )
+    if not wanted and len(machine.joints) > 1:
+        names = ", ".join(machine.joints)
+        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"select one with --joint: {names}")
+    if wanted and wanted not in machine.joints:
+        raise UsageError(f"{file.path} has no joint '{wanted}'", nearest(wanted, machine.joints))
+    at = machine.joints.index(wanted) if wanted else 0
+    load, motor = _load_inertia(machine, at), machine.motor_inertia[at]
+    key = machine.inertia_key if isinstance(machine, Axis) else "the load's inertia"
+    needs = "a study requires the inertias of load and motor"
+    if machine.coordinates == "load":
+        needs += ": set coordinates = 'motor' with motor_inertia and transmission_ratio"
+    for name, value in ((key, load), ("motor_inertia", motor)):
+        if value <= 0.0:
+            raise ConfigurationError(f"{file.path}: machine.{name} is missing or 0", needs)
+    rotary = machine.load_units == ROTARY_UNITS
+    lever = _lever(machine, rotary, reader)
+    if not isinstance(machine, Axis):
+        inertia = f"{load:.4g} {'kg m2' if rotary else 'kg'}"
+        reader.assumed.append(f"the other joints are at rest: {inertia} at {machine.joints[at]}, without its motor")
+    ratio = abs(machine.transmission_ratio[at]) * lever
+    return StudiedJoint(machine.joints[at], load / lever**2, motor, ratio, machine.viscous_friction[at], lever, rotary)
+
+
+def _load_inertia(machine: Axis | CoupledMachine, at: int) -> float:
+    """Return the inertia without the motor [kg m2, kg]; for coupled joints the diagonal of M in the home position."""
+    if isinstance(machine, Axis):
+        return machine.load_inertia[at]
+    return float(machine.nominal_inertia[at] - machine.reflected_inertia[at])
+
+
+def _lever(machine: JointMachine, rotary: bool, reader: StudyReader) -> float:
+    given = "lever" in reader.table("impact")
+    if not rotary:
+        if given:
+            raise UsageError("a lever is given for a linear axis", "use it only for a rotary axis")
+        return 1.0
+    if not given and not isinstance(machine, Axis):
+        raise UsageError("no lever is given", "give --lever, the distance from the joint's axis to the contact [m]")
+    return reader.number("impact", "lever", 1.0, "m", "contact to axis", above=0.0)
+
+
+class StudyReader:
+    """Tables by their names; `assumed` has a line for every default used."""
+
+    def __init__(self, root: Table) -> None:
+        self._tables = {"": root}
+        self.assumed: list[str] = []
+
+    def table(self, name: str) -> Table:
+        """Return a table such as sensors.encoder, always the same object."""
+        if name not in self._tables:
+            above, _, last = name.rpartition(".")
+            self._tables[name] = self.table(above).table(last)
+        return self._tables[name]
+
+    def number(self, table: str, key: str, default: float, unit: str, why: str = "", **bounds: float) -> float:
+        """Return a number of a table; a default is reported with its reason."""
+        part = self.table(table)
+        if key not in part:
+            self.assumed.append(f"{table}.{key} = {default:.4g} {unit}".rstrip() + (f": {why}" if why else ""))
+        return part.number(key, default, **bounds)
+
+    def optional(self, table: str, key: str, none: str) -> float | None:
+        """Return a positive number that may be missing; the consequence of a missing one is reported."""
+        part = self.table(table)
+        if key in part:
+            return part.number(key, above=0.0)
+        self.assumed.append(f"{table}.{key} = none: {none}")
+        return None
+
+    def finish(self) -> None:
+        """Raise ConfigurationError if a table has a key that was not read."""
+        for table in self._tables.values():
+            table.finish()

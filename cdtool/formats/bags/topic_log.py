@@ -1,0 +1,124 @@
+"""Messages of topics -> columns: what the readers of MCAP files and of both kinds of bags share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from contextlib import closing, suppress
+from itertools import chain
+from pathlib import Path
+from typing import ClassVar, NamedTuple
+
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.bags.sequence_jumps import SequenceJumps
+from cdtool.formats.channels.channel_map import ChannelMap
+from cdtool.formats.columns import Column
+from cdtool.formats.messages.batch import Batch, Stream
+from cdtool.formats.messages.decoders import Decoders
+from cdtool.formats.messages.topic import Topic, wanted_columns, wanted_topics
+from cdtool.formats.messages.topic_survey import TopicSurvey
+from cdtool.formats.pieces import Pieces, join_pieces
+from cdtool.formats.source import Source, TopicDetails
+
+IsWanted = Callable[[str], bool]
+
+
+class Messages(NamedTuple):
+    """Messages of one channel; `covered`: a CRC covers them and their definitions."""
+
+    stream: Stream
+    batch: Batch
+    covered: bool = False
+
+
+class TopicLog(ABC):
+    """A log that is read once, from start to end.
+
+    `origin` [ns] is valid from the first block on, `topic_details` and `findings()` after the last one. If cdtool
+    converted the log, the field `exact` has the exact time [s] of each message, relative to `exact_origin` [s].
+    """
+
+    format: ClassVar[str]
+    exact, exact_origin = "", 0.0
+
+    def __init__(self, path: Path, is_wanted: IsWanted | None) -> None:
+        self.path = path
+        self.is_wanted = is_wanted or (lambda _: True)
+        self.origin = 0
+        self.topic_details: Mapping[str, TopicDetails] = {}
+
+    @abstractmethod
+    def blocks(self) -> Generator[Sequence[Messages], None, None]:
+        """Yield the messages of the wanted topics, block by block in the order of the log; raises RecordingError."""
+
+    @abstractmethod
+    def findings(self) -> list[Finding]:
+        """Return the findings on losses and on the container."""
+
+    def source(self, columns: Mapping[str, Column], findings: Sequence[Finding], start: float) -> Source:
+        """Return these columns as a source, after all blocks were read; times are relative to `start` [s]."""
+        names, details = tuple(columns), self.topic_details
+        return Source(self.path, self.format, columns, start, tuple(findings), names=names, topics=details)
+
+    def mapped_source(self, wanted: ChannelMap, topics: Mapping[str, Topic]) -> Source:
+        """Return the columns of a channel map, after all blocks were read."""
+        logged = [name for name, topic in self.topic_details.items() if topic.messages]
+        columns, findings, origin = wanted_columns(self.path, wanted, topics, logged, self.origin)
+        start = self.exact_origin if self.exact else origin / 1e9
+        return self.source(columns, self.findings() + findings, start)
+
+
+class TopicFormat(ABC):
+    """A format of logs of topics: a column is a topic and a numeric field of its messages, `/joint_states position[0]`.
+
+    Its subclasses are dataclasses without fields: formats are compared and pickled.
+    """
+
+    topics: ClassVar[bool] = True
+
+    @abstractmethod
+    def log(self, path: Path, is_wanted: IsWanted | None = None) -> TopicLog:
+        """Open a log; messages of other topics than the wanted ones are only counted; raises RecordingError."""
+
+    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
+        """Return the fields that `wanted` names, or all numeric fields; raises RecordingError."""
+        if wanted is None:
+            return join_pieces(self.pieces(path), sort=True)
+        log = self.log(path, {source.topic for source in wanted.sources}.__contains__)
+        topics = wanted_topics(path, wanted, log.exact)
+        for stream, batch, *_ in chain.from_iterable(log.blocks()):
+            topics[stream.topic].add(stream, batch)
+        return log.mapped_source(wanted, topics)
+
+    def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:  # noqa: ARG002  all keys
+        """Yield all numeric fields, some MiB of the file at a time; raises RecordingError."""
+        return (yield from survey(self.log(path)))
+
+    def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
+        """Return the names of array elements in a topic's first decodable message; () if it has none."""
+        decoders, blocks = Decoders(), self.log(path, topic.__eq__).blocks()
+        with suppress(RecordingError), closing(blocks):  # the survey reports the problem
+            for stream, batch, *_ in chain.from_iterable(blocks):
+                names = decoders.element_names(stream, batch)
+                if names is not None:
+                    return names
+        return ()
+
+
+def survey(log: TopicLog) -> Pieces:
+    """Yield all numeric fields of a log, some MiB of it at a time; raises RecordingError."""
+    topics: dict[str, TopicSurvey] = {}
+    jumps = SequenceJumps()
+    for block in log.blocks():
+        jumps.add(block, log.origin)
+        for stream, batch, *_ in block:
+            topic = topics.setdefault(stream.topic, TopicSurvey(stream.topic))
+            yield from topic.pieces(stream, batch, log.origin)
+    findings = log.findings()
+    columns: dict[str, Column] = {}
+    for name in (name for name in log.topic_details if name in topics):
+        of_topic, of_findings = topics[name].columns_and_findings()
+        columns |= of_topic
+        findings += of_findings
+    return log.source(columns, findings + jumps.findings(), log.origin / 1e9)

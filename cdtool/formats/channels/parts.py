@@ -1,0 +1,213 @@
+"""A log in parts, as rosbag2 splits one: joining the parts, and parts that metadata.yaml names but that are missing."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import RecordingError
+from cdtool.base.files.bounded_loading import read_bytes
+from cdtool.base.findings import Finding
+from cdtool.base.remote.remote_path import location
+from cdtool.formats.columns import Column
+from cdtool.formats.source import Source, TopicDetails
+from cdtool.recordings.clock import GAP_PERIODS
+from cdtool.recordings.recording import GROUND_TRUTH, Recording, Series
+
+# First and last time [s].
+Span = tuple[float, float]
+
+_METADATA = "metadata.yaml"
+_COMPRESSED = (".zstd", ".zst", ".lz4")
+
+
+def join_digests(digests: Sequence[str]) -> str:
+    """Return the SHA-256 of a log: of a single part its own, else that of the concatenated hexadecimal digests."""
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+
+
+def missing_part_findings(folder: Path, parts: Sequence[Path]) -> list[Finding]:
+    """Return findings on files that the folder's metadata.yaml names, but that are not among its `parts`."""
+    read, findings = {part.name for part in parts}, []
+    for name in named_parts(folder):
+        plain = Path(name).stem if Path(name).suffix in _COMPRESSED else name
+        if name in read or plain in read:
+            continue
+        exists = (folder / name).exists()
+        kind = "part_missing" if not exists else "part_compressed" if name != plain else "part_of_other_kind"
+        findings.append(Finding(kind, "", {"part": name, "metadata": _METADATA}))
+    return findings
+
+
+def loss_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, RecordingError]) -> tuple[Finding, ...]:
+    """Return the losses of a folder: `parts` are its files, `unread` those that cannot be read, with the reason."""
+    findings = missing_part_findings(folder, parts)
+    for part, fault in unread.items():
+        reason = fault.message.removeprefix(f"{part}: ")
+        findings.append(Finding("part_unreadable", "", {"part": part.name, "reason": reason}))
+    return tuple(findings)
+
+
+def join_sources(
+    folder: Path, parts: Sequence[tuple[Source, Mapping[str, Span]]], unread: Mapping[Path, RecordingError]
+) -> Source:
+    """Return the columns of all parts without rows, and the findings of every part, in the order of their times.
+
+    Each part has the time span [s] of each of its columns, on one clock. A column may be missing in some parts. A
+    column whose array length differs between parts is left out and reported, as are parts that could not be read
+    (`unread`).
+    """
+    sources = [source for source, _ in parts]
+    lost = loss_findings(folder, [*(source.path for source in sources), *unread], unread)
+    if len(parts) == 1:
+        return replace(sources[0], path=folder, findings=(*lost, *sources[0].findings))
+    findings = [*lost, *(found for source in sources for found in with_file_name(source.path, source.findings))]
+    columns: dict[str, Column] = {}
+    late: dict[Path, str] = {}
+    for name in dict.fromkeys(name for source in sources for name in source.columns):
+        containing = [(source, spans.get(name)) for source, spans in parts if name in source.columns]
+        widths = sorted({source.columns[name].values.shape[1:] for source, _ in containing})
+        if len(widths) > 1:
+            lengths = {"lengths": tuple(width[0] if width else 1 for width in widths)}
+            findings.append(Finding("array_lengths_differ", name, lengths))
+            continue
+        columns[name] = containing[0][0].columns[name]
+        for (_, before), (source, span) in pairwise(containing):
+            if before and span and span[0] < before[1]:
+                late.setdefault(source.path, name)
+    findings += [Finding("parts_overlap", "", {"part": path.name, "column": name}) for path, name in late.items()]
+    first, names = sources[0], tuple(columns)
+    details, topics = join_details(sources), join_topics(sources)
+    return Source(folder, first.format, columns, first.origin, tuple(findings), details, names=names, topics=topics)
+
+
+def join_recordings(parts: Sequence[Recording], name: str) -> Recording:
+    """Return the parts of a log, as logged, as one recording.
+
+    Raises RecordingError if a part does not have a channel of another one, or begins before the previous part ends.
+    Ground truth, such as the events of a stroke, may be in some parts only.
+    """
+    parts = sorted(parts, key=lambda part: part.origin + part.start)
+    first = parts[0]
+    joined: dict[str, Series] = {}
+    for channel in dict.fromkeys(name for part in parts for name in part.channels):
+        containing = [part for part in parts if channel in part or channel not in GROUND_TRUTH]
+        end, unit, times = -np.inf, None, list[FloatArray]()
+        for part in containing:
+            if channel not in part or unit not in (None, part[channel].unit):
+                raise RecordingError(
+                    f"{part.source}: channel '{channel}' is not logged as in {first.source}",
+                    "all parts of a log have the same channels and units",
+                    channel=channel,
+                )
+            times.append(part[channel].time + (part.origin - first.origin))
+            if times[-1][0] <= end:
+                raise RecordingError(
+                    f"{part.source}: overlaps the previous part ({channel}: starts at {times[-1][0]:g} s, before "
+                    f"{end:g} s)",
+                    "the parts of a log share one clock and do not overlap",
+                )
+            end, unit = times[-1][-1], part[channel].unit
+        values = np.concatenate([part[channel].values for part in containing])
+        joined[channel] = Series(np.concatenate(times), values, containing[0][channel].unit)
+    findings = tuple(found for part in parts for found in with_file_name(location(part.source), part.findings))
+    findings += tuple(_gaps_between(parts))
+    source = ", ".join(part.source for part in parts)
+    digest = join_digests([part.digest for part in parts])
+    kinds = next((part.label_kinds for part in parts if part.label_kinds), ())
+    return Recording(name, source, first.joints, joined, first.origin, findings, digest, label_kinds=kinds)
+
+
+def _gaps_between(parts: Sequence[Recording]) -> Iterator[Finding]:
+    """Yield one finding for each of the consecutive `parts` that begins later than its channels' steps explain.
+
+    Nothing was logged in between: the recorder was stopped, or a part is missing. Ground truth is not considered, as it
+    may be in some parts only. If only some channels pause, the finding names them.
+    """
+    for before, after in pairwise(parts):
+        channels = [name for name in before.channels if name in after and name not in GROUND_TRUTH]
+        gaps = {}
+        for name in channels:
+            gap = float(after[name].time[0] + (after.origin - before.origin) - before[name].time[-1])
+            if gap > GAP_PERIODS * before[name].period:
+                gaps[name] = gap
+        if gaps:
+            paused = () if len(gaps) == len(channels) else tuple(gaps)
+            numbers = {"gap": min(gaps.values()), "channels": paused}
+            yield Finding("part_gap", "", numbers, file=Path(after.source).name)
+
+
+def with_file_name(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield the findings of a part, with the name of its file."""
+    return (replace(finding, file=path.name) for finding in findings)
+
+
+def join_details(parts: Sequence[Source]) -> dict[str, str]:
+    """Return the details of a log from those of its parts."""
+    if len(parts) == 1:
+        return dict(parts[0].details)
+    by_key: dict[str, list[str]] = {}
+    for part in parts:
+        for key, text in part.details.items():
+            by_key.setdefault(key, []).append(text)
+    joined = {"parts": f"{len(parts)}, {parts[0].path.name} to {parts[-1].path.name}"}
+    return joined | {key: " or ".join(dict.fromkeys(texts)) for key, texts in by_key.items()}
+
+
+def join_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
+    """Return the details of each topic from those of the parts of a log."""
+    by_name: dict[str, list[TopicDetails]] = {}
+    for part in parts:
+        for name, topic in part.topics.items():
+            by_name.setdefault(name, []).append(topic)
+    return {name: TopicDetails.of_parts(topics) for name, topics in by_name.items()}
+
+
+def named_parts(folder: Path) -> list[str]:
+    """Return the file names listed in `relative_file_paths` of a folder's metadata.yaml; empty without this file.
+
+    It is read line by line, as rosbag2 writes simple lists of strings. The first versions of rosbag2 wrote the bag's
+    folder before each name.
+    """
+    metadata = folder / _METADATA
+    try:
+        content = read_bytes(metadata, RecordingError) if metadata.is_file() else b""
+    except RecordingError:  # the list is only used for a check
+        return []
+    lines = content.decode("utf-8", "replace").splitlines()
+    for i, line in enumerate(lines):
+        key, colon, rest = line.partition(":")
+        if key.strip() == "relative_file_paths" and colon:
+            listed = _flow_list(rest, lines[i + 1 :]) if "[" in rest else _block_list(lines[i + 1 :])
+            return [Path(name).name for name in map(_plain, listed) if name]
+    return []
+
+
+def _flow_list(rest: str, below: Sequence[str]) -> list[str]:
+    """Return the items of a list `[bag_0.mcap, bag_1.mcap]`, in one line or several."""
+    return "\n".join([rest, *below]).partition("[")[2].partition("]")[0].split(",")
+
+
+def _block_list(below: Sequence[str]) -> Iterator[str]:
+    """Yield the items of lines `- bag_0.mcap`, up to the first line that is not an item."""
+    for line in below:
+        text = line.strip()
+        if not text or text.startswith("#"):
+            continue
+        if not text.startswith("- "):
+            return
+        yield text[2:]
+
+
+def _plain(item: str) -> str:
+    """Return an item without its quotes, or without the comment after it."""
+    text = item.strip()
+    if text[:1] in ("'", '"'):
+        return text[1:].partition(text[0])[0]
+    return text.partition(" #")[0].strip()

@@ -1,0 +1,439 @@
+"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.files.kinds import kind_of
+from cdtool.base.findings import Finding
+from cdtool.base.log_names import log_stem, log_suffix
+from cdtool.base.remote.remote_path import location
+from cdtool.formats import FORMATS
+from cdtool.formats.channels.channel_assembly import assemble_recording
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
+from cdtool.formats.channels.file_beside import add_files_beside
+from cdtool.formats.channels.force_axes import fields_by_axis, join_axes, join_fields
+from cdtool.formats.channels.header_units import unit_findings
+from cdtool.formats.channels.logged_recording import LoggedRecording
+from cdtool.formats.channels.parts import (
+    Span,
+    join_details,
+    join_recordings,
+    join_sources,
+    join_topics,
+    loss_findings,
+    missing_part_findings,
+    named_parts,
+)
+from cdtool.formats.column_names import OWN_CLOCK, resolve_columns
+from cdtool.formats.columns import Column, Piece
+from cdtool.formats.csv.gzipped import MAGIC
+from cdtool.formats.csv.text import read_sample
+from cdtool.formats.machine_file import MachineFile
+from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
+from cdtool.formats.source import Format, Source, in_words
+from cdtool.recordings.clock.stamps import epoch_start
+from cdtool.recordings.plausible import PlausibleRanges
+from cdtool.recordings.recording import Recording, Series
+
+# The parts of a log in a folder; the first kind that is there is read.
+_PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
+# Opens a file of a format, for some or all of its columns.
+ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
+
+_KNOWN_CONTENTS = {
+    b"\x89PNG": "a PNG image",
+    b"\xff\xd8\xff": "a JPEG image",
+    b"GIF8": "a GIF image",
+    b"%PDF": "a PDF document",
+    b"PK\x03\x04": "a ZIP archive or an Excel workbook",
+    b"\x1f\x8b": "gzip-compressed",
+    b"(\xb5/\xfd": "zstd-compressed",
+    b"\x89HDF": "an HDF5 file",
+    b"SQLite format 3": "an SQLite database, but not a ROS 2 bag",
+    b"<": "HTML or XML",
+    b"{": "JSON",
+    b"[": "JSON",
+}
+_NEXT_STEPS = {
+    "a ZIP archive or an Excel workbook": "unpack the archive, or save the sheet as CSV",
+    "gzip-compressed": "only text tables are read compressed; unpack it first, e.g. with gunzip",
+    "zstd-compressed": "unpack it first, e.g. with unzstd",
+}
+# UTF-32 first: its mark begins with that of UTF-16.
+_WIDE = {
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF32_BE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+
+
+def choose_format(path: Path) -> Format:
+    """Return the format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
+    head = _read_head(path)
+    suffix = log_suffix(path).lower()
+    if suffix == ".toml" and (kind := kind_of(head)):  # its numbers could be read as a table
+        raise RecordingError(f"{path}: is not a recording: it is {kind}", "give a log in its place")
+    for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
+        likely: Format = FORMATS.load(name)()
+        if suffix in likely.suffixes and likely.sniff(path):
+            return likely
+    formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
+    by_suffix = [item for item in formats if suffix in item.suffixes]
+    # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
+    claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
+    for item in [*by_suffix, *formats]:
+        if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
+            return item
+    wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
+    start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
+    content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
+    content = kind_of(head) or content if content == "JSON" else content
+    if wide and not content and _is_damaged_text(path, wide):
+        raise RecordingError(
+            f"{path}: begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
+        )
+    expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
+    raise RecordingError(
+        f"{path}: is not a recording{f': it is {content}' if content else expected}",
+        _NEXT_STEPS.get(content, f"cdtool reads {', '.join(item.name for item in formats)}"),
+    )
+
+
+def survey(path: Path) -> Source:
+    """Return all numeric columns of a log with their rows, and its warnings; raises RecordingError."""
+    return join_pieces(log_pieces(path), sort=True) if path.is_dir() else choose_format(path).columns(path)
+
+
+def log_pieces(log: Path, keys: Collection[str] | None = None, read: ReadFile = read_pieces) -> Pieces:
+    """Yield pieces of the numeric columns of a file, or of a folder written by rosbag2.
+
+    The columns are all, or at least `keys`. A part that cannot be read is a loss if another part can be read. Raises
+    RecordingError.
+    """
+    if not log.is_dir():
+        return read(choose_format(log), log, keys)
+    return _part_pieces(log, keys, read)
+
+
+def _part_pieces(folder: Path, keys: Collection[str] | None, read: ReadFile) -> Pieces:
+    """Yield the pieces of one part after the other; all times count from the start of the first part."""
+    log = LogFolder.of(folder)
+    start: float | None = None
+    parts: list[tuple[Source, Mapping[str, Span]]] = []
+    for part in (*log.filled, *log.empty):
+        run = PieceRun(read(choose_format(part), part, keys))
+        spans: dict[str, Span] = {}
+        for piece in run:
+            start = piece.origin if start is None else start
+            if piece.time is None or not piece.rows:
+                continue
+            time = piece.time + (piece.origin - start)
+            for name in piece.values:
+                first, last = spans.get(name, (np.inf, -np.inf))
+                spans[name] = min(first, float(time[0])), max(last, float(time[-1]))
+            yield replace(piece, time=time, origin=start)
+        parts.append((run.source, spans))
+    return join_sources(folder, parts, log.unread)
+
+
+def needs_time_order(log: Path) -> bool:
+    """Return True if rows must be sorted by their times, as messages, instead of in the order of the file."""
+    return log.is_dir() or has_topics(choose_format(log))
+
+
+def element_names(path: Path, topic: str) -> tuple[str, ...]:
+    """Return the element names in the first message of a topic, such as the joint names of a JointState.
+
+    Empty if the message does not name its elements, or the format has no such names.
+    """
+    read_names = getattr(choose_format(path), "element_names", None)
+    return tuple(read_names(path, topic)) if read_names is not None else ()
+
+
+def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
+    """Return one log as a recording on the load side; raises RecordingError or ConfigurationError.
+
+    A folder of MCAP or .db3 files, as written by rosbag2, is one log in parts. Values outside of `ranges` are masked.
+    """
+    return read_as_logged(path, machine_file).on_load_side(machine_file.machine, ranges)
+
+
+def read_as_logged(
+    path: Path, machine_file: MachineFile, unread: Literal["error", "loss"] = "error"
+) -> LoggedRecording:
+    """Return one log, a file or a folder of parts, as logged; raises RecordingError or ConfigurationError.
+
+    `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
+    """
+    logged = _read_log_itself(path, machine_file, unread)
+    if not (machine_file.columns.beside or machine_file.topics.beside):
+        return logged
+    by_topics = has_topics(choose_format(log_parts(path)[0]))
+    channels = machine_file.topics if by_topics else machine_file.columns
+
+    def read_trigger(name: str | int) -> Series:
+        source = ChannelSource("trigger", columns=(name,))
+        if by_topics:
+            topic, _, field = str(name).rpartition(" ")
+            source = ChannelSource("trigger", topic=topic, field=field)
+        only = replace(channels, sources=(source,), beside=())
+        return _read_log_itself(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
+
+    recording = logged.recording
+    recording = add_files_beside(recording, path, channels, machine_file.machine, _resolved_source, read_trigger)
+    return replace(logged, recording=recording)
+
+
+def _read_log_itself(path: Path, machine_file: MachineFile, unread: Literal["error", "loss"]) -> LoggedRecording:
+    """Return one log without the channels in files beside it."""
+    if not path.is_dir():
+        return read_parts([path], machine_file, log_stem(path))
+    if unread == "loss":
+        folder = LogFolder.of(path)
+        parts, lost = list(folder.filled), list(folder.findings)
+        if not parts:
+            raise RecordingError(f"{path}: no part of the log contains a message", "was the recording stopped at once?")
+    else:
+        parts = log_parts(path)
+        lost = missing_part_findings(path, parts)
+    logged = read_parts(parts, machine_file, path.name)
+    findings = (*lost, *logged.recording.findings)
+    return replace(logged, recording=replace(logged.recording, source=str(path), findings=findings))
+
+
+@dataclass(frozen=True)
+class LogFolder:
+    """The parts of a log in a folder: `filled` ones in the order of their first times, and `empty` ones.
+
+    `unread` are those that cannot be read, with the reason.
+    """
+
+    folder: Path
+    filled: tuple[Path, ...]
+    empty: tuple[Path, ...]
+    unread: Mapping[Path, RecordingError]
+
+    @classmethod
+    def of(cls, folder: Path) -> LogFolder:
+        """Return the parts of a folder; raises RecordingError if no part can be read."""
+        starts: dict[Path, float] = {}
+        unread: dict[Path, RecordingError] = {}
+        for part in log_parts(folder):
+            try:
+                starts[part] = _first_time(part)
+            except RecordingError as fault:
+                unread[part] = fault
+        if not starts:
+            raise next(iter(unread.values()))
+        known = sorted((start, part.name, part) for part, start in starts.items() if start < np.inf)
+        empty = tuple(part for part, start in starts.items() if start == np.inf)
+        return cls(folder, tuple(part for _, _, part in known), empty, unread)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files of the log."""
+        return (*self.filled, *self.empty, *self.unread)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The losses: missing parts, and those that cannot be read."""
+        return loss_findings(self.folder, self.files, self.unread)
+
+
+def log_parts(path: Path) -> list[Path]:
+    """Return the files of a log: the file itself, or those in a folder written by rosbag2; raises RecordingError."""
+    for pattern in _PARTS if path.is_dir() else ():
+        if parts := sorted(part for part in path.glob(pattern) if not part.name.startswith(".")):
+            return parts
+    if path.is_dir() and (lost := missing_part_findings(path, [])):
+        raise RecordingError(f"{path}: {lost[0]}", "copy the complete folder that rosbag2 wrote")
+    _read_head(path)
+    return [path]
+
+
+def mapped_source(
+    path: Path, machine_file: MachineFile, also: Callable[[bool], ChannelSource] | None = None
+) -> tuple[Source, ChannelMap]:
+    """Return the columns of one file that the machine file maps, and the map for them; raises RecordingError.
+
+    A mapped load cell or label that is not in the file is left out of the map, with a note. `also` returns a further
+    column, given whether the file contains topics; it becomes the last source of the map.
+    """
+    return _resolved_source(path, _map_for(choose_format(path), machine_file, path), also)
+
+
+def _resolved_source(
+    path: Path, channels: ChannelMap, also: Callable[[bool], ChannelSource] | None = None
+) -> tuple[Source, ChannelMap]:
+    """Return the columns of one file that a map names, with that of `also`, and the map; raises RecordingError."""
+    file_format = choose_format(path)
+    if has_topics(file_format) and not channels.topics:
+        raise RecordingError(f"{path}: contains topics, but columns are mapped", "give a file of columns")
+    if also is not None:
+        channels = replace(channels, sources=(*channels.sources, also(channels.topics)))
+    asked = fields_by_axis(channels)
+    source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+    if resolved.time.nanoseconds_key:
+        source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
+    return with_own_clocks(*join_fields(source, resolved, channels))
+
+
+def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: float = 1.0) -> Source:
+    """Return a table with one clock, `seconds` (of `factor` s), in place of it and of the nanoseconds within each."""
+    columns = {key: column for key, column in source.columns.items() if key != nanoseconds}
+    clock, rest = columns[seconds], source.columns[nanoseconds].values
+    # An epoch is subtracted first: float64 does not represent nanoseconds since 1970.
+    start = epoch_start(clock.values, factor)
+    values = clock.values - start + rest * (1e-9 / factor)
+    columns[seconds] = replace(clock, values=values, unit="s" if factor == 1.0 else clock.unit)
+    return replace(source, columns=columns, origin=source.origin + start * factor)
+
+
+def has_topics(file_format: Format) -> bool:
+    """Return True if a format contains messages of topics, mapped by [channels.mcap]; optional for plug-ins."""
+    return bool(getattr(file_format, "topics", False))
+
+
+def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
+    """Return the parts of a log as one recording, in the order of their times; raises RecordingError."""
+    parts: list[Recording] = []
+    headers: list[Source] = []
+    factors: dict[str, tuple[float, ...]] = {}
+    for path in paths:
+        source, channels = mapped_source(path, machine_file)
+        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
+        parts.append(assemble_recording(source, channels, machine_file.machine))
+        headers.append(replace(source, columns={}))
+    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
+    details = in_words(join_details(headers), join_topics(headers))
+    return LoggedRecording(whole, factors, channels.speed_low_pass, source.format, details, source.dialect)
+
+
+def _map_for(file_format: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
+    topics = has_topics(file_format)
+    channels = machine_file.topics if topics else machine_file.columns
+    if not channels.sources:
+        section = "[channels.mcap]" if topics else "[channels]"
+        what = "topic and field" if topics else "column and unit"
+        raise ConfigurationError(
+            f"{machine_file.path}: no channel in {section}, which {path} needs",
+            f"write {section} with the {what} of each channel",
+        )
+    return channels
+
+
+def _sniffs_any_text(file_format: Format) -> bool:
+    return bool(getattr(file_format, "sniffs_any_text", False))
+
+
+def _is_table(file_format: Format, path: Path) -> bool:
+    try:
+        return bool(file_format.columns(path).columns)
+    except RecordingError:
+        return False
+
+
+def _suffixes() -> set[str]:
+    return {suffix for name in FORMATS.names() for suffix in FORMATS.load(name).suffixes}
+
+
+def _is_damaged_text(path: Path, encoding: str) -> bool:
+    try:
+        codecs.getincrementaldecoder(encoding)().decode(read_sample(path))
+    except UnicodeError:
+        return True
+    return False
+
+
+def is_bag_folder(path: Path) -> bool:
+    """Return whether a folder was written by rosbag2: its metadata.yaml names its parts."""
+    return path.is_dir() and bool(named_parts(path))
+
+
+def _first_time(part: Path) -> float:
+    """Return the first time of a part [s]; infinite without a message, so that the part is last."""
+    pieces = read_pieces(choose_format(part), part)
+    try:
+        piece: Piece | None = next(pieces, None)
+    finally:
+        pieces.close()
+    return np.inf if piece is None or piece.time is None or not piece.rows else piece.origin + float(piece.time[0])
+
+
+def _read_head(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
+        if not path.exists():
+            whole, mark, _ = str(path).rpartition("#")
+            is_run = mark and location(whole).exists()
+            hint = f"for a run of {whole}, state how it is cut, as detect --operations column:NAME" if is_run else ""
+            raise RecordingError(f"{path}: no such file", hint or "check the path")
+        if not path.is_file():
+            raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")
+        with path.open("rb") as file:
+            head = file.read(512)
+    except OSError as fault:
+        raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the file's permissions") from fault
+    if not head or (head.startswith(MAGIC) and not read_sample(path, 1)):
+        raise RecordingError(f"{path}: is empty", "was the recording stopped at once, or the copy cut off?")
+    return head
+
+
+def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+    """Return a source whose columns have their own clocks, and its map, with one column per channel.
+
+    MDF4, TDMS and HDF5 files have such columns. A table is returned unchanged. The map's columns are resolved
+    (resolve_columns). Raises RecordingError if the columns of a channel have different clocks or no clock, and
+    ConfigurationError if the machine file states another unit than s for the clock.
+    """
+    if channels.topics or not any(column.time is not None for column in source.columns.values()):
+        return source, channels
+    if channels.time.column != OWN_CLOCK:  # a column or a rate that the machine file names decides
+        plain = {name: replace(column, time=None) for name, column in source.columns.items()}
+        return replace(source, columns=plain), channels
+    if channels.time.factor != 1.0:
+        raise ConfigurationError(
+            f"{source.path}: its own clock is in s, but [channels] time states another unit",
+            'time = { column = "time", unit = "s" }',
+        )
+    joined, notes = dict[str, Column](), list[Finding]()
+    for item in channels.sources:
+        joined[item.channel], of_axes = _joined(source, item)
+        notes += of_axes
+    sources = tuple(replace(item, keys=(item.channel,)) for item in channels.sources)
+    names = tuple(joined)
+    # The units are compared here, as joined columns have no unit.
+    findings = (*source.findings, *unit_findings(source, channels), *notes)
+    source = replace(source, columns=joined, names=names, findings=findings)
+    return source, replace(channels, sources=sources, topics=True)
+
+
+def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]:
+    parts = [source.columns[key] for key in item.keys]
+    if item.axes and all(part.time is not None for part in parts):
+        return join_axes(source.path, item, parts)
+    time = parts[0].time
+    for part in parts:
+        if part.time is None or time is None:
+            raise RecordingError(
+                f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock",
+                "name the column with its clock in [channels] time",
+                channel=item.channel,
+            )
+        if not np.array_equal(part.time, time):
+            raise RecordingError(
+                f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
+                "all joints of a channel must have the same clock",
+                channel=item.channel,
+            )
+    return Column(item.channel, np.column_stack([part.values for part in parts]), time, words=parts[0].words), []

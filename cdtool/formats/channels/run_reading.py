@@ -1,0 +1,403 @@
+"""Read a log that contains several runs: cut its columns into runs before their clocks are checked.
+
+Each run becomes a recording of its own, named FILE#ID, with its own clock. In a table a run is some consecutive rows.
+Where columns have clocks of their own, the id that was logged last at or before a sample holds for it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.findings import Finding
+from cdtool.base.log_names import log_stem
+from cdtool.base.plain_text import counted, first_of
+from cdtool.base.remote.remote_path import location
+from cdtool.formats.channels.channel_assembly import assemble_recording, file_digest
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
+from cdtool.formats.channels.logged_recording import LoggedRecording
+from cdtool.formats.channels.parts import join_details, join_digests, join_topics, missing_part_findings, with_file_name
+from cdtool.formats.channels.reading import log_parts, mapped_source
+from cdtool.formats.channels.run_segments import Rows, Segments, segments_by_id, segments_by_reset
+from cdtool.formats.columns import Column
+from cdtool.formats.machine_file import MachineFile
+from cdtool.formats.source import Source, in_words
+from cdtool.recordings.operations import RunCut
+from cdtool.recordings.recording import GROUND_TRUTH
+
+# A run with fewer samples than this is left out: too few for a clock's usual step.
+FEWEST_SAMPLES = 8
+_ID = "run id"
+_MARK = "#"
+
+
+@dataclass(frozen=True)
+class LogRuns:
+    """The runs of a log in its order; `findings` are about the log, `left_out` are runs with the reason."""
+
+    runs: tuple[LoggedRecording, ...]
+    findings: tuple[Finding, ...] = ()
+    left_out: tuple[tuple[Path, str], ...] = ()
+
+
+def split_run(log: Path) -> tuple[Path, str]:
+    """Return the file of LOG#ID, and the id.
+
+    Parameters
+    ----------
+    log : Path
+        A log, or LOG#ID. A file whose name contains the mark is a log.
+
+    Returns
+    -------
+    file : Path
+        The log.
+    ids : str
+        The id of a run, or a pattern such as `free*`; empty for a whole log.
+
+    Examples
+    --------
+    >>> file, ids = split_run(Path("cycles.csv#7*"))
+    >>> file.name, ids
+    ('cycles.csv', '7*')
+    """
+    text = str(log)
+    if _MARK not in text or log.exists():
+        return log, ""
+    places = [i for i, character in enumerate(text) if character == _MARK]
+    place = next((i for i in places if location(text[:i]).exists()), places[-1])
+    return location(text[:place]), text[place + 1 :]
+
+
+def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
+    """Return the runs of a log, or of LOG#ID only those with this id, which may be a pattern.
+
+    Parameters
+    ----------
+    log : Path
+        A file, or a folder of parts written by rosbag2.
+    machine_file : MachineFile
+        The machine and its map of channels.
+    cut : RunCut
+        How the log is cut.
+
+    Returns
+    -------
+    LogRuns
+        The recordings as logged, each with the log's path and its id as `source`.
+
+    Raises
+    ------
+    RecordingError
+        The log cannot be read or has no such column, or no run of it can be used.
+    ConfigurationError
+        The machine file does not fit the log.
+    """
+    path, pattern = split_run(log)
+    if machine_file.files_beside(path):
+        raise ConfigurationError(
+            f"{machine_file.path}: a channel in a file of its own cannot be divided into the runs of {path}",
+            "write each run to a log of its own, or map a channel of the log",
+        )
+    whole = _CutLog.of(path, machine_file, cut)
+    segments = whole.segments
+    lengths = whole.lengths
+    long_enough = np.flatnonzero(lengths >= FEWEST_SAMPLES)
+    if not len(long_enough):
+        raise whole.no_run(int(lengths.max(initial=0)))
+    names = segments.names(long_enough)
+    chosen = [(int(run), name) for run, name in zip(long_enough, names, strict=True) if _fits(name, pattern)]
+    if not chosen:
+        raise RecordingError(f"{path}: no run '{pattern}'", f"its runs are {first_of(names)}")
+    digest = join_digests([file_digest(part) for part in whole.files])
+    runs: list[LoggedRecording] = []
+    left_out: list[tuple[Path, str]] = []
+    for run, name in chosen:
+        try:
+            runs.append(whole.recording(run, name, digest))
+        except RecordingError as fault:
+            left_out.append((location(f"{path}{_MARK}{name}"), str(fault).removeprefix(f"{path}{_MARK}{name}: ")))
+    if not runs:
+        raise RecordingError(f"{left_out[0][0]}: {left_out[0][1]}", "check the log with cdtool info")
+    findings = [*whole.source.findings, *whole.outside()]
+    later = tuple(name for (run, name) in chosen if segments.number[run])
+    if later and cut.by == "column":
+        findings.append(Finding("returning_ids", "", {"names": later, "column": cut.column}))
+    short = np.flatnonzero(lengths < FEWEST_SAMPLES)
+    if pattern:
+        fits = [_fits(name, pattern) for name in segments.names(short)]
+        short = short[np.array(fits, dtype=bool)]
+    if len(short):
+        left_out.append((path, _too_short(segments, short, lengths)))
+    return LogRuns(tuple(runs), tuple(findings), tuple(left_out))
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return not pattern or name == pattern or fnmatchcase(name, pattern)
+
+
+def _too_short(segments: Segments, short: Rows, lengths: Rows) -> str:
+    names = first_of(segments.names(short[:4])) if len(short) <= 4 else ", ".join(segments.names(short[:3])) + ", ..."
+    samples = int(lengths[short].sum())
+    what = "is" if len(short) == 1 else "are"
+    return (
+        f"{counted(len(short), 'run')} ({names}) with {counted(samples, 'sample')} in all {what} shorter than "
+        f"{FEWEST_SAMPLES} samples: left out"
+    )
+
+
+def id_source(cut: RunCut, topics: bool) -> ChannelSource:
+    """Return the source of the ids of a cut; raises RecordingError if topics have no such field or no such cut."""
+    if not topics:
+        column = int(cut.column) if cut.column.isdecimal() else cut.column  # a number as in [channels]
+        return ChannelSource(_ID, (column,), words=True)
+    topic, _, field_name = cut.column.partition(" ")
+    if not field_name.strip():
+        raise RecordingError(
+            f"operations '{cut.by}:{cut.column}': does not name a field of a topic", f"write {cut.by}:TOPIC FIELD"
+        )
+    return ChannelSource(_ID, topic=topic, field=field_name.strip(), words=True)
+
+
+@dataclass(frozen=True)
+class _CutLog:
+    """The columns of a log, and where its runs are.
+
+    `rows` are the rows of each run in the order of the file, by clock; a clock is known by its identity, that of a
+    table by 0. `begins` (r,) is when the runs begin [s], where ids have a clock of their own.
+    """
+
+    path: Path
+    source: Source
+    channels: ChannelMap
+    cut: RunCut
+    machine_file: MachineFile
+    files: tuple[Path, ...]
+    segments: Segments
+    rows: Mapping[int, Sequence[Rows]] = field(default_factory=dict)
+    begins: FloatArray | None = None
+
+    @classmethod
+    def of(cls, path: Path, machine_file: MachineFile, cut: RunCut) -> _CutLog:
+        """Read and cut a log; raises RecordingError."""
+        files = tuple(log_parts(path))
+        also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
+        mapped = [mapped_source(file, machine_file, also) for file in files]
+        channels = _common_map(path, [item for _, item in mapped])
+        source = _joined(path, [item for item, _ in mapped]) if path.is_dir() else mapped[0][0]
+        ids: Column | None = None
+        if cut.by != "clock-reset":
+            *others, last = channels.sources
+            ids = source.columns[last.keys[0]]
+            if ids.words and any(last.keys[0] in other.keys for other in others):
+                raise RecordingError(f"{path}: column '{cut.column}' has texts", "map another column to the channel")
+            channels = replace(channels, sources=tuple(others))
+        log = cls(path, source, channels, cut, machine_file, files, _none())
+        return log._by_reset() if ids is None else log._by_id(ids)
+
+    def _by_id(self, ids: Column) -> _CutLog:
+        values = ids.values.reshape(len(ids.values), -1)
+        if values.shape[1] != 1:
+            raise RecordingError(
+                f"{self.path}: column '{self.cut.column}' (channel '{_ID}') has {values.shape[1]} values per sample",
+                "select one element, e.g. data[0]",
+            )
+        bridged = self.cut.by == "column"
+        if not self.channels.topics:
+            segments = segments_by_id(values[:, 0], ids.words, bridged)
+            return replace(self, segments=segments, rows={0: _consecutive(segments)})
+        assert ids.time is not None
+        time, id_values = ids.time, values[:, 0]
+        if np.any(time[1:] < time[:-1]):
+            order = np.argsort(time, kind="stable")
+            time, id_values = time[order], id_values[order]
+        segments = segments_by_id(id_values, ids.words, bridged)
+        begins = time[segments.start]
+        ends = np.append(time, np.inf)[segments.stop]
+        rows = {clock: _between(time, begins, ends) for clock, time in self._clocks().items()}
+        return replace(self, segments=segments, rows=rows, begins=begins)
+
+    def _by_reset(self) -> _CutLog:
+        if any(item.topic for item in self.channels.sources):
+            raise RecordingError(
+                f"{self.path}: messages are in the order of their times: their clock cannot start again",
+                'cut them by a field: by = "column:TOPIC FIELD"',
+            )
+        if not self.channels.topics:
+            if self.channels.time.column is None:
+                raise RecordingError(
+                    f"{self.path}: has no clock that could start again: [channels] time states a rate",
+                    'cut it by a column: by = "column:NAME"',
+                )
+            segments = segments_by_reset(self.source.columns[self.channels.time.key].values)
+            return replace(self, segments=segments, rows={0: _consecutive(segments)})
+        found = {clock: segments_by_reset(time) for clock, time in self._clocks().items()}
+        counts = sorted({len(item) for item in found.values()})
+        if len(counts) > 1:
+            raise RecordingError(
+                f"{self.path}: its clocks start again at different numbers of places: "
+                f"{' and '.join(str(count - 1) for count in counts)}",
+                'cut it by a column: by = "column:NAME"',
+            )
+        rows = {clock: _consecutive(segments) for clock, segments in found.items()}
+        return replace(self, segments=next(iter(found.values())), rows=rows)
+
+    def _clocks(self) -> dict[int, FloatArray]:
+        """Return the clocks of the channels by their identity; empty for a table."""
+        columns = (self.source.columns[key] for item in self.channels.sources for key in item.keys)
+        return {id(column.time): column.time for column in columns if column.time is not None}
+
+    @property
+    def lengths(self) -> Rows:
+        """The samples (r,) of each run, in the channel with most of them."""
+        counts = [list(map(len, rows)) for rows in self.rows.values()]
+        return np.max(counts, axis=0) if counts else np.zeros(0, dtype=np.intp)
+
+    def recording(self, run: int, name: str, digest: str) -> LoggedRecording:
+        """Return a run as logged; raises RecordingError if a channel has no sample in it."""
+        path = location(f"{self.path}{_MARK}{name}")
+        source, first_row = self.source, self.source.first_row
+        times, start = self._times(run)
+        columns: dict[str, Column] = {}
+        for key, column in source.columns.items():
+            clock = id(column.time) if self.channels.topics else 0
+            if clock in self.rows:  # of a channel
+                columns[key] = replace(column, values=column.values[self.rows[clock][run]], time=times.get(clock))
+        if 0 in self.rows:
+            first_row += int(self.segments.start[run]) if first_row else 0
+            columns, start = self._from_start(columns)
+        channels, absent = self._present(columns)
+        mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
+        origin = source.origin + start
+        part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=tuple(absent))
+        recording = assemble_recording(part, channels, self.machine_file.machine, mark)
+        recording = replace(recording, name=f"{log_stem(self.path)}{_MARK}{name}")
+        factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
+        details = in_words(source.details, source.topics)
+        return LoggedRecording(recording, factors, channels.speed_low_pass, source.format, details, source.dialect)
+
+    def _times(self, run: int) -> tuple[dict[int, FloatArray], float]:
+        """Return the times of a run by clock, and their start [s].
+
+        A message's time, and one that counts from an epoch, is what it is in a file with this run alone: it counts from
+        the run's start.
+        """
+        times = {clock: time[self.rows[clock][run]] for clock, time in self._clocks().items() if clock in self.rows}
+        if not self.source.origin and not any(item.topic for item in self.channels.sources):
+            return times, 0.0
+        starts = [float(time[0]) for time in times.values() if len(time)]
+        first = float(self.begins[run]) if self.begins is not None else min(starts, default=0.0)
+        return {clock: time - first for clock, time in times.items()}, first
+
+    def _from_start(self, columns: dict[str, Column]) -> tuple[dict[str, Column], float]:
+        """Return the columns of a run of a table, whose clock counts from its start if the log's counts from one."""
+        time = self.channels.time
+        if not self.source.origin or time.column is None:
+            return columns, 0.0
+        clock = columns[time.key]
+        first = float(next(iter(clock.values[np.isfinite(clock.values)]), 0.0))
+        return columns | {time.key: replace(clock, values=clock.values - first)}, first * time.factor
+
+    def _present(self, columns: Mapping[str, Column]) -> tuple[ChannelMap, list[Finding]]:
+        """Return the map without ground truth that has no sample in a run, each with a note."""
+        absent = [
+            item
+            for item in self.channels.sources
+            if item.channel in GROUND_TRUTH and not all(len(columns[key].values) for key in item.keys)
+        ]
+        notes = [
+            Finding("absent_truth", item.channel, {"what": "column", "name": item.described, "similar": ""})
+            for item in absent
+        ]
+        sources = tuple(item for item in self.channels.sources if item not in absent)
+        return replace(self.channels, sources=sources), notes
+
+    def outside(self) -> Iterator[Finding]:
+        """Yield a warning for each clock with samples that are in no run."""
+        if self.cut.by == "clock-reset":
+            return
+        columns = self.source.columns
+        channels = {id(columns[item.keys[0]].time): item.channel for item in reversed(self.channels.sources)}
+        totals = {id(column.time) if self.channels.topics else 0: len(column.values) for column in columns.values()}
+        for clock, rows in self.rows.items():
+            if outside := totals[clock] - sum(map(len, rows)):
+                fact = {"count": outside, "total": totals[clock], "column": self.cut.column}
+                yield Finding("samples_outside_runs", channels.get(clock, "") if self.channels.topics else "", fact)
+
+    def no_run(self, longest: int) -> RecordingError:
+        """Return the error for a log without a run that can be used."""
+        if not len(self.segments):
+            return RecordingError(
+                f"{self.path}: column '{self.cut.column}' has no value in any sample", "name the column of the runs"
+            )
+        return RecordingError(
+            f"{self.path}: none of {counted(len(self.segments), 'run')} by {_described(self.cut)} has "
+            f"{FEWEST_SAMPLES} samples: the longest has {longest}",
+            "see cdtool info" if self.cut.by == "clock-reset" else "name a column whose value stays the same in a run",
+        )
+
+
+def _consecutive(segments: Segments) -> list[Rows]:
+    """Return the rows of runs of consecutive rows."""
+    return [np.arange(start, stop) for start, stop in zip(segments.start, segments.stop, strict=True)]
+
+
+def _between(time: FloatArray, begins: FloatArray, ends: FloatArray) -> list[Rows]:
+    """Return the rows whose time [s] is at least the beginning of a run (r,) and below its end (r,)."""
+    run = np.searchsorted(begins, time, side="right") - 1
+    inside = (run >= 0) & (time < np.append(ends, -np.inf)[run])  # run -1 is the last one, which is -inf
+    run[~inside] = len(begins)
+    order = np.argsort(run, kind="stable")
+    return np.split(order, np.searchsorted(run[order], np.arange(1, len(begins) + 1)))[: len(begins)]
+
+
+def _none() -> Segments:
+    nothing = np.empty(0, dtype=np.intp)
+    return Segments(nothing, nothing, np.empty(0), nothing, {})
+
+
+def _described(cut: RunCut) -> str:
+    return cut.by if cut.by == "clock-reset" else f"{cut.by} '{cut.column}'"
+
+
+def _common_map(path: Path, maps: Sequence[ChannelMap]) -> ChannelMap:
+    """Return the map of all parts of a log; raises RecordingError if their channels differ."""
+    for other in maps[1:]:
+        if [item.channel for item in other.sources] != [item.channel for item in maps[0].sources]:
+            raise RecordingError(f"{path}: its parts have different channels", "cut each part as a log of its own")
+    return maps[0]
+
+
+def _joined(path: Path, parts: Sequence[Source]) -> Source:
+    """Return the columns of the parts of a log one after the other, on the clock of the first part."""
+    first = min(parts, key=lambda part: part.origin)
+    ordered = sorted(parts, key=lambda part: part.origin)
+    columns: dict[str, Column] = {}
+    clocks: dict[tuple[int, ...], FloatArray] = {}
+    for key in first.columns:
+        own = [part.columns[key] for part in ordered]
+        if len({item.values.shape[1:] for item in own}) > 1:
+            raise RecordingError(f"{path}: the length of '{key}' differs between its parts", "select one element")
+        times = [item.time for item in own if item.time is not None]
+        clock = tuple(map(id, times))
+        if clock not in clocks:
+            shifted = [time + (part.origin - first.origin) for time, part in zip(times, ordered, strict=True)]
+            clocks[clock] = np.concatenate(shifted)
+        columns[key] = replace(own[0], values=np.concatenate([item.values for item in own]), time=clocks[clock])
+    findings = [item for part in ordered for item in with_file_name(part.path, part.findings)]
+    findings += missing_part_findings(path, [part.path for part in ordered])
+    return replace(
+        first,
+        path=path,
+        columns=columns,
+        findings=tuple(findings),
+        details=join_details(ordered),
+        topics=join_topics(ordered),
+    )

@@ -1,0 +1,79 @@
+"""Checks that the readers of containers share: optional library, declared sizes, errors of a library in one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import CdtoolError, RecordingError, installing
+from cdtool.base.findings import Finding
+from cdtool.formats.columns import as_float64
+
+# A file that unpacks to more than this many bytes and to more than this multiple of its own size is refused.
+_FREE, _RATIO = 256 * 2**20, 200
+_LARGEST_EXACT = 2**53
+# HDF5 filters that do not compress: shuffle, Fletcher32 checksum.
+_FILTERS_WITHOUT_COMPRESSION = (2, 3)
+
+
+def library(module: str, extra: str, path: Path) -> Any:
+    """Return an optional library; raises RecordingError that names the extra if the library is not installed."""
+    try:
+        return import_module(module)
+    except ImportError as fault:
+        raise RecordingError(f"{path}: {module.partition('.')[0]} is not installed", installing(extra)) from fault
+
+
+def check_size(path: Path, values: int) -> None:
+    """Raise RecordingError if a file declares far more numbers than a log of its size can contain."""
+    declared = min(8 * values, 2**63)  # a product of damaged dimensions may exceed every float
+    if declared > _FREE and declared > _RATIO * (size := path.stat().st_size):
+        raise RecordingError(
+            f"{path}: unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",
+            "name fewer columns in the machine file, or save it without compression",
+        )
+
+
+def check_chunks(path: Path, name: str, dataset: Any) -> None:
+    """Raise RecordingError if an HDF5 dataset is compressed twice, or has chunks far larger than its file.
+
+    HDF5 decompresses whole chunks even if only a part is read, and each compression may shrink zeros to a thousandth.
+    """
+    check_size(path, math.prod(dataset.chunks or ()) * dataset.dtype.itemsize // 8)
+    properties = dataset.id.get_create_plist()
+    filters = [properties.get_filter(i)[0] for i in range(properties.get_nfilters())]
+    if sum(number not in _FILTERS_WITHOUT_COMPRESSION for number in filters) > 1:
+        raise RecordingError(f"{path}: dataset '{name}' is compressed more than once: refused", "save it again")
+
+
+@contextmanager
+def one_line_errors(path: Path, kind: str) -> Iterator[None]:
+    """Raise any error of a library as one RecordingError."""
+    try:
+        yield
+    except (CdtoolError, KeyboardInterrupt):
+        raise
+    except Exception as fault:  # damaged bytes cause errors of any type
+        reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
+        raise RecordingError(f"{path}: damaged or not {kind}: {reason}", "copy or save it again") from fault
+
+
+def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> FloatArray:
+    """Return integers, booleans or floats as float64; add a finding if float64 cannot represent all integers."""
+    if values.dtype.kind in "iu" and values.size:
+        largest = max(abs(int(values.min())), abs(int(values.max())))
+        if largest > _LARGEST_EXACT:
+            findings.append(Finding("rounded_column", name))
+    return as_float64(values)
+
+
+def left_out_finding(name: str, kind: str) -> Finding:
+    """Return the note on a column that is left out because its values are not numbers."""
+    return Finding("column_left_out", "", {"column": name, "what": kind})

@@ -1,0 +1,208 @@
+"""Parquet and Feather (Arrow IPC): tables of typed columns, by pyarrow."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.channel_map import ChannelMap
+from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, split_unit
+from cdtool.formats.columns import Categories, Column, Piece
+from cdtool.formats.containers.container_checks import (
+    as_numbers,
+    check_size,
+    left_out_finding,
+    library,
+    one_line_errors,
+)
+from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
+from cdtool.formats.source import Source
+
+_PARQUET, _ARROW = b"PAR1", b"ARROW1"
+_UNIT_KEYS = (b"unit", b"units", b"Unit")
+# Metadata key of a table that cdtool wrote from several clocks.
+OWN_CLOCKS = b"cdtool.own_clocks"
+_FEWEST_ROWS = 2**12
+
+
+@dataclass(frozen=True)
+class Parquet(PiecewiseFormat):
+    """Arrow tables, `.parquet` and `.feather`: a missing value (null) becomes NaN, a time stamp becomes seconds."""
+
+    name: ClassVar[str] = "parquet"
+    suffixes: ClassVar[tuple[str, ...]] = (".parquet", ".feather", ".arrow")
+
+    def sniff(self, path: Path) -> bool:
+        """Return whether the file starts like a Parquet or Arrow file."""
+        with path.open("rb") as file:
+            head = file.read(len(_ARROW))
+        return head == _ARROW or head.startswith(_PARQUET)
+
+    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
+        arrow = library("pyarrow", "parquet", path)
+        findings: list[Finding] = []
+        with one_line_errors(path, "a Parquet or Feather file"):
+            table = _ArrowTable(path, arrow, findings, wanted.worded if wanted is not None else ())
+            names = tuple(table.schema.names)
+            keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
+            read = [key for key in keys if table.is_number(key)]
+            findings += [left_out_finding(key, str(table.schema.field(key).type)) for key in keys if key not in read]
+            not_read = [key for key in keys if key not in read]
+            if wanted is not None and not_read:
+                raise RecordingError(f"{path}: column '{not_read[0]}' is not numeric", "map another column")
+            if not read:
+                raise RecordingError(f"{path}: has no column of numbers", "see cdtool info")
+            yield from table.pieces(read)
+        details = {"rows": str(table.rows), "container": table.kind}
+        unique = tuple(dict.fromkeys(findings))
+        return Source(path, self.name, table.headers(read), table.origin, unique, details, names)
+
+
+class _ArrowTable:
+    """Schema and rows of a file in either container; `rows` is their number after `pieces` has read them.
+
+    The columns `worded` may contain texts, which are read as categories.
+    """
+
+    def __init__(self, path: Path, arrow: Any, findings: list[Finding], worded: Collection[str | int] = ()) -> None:
+        self.path, self.arrow, self.findings = path, arrow, findings
+        self.rows = 0
+        with path.open("rb") as file:
+            self.kind = "parquet" if file.read(4) == _PARQUET else "feather"
+        if self.kind == "parquet":
+            self._file = library("pyarrow.parquet", "parquet", path).ParquetFile(os.fspath(path))
+            self.schema, self._batches = self._file.schema_arrow, self._of_parquet
+        else:
+            self._file = _Feather(path, arrow, findings)
+            self.schema, self._batches = self._file.schema, self._file.batches
+        metadata = self.schema.metadata or {}
+        self.own_clocks = metadata.get(OWN_CLOCKS) == b"1" and OWN_CLOCK in self.schema.names
+        self.origin = float(metadata.get(b"cdtool.origin_s", b"0"))
+        self._starts: dict[str, Any] = {}  # of columns of time stamps
+        asked = (key for name in worded if (key := column_key(name, self.schema.names)))
+        self._categories = {key: Categories() for key in asked if self._has_texts(key)}
+
+    def _has_texts(self, key: str) -> bool:
+        types, kind = self.arrow.types, self.schema.field(key).type
+        kind = kind.value_type if types.is_dictionary(kind) else kind
+        return bool(types.is_string(kind) or types.is_large_string(kind))
+
+    def is_number(self, key: str) -> bool:
+        """Return whether a column has numbers, booleans or time stamps, or is read as categories."""
+        types, kind = self.arrow.types, self.schema.field(key).type
+        return key in self._categories or bool(
+            types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_timestamp(kind)
+        )
+
+    def headers(self, keys: Sequence[str]) -> dict[str, Column]:
+        """Return the columns without their rows."""
+        own = np.empty(0) if self.own_clocks else None
+        values = [key for key in keys if not (self.own_clocks and key == OWN_CLOCK)]
+        words = {key: each.words for key, each in self._categories.items()}
+        return {key: Column(key, np.empty(0), own, self._unit(key), words.get(key, {})) for key in values}
+
+    def pieces(self, keys: Sequence[str]) -> Iterator[Piece]:
+        """Yield the rows of these columns, one group of rows at a time."""
+        read = list(dict.fromkeys((*keys, OWN_CLOCK) if self.own_clocks else keys))
+        for batch in self._batches(read):
+            self.rows += batch.num_rows
+            check_size(self.path, self.rows * len(keys))
+            columns = {key: self._numbers(key, batch.column(batch.schema.get_field_index(key))) for key in read}
+            if not self.own_clocks:
+                yield Piece("", None, {key: values for key, (values, _) in columns.items()}, batch.num_rows)
+                continue
+            time, _ = columns.pop(OWN_CLOCK)
+            for key, (values, absent) in columns.items():
+                # Written by cdtool from several clocks: null means that this column has no sample at this time.
+                yield Piece(key, time[~absent], {key: values[~absent]}, int(np.count_nonzero(~absent)))
+
+    def _of_parquet(self, keys: Sequence[str]) -> Iterator[Any]:
+        metadata = self._file.metadata
+        check_size(self.path, sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)) * len(keys))
+        return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)))
+
+    def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
+        """Return the values, and which of them are absent (null)."""
+        absent = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
+        if key in self._categories:
+            return self._codes(self._categories[key], column, absent), absent
+        if self.arrow.types.is_timestamp(column.type):
+            return self._seconds(key, column.to_numpy(zero_copy_only=False).astype("datetime64[ns]"))
+        values = column.cast(self.arrow.float64(), safe=False) if absent.any() else column
+        return as_numbers(key, values.to_numpy(zero_copy_only=False), self.findings), absent
+
+    def _codes(self, categories: Categories, column: Any, absent: Any) -> FloatArray:
+        """Return the codes of a column of texts; NaN where a text is missing or empty."""
+        encoded = column if self.arrow.types.is_dictionary(column.type) else column.dictionary_encode()
+        texts = encoded.dictionary.to_pylist()
+        codes = np.array([categories.code(text) if text else np.nan for text in texts], dtype=np.float64)
+        values = np.full(len(column), np.nan)
+        if len(codes):
+            values[~absent] = codes[encoded.indices.to_numpy(zero_copy_only=False)[~absent].astype(np.intp)]
+        return values
+
+    def _seconds(self, key: str, stamps: Any) -> tuple[FloatArray, Any]:
+        """Return time stamps as seconds after the first one, which float64 can represent, and which are absent."""
+        absent = np.isnat(stamps)
+        if key not in self._starts and not absent.all():
+            self._starts[key] = stamps[~absent][0]
+            self.findings.append(Finding("stamps_as_seconds", key, {"start": str(self._starts[key])}))
+        seconds = (stamps - self._starts.get(key, np.datetime64(0, "ns"))).astype(np.int64) / 1e9
+        seconds[absent] = np.nan
+        return seconds, absent
+
+    def _unit(self, key: str) -> str | None:
+        if self.arrow.types.is_timestamp(self.schema.field(key).type):
+            return "s"
+        metadata = self.schema.field(key).metadata or {}
+        stated = next((metadata[name].decode("utf-8", "replace") for name in _UNIT_KEYS if name in metadata), None)
+        return stated or split_unit(key)[1]
+
+
+class _Feather:
+    """An Arrow file as record batches; if the file is cut off, only the batches before the cut."""
+
+    def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
+        self._path, self._arrow, self._findings = path, arrow, findings
+        self._ipc = library("pyarrow.ipc", "parquet", path)
+        try:
+            self._whole = self._ipc.open_file(os.fspath(path))
+            self.schema = self._whole.schema
+            # A batch is decompressed as a whole; this counts its rows by its head.
+            counted = library("pyarrow.dataset", "parquet", path).dataset(os.fspath(path), format="feather")
+            check_size(path, counted.count_rows() * len(self.schema.names))
+        except arrow.ArrowInvalid:
+            self._whole = None
+            with path.open("rb") as stream:
+                self.schema = self._stream(stream).schema
+
+    def batches(self, keys: Sequence[str]) -> Iterator[Any]:
+        """Yield the columns `keys`, batch by batch. Arrow does not check a file's declarations without `validate`."""
+        count = 0 if self._whole is None else self._whole.num_record_batches
+        for batch in self._before_cut() if self._whole is None else map(self._whole.get_batch, range(count)):
+            batch.validate(full=True)
+            yield batch.select(list(keys))
+
+    def _before_cut(self) -> Iterator[Any]:
+        """Yield the batches before the cut."""
+        rows = 0
+        with self._path.open("rb") as stream, suppress(self._arrow.ArrowInvalid, OSError, StopIteration):
+            reader = self._stream(stream)
+            while True:
+                batch = reader.read_next_batch()
+                rows += batch.num_rows
+                yield batch
+        self._findings.append(Finding("cut_behind_row", "", {"row": rows}))
+
+    def _stream(self, stream: Any) -> Any:
+        stream.seek(8)  # after the magic bytes and their padding, an Arrow file is a stream
+        return self._ipc.open_stream(stream)

@@ -1,0 +1,1 @@
+"""How a text table is written: separators, marks, head lines and encodings."""

@@ -1,0 +1,83 @@
+"""The decoders of a topic's channels, and the count of messages that could not be decoded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.messages.batch import Batch, Stream
+from cdtool.formats.messages.decoded_batch import DECODED, DecodedBatch, Decoder, UndecodableError
+from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.fields import element_names
+
+Result = TypeVar("Result")
+
+
+class Decoders:
+    """One decoder per channel, created when its first messages arrive.
+
+    Messages that cannot be decoded are counted in `failed`; `reason` is that of the first one.
+    """
+
+    def __init__(self) -> None:
+        self._by_channel: dict[int, Decoder | UndecodableError] = {}
+        self.decoded = 0
+        self.failed = 0
+        self.reason = ""
+
+    def attempt(self, stream: Stream, batch: Batch, read: Callable[[Decoder], Result]) -> Result | None:
+        """Return what `read` returns; if the channel has no decoder, count the batch as failed and return None."""
+        try:
+            if stream.id not in self._by_channel:
+                self._by_channel[stream.id] = decoder_for(stream.encoding, *stream.definition)
+            decoder = self._by_channel[stream.id]
+            if isinstance(decoder, UndecodableError):
+                raise decoder
+            return read(decoder)
+        except UndecodableError as fault:  # `read` may raise it for a reason that only its messages reveal
+            self._by_channel[stream.id] = fault
+            self._fail(len(batch), str(fault))
+            return None
+
+    def element_names(self, stream: Stream, batch: Batch) -> tuple[str, ...] | None:
+        """Return the texts of the array `name` of the first decodable message; None if no message is decodable."""
+        for row in range(len(batch)):
+            one = batch.rows(slice(row, row + 1))
+            contents = self.attempt(stream, one, lambda decoder, one=one: decoder.contents(one))  # type: ignore[misc]
+            if contents is None:
+                return None
+            if contents:
+                return tuple(element_names(contents[0]))
+        return None
+
+    def keep(self, decoded: DecodedBatch) -> npt.NDArray[np.bool_]:
+        """Return which messages of a batch are decoded (n,), and count both kinds."""
+        whole: npt.NDArray[np.bool_] = decoded.status == DECODED
+        count = int(np.count_nonzero(whole))
+        self.decoded += count
+        if count < len(whole):
+            self._fail(len(whole) - count, decoded.reason)
+        return whole
+
+    def _fail(self, count: int, reason: str) -> None:
+        self.failed += count
+        self.reason = self.reason or " ".join(reason.split())[:200]
+
+    def failure(self, topic: str) -> list[Finding]:
+        """Return the finding on messages that could not be decoded, if there are any."""
+        fact = {"count": self.failed, "messages": self.failed + self.decoded, "reason": self.reason}
+        return [Finding("undecodable_messages", topic, fact)] if self.failed else []
+
+    def checked_failure(self, path: str, topic: str) -> list[Finding]:
+        """Return the same as `failure`; raises RecordingError if no message could be decoded."""
+        if not self.decoded:
+            raise RecordingError(
+                f"{path}: no message of {topic} can be decoded: {self.reason}",
+                "record the topic as JSON, ROS 2 CDR, ROS 1 or protobuf, with its message definition",
+            )
+        return self.failure(topic)

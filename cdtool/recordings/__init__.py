@@ -1,0 +1,1 @@
+"""What was measured: a recording, its clock, its units, its motions and its operations."""

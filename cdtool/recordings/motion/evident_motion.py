@@ -1,0 +1,75 @@
+"""Where a log shows that a joint moves: its average speed so far differs from zero by more than its noise allows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.recordings.recording import Series
+
+# The speed is averaged over this long [s] back, and over this many samples at least.
+_SECONDS, _SAMPLES = 0.1, 5
+# With fewer samples, noise cannot be told from motion.
+_FEWEST = 3
+# A mean that is this many of its standard errors from zero is motion.
+_ERRORS = 5.0
+
+
+def evident_speed(speed: Series) -> FloatArray:
+    """Return the average speed so far (n, J) where it shows motion, and 0 elsewhere.
+
+    Parameters
+    ----------
+    speed : Series
+        The speed (n, J), in any unit; NaN: no sample.
+
+    Returns
+    -------
+    ndarray of float, shape (n, J)
+        Mean of the last 0.1 s, and of the last 5 samples at least, if its magnitude is above 5 of its standard errors;
+        otherwise 0. Causal.
+
+    Notes
+    -----
+    No scale is needed: it works for a joint whose nominal speed is unknown. A drift of a filtered speed at rest can
+    count as slow motion.
+
+    Examples
+    --------
+    >>> noise = 0.01 * np.array([1.0, -2.0, 1.5, -1.0, 0.5, -1.5, 1.0, -0.5, 0.0, 1.0])
+    >>> speed = Series(0.02 * np.arange(10), noise + np.repeat([0.0, 0.5], 5), "m/s")
+    >>> evident_speed(speed)[[4, 9], 0].round(3).tolist()
+    [0.0, 0.417]
+    """
+    found = np.zeros(speed.values.shape)
+    column = np.empty(len(speed))
+    for joint in range(speed.joint_count):
+        _evident(speed.time, np.ascontiguousarray(speed.values[:, joint]), column)
+        found[:, joint] = column
+    return found
+
+
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64[::1])")
+def _evident(time: FloatArray, speed: FloatArray, found: FloatArray) -> None:
+    for k in range(len(time)):
+        found[k] = 0.0
+        count, total, first = 0, 0.0, k
+        for i in range(k, -1, -1):
+            if time[k] - time[i] > _SECONDS and k - i >= _SAMPLES:
+                break
+            first = i
+            if math.isfinite(speed[i]):
+                count += 1
+                total += speed[i]
+        if count < _FEWEST:
+            continue
+        mean, squares = total / count, 0.0
+        for i in range(first, k + 1):
+            if math.isfinite(speed[i]):
+                squares += (speed[i] - mean) ** 2
+        error = math.sqrt(squares / (count - 1) / count)
+        if abs(mean) > _ERRORS * error:
+            found[k] = mean

@@ -1,0 +1,124 @@
+"""Latency against false alarms (activity monitor operating characteristic, AMOC): one curve per detector and group.
+
+Conventions: latencies come from a group of impacts, false alarms from the impact-free hold-out, with the same limits.
+No false alarm does not mean a rate of zero: the upper bound is given as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.base.errors import UsageError
+from cdtool.results.curves.false_alarm_budget import Budget
+from cdtool.results.results import Results, SweepResult
+from cdtool.statistics.rates import poisson_at_most
+
+Per = Literal["hour", "operation"]
+
+
+@dataclass(frozen=True)
+class AmocPoint:
+    """One safety factor: `rate` of false alarms, `median` latency [ms], infinite if it is not reached.
+
+    The median counts missed contacts as later than all others; NaN if no contact could be assessed.
+    """
+
+    safety_factor: float
+    false_alarms: int
+    rate: float
+    median: float
+    detected: int
+    missed: int
+
+
+@dataclass(frozen=True)
+class AmocCurve:
+    """One detector in one group: points by ascending safety factor, `in_use` the number of the one that is set.
+
+    The rates refer to the hold-out's `operations` and `hours`. `at_most`: the rate that is not exceeded if there was no
+    false alarm (one-sided, 95 %).
+    """
+
+    detector: str
+    group: str
+    per: Per
+    operations: int
+    hours: float
+    at_most: float
+    not_assessable: int
+    points: tuple[AmocPoint, ...]
+    in_use: int
+
+    @property
+    def set_point(self) -> AmocPoint:
+        """The point of the safety factor that is set."""
+        return self.points[self.in_use]
+
+
+def amoc_curves(results: Results) -> tuple[AmocCurve, ...]:
+    """Return the curves of latency against false alarms of a benchmark.
+
+    Parameters
+    ----------
+    results : Results
+        The results; their `sweep` has the points.
+
+    Returns
+    -------
+    tuple of AmocCurve
+        In the order of the benchmark file. Rates are per hour, or per operation if that is the unit of the false-alarm
+        budget. A detector that was nowhere assessable in the hold-out has no curve.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the results.
+    """
+    rows: dict[tuple[str, str], list[SweepResult]] = {}
+    for row in results.sweep:
+        rows.setdefault((row.group, row.detector), []).append(row)
+    per = rate_unit(results)
+    made = [_curve(items, per) for items in rows.values()]
+    return tuple(curve for curve in made if curve is not None)
+
+
+def rate_unit(results: Results) -> Per:
+    """Return the unit of false-alarm rates: that of the budget, else hours."""
+    budget = results.provenance.get("false_alarm_budget")
+    try:
+        return Budget.parse(str(budget)).per if budget else "hour"
+    except UsageError:
+        return "hour"
+
+
+def _curve(rows: Sequence[SweepResult], per: Per) -> AmocCurve | None:
+    rows = sorted(rows, key=lambda row: row.safety_factor)
+    first = rows[0]
+    exposure = first.hours if per == "hour" else float(first.operations)
+    if exposure <= 0.0:
+        return None
+    return AmocCurve(
+        detector=first.detector,
+        group=first.group,
+        per=per,
+        operations=first.operations,
+        hours=first.hours,
+        at_most=poisson_at_most(0, exposure),
+        not_assessable=first.not_assessable,
+        points=tuple(_point(row, exposure) for row in rows),
+        in_use=next((i for i, row in enumerate(rows) if row.in_use), 0),
+    )
+
+
+def _point(row: SweepResult, exposure: float) -> AmocPoint:
+    median = math.inf if row.median_ms is None else row.median_ms
+    return AmocPoint(
+        safety_factor=row.safety_factor,
+        false_alarms=row.false_alarms,
+        rate=row.false_alarms / exposure,
+        median=median if row.detected or row.missed else math.nan,
+        detected=row.detected,
+        missed=row.missed,
+    )

@@ -1,0 +1,359 @@
+"""Audit the synchronisation of a log's channels by the physics that connects them.
+
+The speed is the derivative of the position, the acceleration that of the speed, and in a contact the load cell reads
+what the machine's momentum balance leaves over: drive force less friction less inertia times acceleration.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.plain_text import counted
+from cdtool.machines.dynamics import Machine
+from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.truth.synchronisation.combination import clock_line
+from cdtool.truth.synchronisation.delay import LEAST_POINTS, EventDelay, SmoothSignal, delay_of
+from cdtool.truth.synchronisation.latency import ChannelLatency, RestsOn, TimedEvent, latency_from
+from cdtool.truth.synchronisation.smoothing import POINTS_PER_WIDTH, REACH, Grid, local_derivative
+
+# Delays up to this are found [s].
+LONGEST_DELAY = 0.25
+# A periodic motion would allow longer ones: filters of drives are shorter than this [s].
+_LONGEST_IN_MOTION = 0.1
+# Widths of the smoothing: these multiples of the longer sample period. The least is what a local fit needs.
+_WIDTHS = (1.5, 3.0, 6.0, 12.0, 24.0)
+# Twice the chosen width must still resolve an event: at least this many widths per event [-].
+_WIDTHS_PER_EVENT = 12.0
+# A contact is examined from this time before its onset to this time after its end, and at most this long [s].
+_BEFORE, _AFTER, _LONGEST_CONTACT = 0.15, 0.05, 0.6
+# A motion is examined in sections of at least this length [s]; as many as are needed and as are affordable.
+_SECTION, _MOST_SECTIONS = 1.0, 48
+_PERIODS_PER_SECTION = 100.0
+# A long log is not cut into more sections than this, of which the ones to examine are chosen.
+_FINEST_CUT = 2000
+# A smoothing counts if at least this share of the events that another one shows have a delay.
+_MOST_EVENTS = 0.75
+# So many sections must agree: a single one may show the machine's elasticity, not the channel.
+_LEAST_AGREEING = 3
+# Contacts that are examined: spread over the log.
+_MOST_CONTACTS = 200
+# A force that rises within a sample period is not resolved: its delay is uncertain by this share of the period, and by
+# less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so much.
+_ALIASING = 0.1
+# A delay whose standard error is larger than this [s] says nothing.
+_LARGEST_ERROR = 0.05
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A signal that is part of a prediction: its samples, the order of the derivative, and a factor (J,) or scalar."""
+
+    time: FloatArray
+    values: FloatArray
+    order: int
+    factor: float
+
+    __repr__ = short_repr
+
+    @cached_property
+    def period(self) -> float:
+        return float(np.median(np.diff(self.time)))
+
+    def on(self, grid: Grid, width: float) -> FloatArray:
+        """Return the signal (count,) on a grid."""
+        times = grid.times
+        first, last = np.searchsorted(self.time, (times[0] - REACH * width, times[-1] + REACH * width))
+        near = slice(int(first), int(last) + 1)
+        return self.factor * local_derivative(self.time[near], self.values[near], times, width, self.order)
+
+
+@dataclass(frozen=True)
+class _Window:
+    """An event's start and end [s], and the rise time of a contact [s]."""
+
+    start: float
+    end: float
+    rise: float = math.nan
+
+
+def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -> tuple[ChannelLatency, ...]:
+    """Return the latency of every channel that physics connects with another one.
+
+    Parameters
+    ----------
+    recording : Recording
+        A log on the load side, with each channel on its own clock.
+    machine : Machine
+        Its inertia and friction, for the balance in contacts.
+    contacts : sequence of Contact
+        The log's contacts, on the load cell's clock.
+
+    Returns
+    -------
+    tuple of ChannelLatency
+        Per joint the speed against the position, and the acceleration against position or speed; the load cell against
+        the balance with the position and with the speed. Each states why where it is not assessable. Channels that
+        cdtool derived from others are not listed. The load cell is only compared here, never used by a detector.
+
+    Notes
+    -----
+    F = u - friction - J dv/dt for a rigid machine. With an accelerometer on the load, m dv/dt of the load is measured
+    instead (two masses, connected by an elastic transmission). Of an axis, the friction in the machine file is
+    subtracted; scale and offset are estimated in every event. The method fails where neither holds: contacts that the
+    machine's inertia does not feel (very slow ones), clamping at standstill, robots whose contact moves another joint
+    than the one examined, dry friction that the machine file does not have where the load rebounds.
+
+    Examples
+    --------
+    The stamps of a speed are 4 ms late.
+
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recordings.recording import Series
+    >>> from cdtool.base.tables import Table
+    >>> time = np.arange(0.0, 6.0, 0.005)
+    >>> position = Series(time, 0.3 * np.sin(2.0 * time) ** 3, "m")
+    >>> speed = Series(time + 0.004, 1.8 * np.sin(2.0 * time) ** 2 * np.cos(2.0 * time), "m/s")
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
+    >>> found = audit(Recording("run", "", ("axis",), {"position": position, "speed": speed}), axis, [])
+    >>> found[0].channel, found[0].reference, round(found[0].offset.value, 4)
+    ('speed', 'position', 0.004)
+    """
+    found: list[ChannelLatency] = []
+    # Of implausibly large values squares are infinite: what they are part of is not assessable.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for j, joint in enumerate(recording.joints):
+            found += _motion_latencies(recording, j, joint if len(recording.joints) > 1 else "", contacts)
+        if "force" in recording:
+            found += _load_cell_latencies(recording, machine, contacts, found)
+    return tuple(found)
+
+
+def _is_measured(recording: Recording, channel: str) -> bool:
+    derived = {"speed": "derived_speed", "position": "integrated_position"}.get(channel)
+    if channel not in recording or len(recording[channel]) < 3:
+        return False
+    return derived is None or not any(item.kind == derived for item in recording.findings)
+
+
+def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _Part:
+    return _Part(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
+
+
+def _motion_latencies(recording: Recording, joint: int, name: str, contacts: Sequence[Contact]) -> list[ChannelLatency]:
+    found = []
+    has_position, has_speed = _is_measured(recording, "position"), _is_measured(recording, "speed")
+    if has_position and has_speed:
+        observed = _part(recording["speed"], joint, 0)
+        predictor = _part(recording["position"], joint, 1)
+        found.append(
+            _by_sections(ChannelLatency("speed", "position", "derivative", name), observed, predictor, math.inf)
+        )
+    if _is_measured(recording, "acceleration") and (has_position or has_speed):
+        base, order = ("position", 2) if has_position else ("speed", 1)
+        # In a contact an elastic transmission separates the accelerometer on the load from the motor.
+        until = min((contact.start for contact in contacts), default=math.inf)
+        observed, predictor = _part(recording["acceleration"], joint, 0), _part(recording[base], joint, order)
+        found.append(_by_sections(ChannelLatency("acceleration", base, "derivative", name), observed, predictor, until))
+    return found
+
+
+def _by_sections(empty: ChannelLatency, observed: _Part, predictor: _Part, until: float) -> ChannelLatency:
+    start = max(float(observed.time[0]), float(predictor.time[0]))
+    end = min(float(observed.time[-1]), float(predictor.time[-1]), until)
+    period = max(observed.period, predictor.period)
+    windows = _sections(start, end, period, predictor)
+    if not windows:
+        return replace(empty, reason="the motion is too short, or at rest")
+    found = _latency(empty, observed, [[predictor]], windows)
+    if found.assessable and len(found.used) < _LEAST_AGREEING:
+        reason = f"only {counted(len(found.used), 'section')} of {len(windows)} with a change of motion that both show"
+        return replace(empty, events=found.events, reason=reason)
+    return found
+
+
+def _sections(start: float, end: float, period: float, predictor: _Part) -> list[_Window]:
+    """Return the sections of a motion in which it changes, at most `_MOST_SECTIONS`."""
+    length = max(_SECTION, _PERIODS_PER_SECTION * period, (end - start) / _FINEST_CUT)
+    if end - start < length:
+        return []
+    count = max(int((end - start) / length), 1)
+    edges = np.linspace(start, end, count + 1)
+    # How much the motion changes in a section: coarse, from a few points each.
+    coarse = Grid.over(start, end, (end - start) / count / 10.0)
+    change = local_derivative(predictor.time, predictor.values, coarse.times, coarse.step, predictor.order)
+    section = np.clip(np.searchsorted(edges, coarse.times, side="right") - 1, 0, count - 1)
+    spread = np.zeros(count)
+    for number in range(count):
+        own = change[(section == number) & np.isfinite(change)]
+        spread[number] = float(np.ptp(own)) if len(own) > 3 else 0.0
+    if not spread.any():
+        return []
+    busy = np.flatnonzero(spread > 0.05 * spread.max())
+    if len(busy) > _MOST_SECTIONS:
+        busy = busy[np.linspace(0, len(busy) - 1, _MOST_SECTIONS).round().astype(np.int64)]
+    return [_Window(float(edges[number]), float(edges[number + 1])) for number in busy]
+
+
+def _load_cell_latencies(
+    recording: Recording, machine: Machine, contacts: Sequence[Contact], others: Sequence[ChannelLatency]
+) -> list[ChannelLatency]:
+    windows = _contact_windows(recording["force"], contacts) if len(recording["force"]) > 2 else []
+    bases = [name for name in ("position", "speed") if _is_measured(recording, name)]
+    if not bases or not windows:
+        reason = "no contact that the load cell shows" if bases else "neither position nor speed is measured"
+        return [ChannelLatency("force", bases[0] if bases else "position", "deceleration", reason=reason)]
+    found = []
+    for base in bases:
+        rests_on, sums = _balances(recording, machine, base, others)
+        found.append(_latency(ChannelLatency("force", base, rests_on), _part(recording["force"], 0, 0), sums, windows))
+    return found
+
+
+def _contact_windows(force: Series, contacts: Sequence[Contact]) -> list[_Window]:
+    usable = [contact for contact in contacts if not contact.in_progress]
+    if len(usable) > _MOST_CONTACTS:
+        usable = [usable[i] for i in np.linspace(0, len(usable) - 1, _MOST_CONTACTS).round().astype(int)]
+    windows = []
+    for contact in usable:
+        end = min(contact.end + _AFTER, contact.start + _LONGEST_CONTACT)
+        windows.append(_Window(contact.start - _BEFORE, end, _rise_time(force, contact)))
+    return windows
+
+
+def _rise_time(force: Series, contact: Contact) -> float:
+    """Return how long the force takes from its onset to half of its peak [s]."""
+    part = force.between(contact.start, contact.end)
+    over = np.abs(part.values[:, 0] - (contact.rest if math.isfinite(contact.rest) else 0.0))
+    known = np.isfinite(over)
+    if not known.any():
+        return 0.5 * force.period
+    high = np.flatnonzero(known & (over >= 0.5 * float(np.max(over[known]))))
+    return max(float(part.time[high[0]]) - contact.start, 0.5 * force.period)
+
+
+def _balances(
+    recording: Recording, machine: Machine, base: str, others: Sequence[ChannelLatency]
+) -> tuple[RestsOn, list[list[_Part]]]:
+    """Return what the balance rests on, and one sum of parts per joint that may feel the contact."""
+    order = 2 if base == "position" else 1
+    inertia = machine.nominal_inertia
+    has_torque = "torque" in recording and len(recording["torque"]) > 2 and bool(np.all(inertia > 0.0))
+    reflected = getattr(machine, "reflected_inertia", None)
+    sums = []
+    rests_on: RestsOn = "momentum balance" if has_torque else "deceleration"
+    for j in range(len(recording.joints)):
+        motion = _part(recording[base], j, order)
+        if not has_torque:
+            sums.append([replace(motion, factor=-1.0)])
+            continue
+        parts = [replace(motion, factor=-float(inertia[j]))]
+        lateness = _lateness(others, base, recording.joints[j] if len(recording.joints) > 1 else "")
+        if _is_measured(recording, "acceleration") and not machine.coupled and reflected is not None:
+            rests_on = "two masses"
+            acceleration = recording["acceleration"]
+            load = _Part(
+                acceleration.time - (lateness or 0.0),
+                np.ascontiguousarray(acceleration.values[:, j]),
+                0,
+                -float(inertia[j] - reflected[j]),
+            )
+            parts = [replace(motion, factor=-float(reflected[j])), load] if reflected[j] > 0.0 else [load]
+        torque = recording["torque"]
+        parts.append(_part(torque, j, 0))
+        if "speed" in recording and not machine.coupled:
+            # Constant while the motion keeps its direction; it changes its sign where the load rebounds.
+            speed = recording["speed"]
+            nothing = np.zeros_like(speed.values)
+            parts.append(_part(speed.with_values(machine.force_balance(nothing, nothing, speed.values), "N"), j, 0))
+        sums.append(parts)
+    return rests_on, sums
+
+
+def _lateness(others: Sequence[ChannelLatency], base: str, joint: str) -> float | None:
+    """Return how late the accelerometer is against `base` [s]; None if that is not known."""
+    found = {item.channel: item for item in others if item.joint == joint and item.assessable}
+    if "acceleration" not in found:
+        return None
+    late = found["acceleration"].offset.value
+    if found["acceleration"].reference == base:
+        return late
+    return late - found["speed"].offset.value if "speed" in found else None
+
+
+def _latency(
+    empty: ChannelLatency, observed: _Part, sums: Sequence[Sequence[_Part]], windows: Sequence[_Window]
+) -> ChannelLatency:
+    """Return the latency with the narrowest interval of all smoothings, widened by its change at twice that."""
+    period = max(observed.period, *(part.period for parts in sums for part in parts))
+    shortest = min(window.end - window.start for window in windows)
+    widths = [factor * period for factor in _WIDTHS if factor * period * _WIDTHS_PER_EVENT <= shortest] or [
+        _WIDTHS[0] * period
+    ]
+    trials = [_joint_events(observed, sums, windows, width) for width in widths]
+    counts = [sum(event.delay.known for event in events) for events in trials]
+    # A few events by chance, of many, do not show a smoothing to be good.
+    scores = [
+        _score(events) if count >= _MOST_EVENTS * max(counts) else math.inf
+        for events, count in zip(trials, counts, strict=True)
+    ]
+    best = int(np.argmin(scores))
+    if not math.isfinite(scores[best]):
+        return latency_from(replace(empty, width=widths[best]), trials[best])
+    beside = trials[best + 1] if best + 1 < len(trials) else _joint_events(observed, sums, windows, 2.0 * widths[best])
+    return latency_from(replace(empty, width=widths[best], dependence=_change(trials[best], beside)), trials[best])
+
+
+def _joint_events(
+    observed: _Part, sums: Sequence[Sequence[_Part]], windows: Sequence[_Window], width: float
+) -> list[TimedEvent]:
+    """Return the events of the joint that explains the observed signal best."""
+    per_joint = [[_event(observed, parts, window, width) for window in windows] for parts in sums]
+    return min(per_joint, key=_score)
+
+
+def _event(observed: _Part, parts: Sequence[_Part], window: _Window, width: float) -> TimedEvent:
+    step = width / POINTS_PER_WIDTH
+    own = Grid.over(window.start, window.end, step)
+    if own.count < LEAST_POINTS:
+        middle = 0.5 * (window.start + window.end)
+        return TimedEvent(EventDelay(middle, math.nan, math.nan, math.nan, reason="too few samples"), window.rise)
+    is_contact = not math.isnan(window.rise)
+    # A contact that is later than half of its window would be compared with what is not part of it.
+    half = 0.5 * (window.end - window.start)
+    longest = min(LONGEST_DELAY, half) if is_contact else max(_LONGEST_IN_MOTION, 4.0 * width)
+    wide = Grid.over(window.start - longest - step, window.end + longest + step, step)
+    predicted = sum((part.on(wide, width) for part in parts), np.zeros(wide.count))
+    y = SmoothSignal(own, observed.on(own, width))
+    delay = delay_of(y, SmoothSignal(wide, predicted), window.start, window.end, longest, is_contact)
+    if delay.known and delay.error > _LARGEST_ERROR:
+        delay = EventDelay(delay.time, math.nan, math.nan, delay.explained, reason="the signals do not change enough")
+    if delay.known and is_contact:
+        period = max(observed.period, *(part.period for part in parts))
+        aliasing = _ALIASING * period * min(period / window.rise, 1.0)
+        delay = replace(delay, error=math.hypot(delay.error, aliasing))
+    return TimedEvent(delay, window.rise)
+
+
+def _score(events: Sequence[TimedEvent]) -> float:
+    """Return half the width of the interval of the offset that the events show; infinite without a delay."""
+    known = [event.delay for event in events if event.delay.known]
+    if not known:
+        return math.inf
+    offset = clock_line(known).offset
+    return 0.5 * (offset.high - offset.low)
+
+
+def _change(chosen: Sequence[TimedEvent], beside: Sequence[TimedEvent]) -> float:
+    """Return by how much the offset differs between two smoothings, beyond the uncertainty of the second one [s]."""
+    pairs = [(a.delay, b.delay) for a, b in zip(chosen, beside, strict=True) if a.delay.known and b.delay.known]
+    if not pairs:
+        return 0.0
+    offset = clock_line([replace(b, delay=b.delay - a.delay) for a, b in pairs]).offset
+    return max(abs(offset.value) - 0.5 * (offset.high - offset.low), 0.0)

@@ -1,1 +1,0 @@
-"""Checks of a log itself, identical in every command."""

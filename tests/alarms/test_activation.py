@@ -1,0 +1,238 @@
+"""Debounce, re-arming and the handling of samples that are not assessable."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.alarms.activation import Activation, begins_at, crossings_of
+from cdtool.alarms.pipeline import judge
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Band, Signal
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.operations import Operation
+from cdtool.recordings.recording import Recording, Series
+from cdtool.thresholds.limit import Limit
+from tests.bits import VALUES, clocks, samples
+
+
+def alarms(values, status=None, debounce=3, rearm=0.5, period=1e-3):
+    values = np.asarray(values, dtype=float).reshape(-1, 1)
+    codes = np.zeros(values.shape, dtype=np.uint8) if status is None else np.asarray(status, np.uint8).reshape(-1, 1)
+    time = np.arange(len(values)) * period
+    band = Band(np.full(values.shape, -1.0), np.full(values.shape, 1.0))
+    return Activation(debounce, rearm).alarms(Signal(time, values, codes, "N"), band)[0]
+
+
+def test_the_alarm_has_the_time_of_the_last_sample_that_was_counted():
+    (alarm,) = alarms([0, 0, 2, 2, 3, 2, 0])
+    assert alarm.time == pytest.approx(4e-3)
+    assert (alarm.side, alarm.statistic, alarm.limit, alarm.joint) == ("above", 3.0, 1.0, "0")
+
+
+def test_a_value_inside_interrupts_the_sequence():
+    assert alarms([2, 2, 0, 2, 2, 0, 2, 2]) == ()
+
+
+def test_a_missing_sample_neither_counts_nor_interrupts():
+    (alarm,) = alarms([0, 2, np.nan, 2, np.nan, 2, 0], status=[0, 0, 3, 0, 3, 0, 0])
+    assert alarm.time == pytest.approx(5e-3)
+
+
+def test_a_sample_where_the_method_does_not_apply_interrupts_the_sequence():
+    assert alarms([2, 2, 2, 2, 2], status=[0, 0, 2, 0, 0]) == ()
+    assert alarms([2, 2, 2, 2, 2], status=[1, 1, 1, 0, 0]) == ()
+
+
+def test_below_the_band_is_an_alarm_too():
+    (alarm,) = alarms([0, -2, -2, -2])
+    assert (alarm.side, alarm.limit) == ("below", -1.0)
+
+
+def test_it_is_armed_again_only_after_half_a_second_inside():
+    blink = [2] * 5 + [0] * 400 + [2] * 5
+    assert len(alarms(blink)) == 1
+    assert len(alarms([2] * 5 + [0] * 502 + [2] * 5)) == 2
+
+
+def test_every_debounced_exit_is_a_crossing_and_only_the_armed_ones_are_alarms():
+    values = np.array([2.0] * 5 + [0.0] * 10 + [2.0] * 5).reshape(-1, 1)
+    signal = Signal(np.arange(20) * 1e-3, values, np.zeros((20, 1), dtype=np.uint8), "N")
+    band = Band(np.full((20, 1), -1.0), np.full((20, 1), 1.0))
+    armed, crossings = Activation(3).alarms(signal, band)
+    assert [round(1e3 * alarm.time) for alarm in armed] == [2]
+    assert [round(1e3 * alarm.time) for alarm in crossings] == [2, 17]
+
+
+def test_the_default_debounce_is_nine_milliseconds_of_samples():
+    assert Activation().samples(1e-3) == 9
+    assert Activation().samples(5e-3) == 2
+    assert Activation().samples(0.04) == 1
+    assert Activation(4).samples(1e-3) == 4
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"debounce": 0}, "debounce is 0"),
+        ({"rearm": -1.0}, "rearm is -1"),
+        ({"rearm": np.inf}, "rearm is inf.*latch"),
+        ({"hysteresis": 1.0}, "hysteresis is 1"),
+        ({"hysteresis": -0.1}, "hysteresis is -0.1"),
+        ({"hysteresis": np.nan}, "hysteresis is nan"),
+    ],
+)
+def test_a_wrong_setting_is_refused_by_its_name(settings, said):
+    with pytest.raises(UsageError, match=said):
+        Activation(**settings)
+
+
+def judged(values, activation):
+    """Return alarms and crossings [samples] of values with limits -1 and 1, through a threshold as in the pipeline."""
+    values = np.asarray(values, dtype=float).reshape(-1, 1)
+    time = np.arange(len(values)) * 1e-3
+    recording = Recording("r", "r", ("a",), {"speed": Series(time, np.ones(values.shape), "m/s")})
+    signal = Signal(time, values, np.zeros(values.shape, dtype=np.uint8), "N", joints=("a",))
+    found = judge(Operation(recording, MotionClass(1, 1.0)), "d", signal, (Limit.given([1.0]),), activation).verdict
+    return tuple([round(1e3 * alarm.time) for alarm in items] for items in (found.alarms, found.crossings))
+
+
+# Outside the band, then 0.6 s just inside it, outside again, 0.6 s far inside, and outside once more.
+DWELLING = [2.0] * 5 + [0.9] * 600 + [2.0] * 5 + [0.1] * 600 + [2.0] * 5
+
+
+def test_with_hysteresis_a_signal_at_its_limit_is_one_alarm():
+    assert judged(DWELLING, Activation(3)) == ([2, 607, 1212], [2, 607, 1212])
+    assert judged(DWELLING, Activation(3, hysteresis=0.2)) == ([2, 1212], [2, 607, 1212])
+    assert judged(DWELLING, Activation(3, hysteresis=0.95)) == ([2], [2, 607, 1212])
+
+
+def test_a_latched_alarm_is_the_only_one_and_hides_no_crossing():
+    assert judged(DWELLING, Activation(3, latch=True)) == ([2], [2, 607, 1212])
+
+
+def test_settings_change_only_what_they_name():
+    stored = Activation(5, 0.3, 0.2, True)
+    assert stored.changed({"debounce": 7, "rearm": None, "latch": None}) == Activation(7, 0.3, 0.2, True)
+    assert stored.changed({"latch": False, "hysteresis": 0.0}) == Activation(5, 0.3)
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 0.4, 0.9, 2.0, -0.9, -2.0]), max_size=80),
+    st.floats(0.0, 0.99),
+    st.integers(1, 4),
+)
+def test_more_hysteresis_never_causes_more_alarms_or_other_crossings(values, hysteresis, debounce):
+    if not values:
+        return
+    plain, crossings = judged(values, Activation(debounce, 0.005))
+    calmer, same = judged(values, Activation(debounce, 0.005, hysteresis))
+    latched, _ = judged(values, Activation(debounce, 0.005, latch=True))
+    assert same == crossings and set(calmer) <= set(crossings)
+    assert len(calmer) <= len(plain) and latched == crossings[:1]
+
+
+@given(st.lists(st.sampled_from([0.0, 2.0, -2.0]), max_size=60), st.integers(1, 5))
+def test_the_alarms_agree_with_a_plain_implementation(values, debounce):
+    expected, count, armed, inside_since = [], 0, True, None
+    for k, value in enumerate(values):
+        if abs(value) > 1.0:
+            inside_since = None
+            count += 1
+            if count == debounce:
+                expected += [k] if armed else []
+                armed = False
+            continue
+        count = 0
+        inside_since = k if inside_since is None else inside_since
+        armed = armed or k - inside_since >= 10
+    found = alarms(values, debounce=debounce, rearm=10.0, period=1.0)
+    assert [round(alarm.time) for alarm in found] == expected
+
+
+def rearmed(values, status=None, debounce=3, rearm=0.5, period=1e-3):
+    values = np.asarray(values, dtype=float).reshape(-1, 1)
+    codes = np.zeros(values.shape, dtype=np.uint8) if status is None else np.asarray(status, np.uint8).reshape(-1, 1)
+    band = Band(np.full(values.shape, -1.0), np.full(values.shape, 1.0))
+    signal, activation = Signal(np.arange(len(values)) * period, values, codes, "N"), Activation(debounce, rearm)
+    raised, _ = activation.alarms(signal, band)
+    return raised, activation.rearmed(signal, band, raised)
+
+
+def test_each_alarm_has_the_time_at_which_it_is_armed_again():
+    values = ([0.0] * 10 + [2.0] * 5 + [0.0] * 600) * 5
+    raised, again = rearmed(values)
+    assert len(raised) == 5
+    # Five samples outside, then 0.5 s inside: 2 more samples outside after the alarm.
+    assert again == pytest.approx([alarm.time + 3e-3 + 0.5 for alarm in raised], abs=2e-3)
+
+
+def test_an_alarm_that_never_stays_inside_is_never_rearmed():
+    raised, again = rearmed([0.0] * 10 + [2.0] * 5 + [0.0] * 100)
+    assert len(raised) == 1 and again == (np.inf,)
+    signal = Signal(
+        np.arange(2000) * 1e-3,
+        np.r_[np.full(10, 2.0), np.zeros(1990)].reshape(-1, 1),
+        np.zeros((2000, 1), dtype=np.uint8),
+        "N",
+    )
+    band = Band(np.full((2000, 1), -1.0), np.full((2000, 1), 1.0))
+    latched = Activation(3, latch=True)
+    assert latched.rearmed(signal, band, latched.alarms(signal, band)[0]) == (np.inf,)
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from([0.0, 2.0]), st.sampled_from([0, 0, 0, 2, 3])), min_size=1, max_size=60),
+    st.integers(1, 3),
+)
+def test_no_alarm_comes_before_the_one_before_it_is_armed_again(samples, debounce):
+    values, status = [value for value, _ in samples], [code for _, code in samples]
+    raised, again = rearmed(values, status, debounce, rearm=4e-3)
+    for i, alarm in enumerate(raised):
+        assert alarm.time < again[i]
+        assert i + 1 == len(raised) or again[i] < raised[i + 1].time
+    # Cut at the last re-arming, only that sample is missing for it.
+    if raised and np.isfinite(again[-1]):
+        k = round(again[-1] / 1e-3)
+        assert rearmed(values[:k], status[:k], debounce, rearm=4e-3)[1][-1:] in ((np.inf,), again[-2:-1])
+        more = [0.0] * 10 + [2.0] * debounce
+        whole = rearmed([*values[: k + 1], *more[10:]], [*status[: k + 1], *([0] * debounce)], debounce, rearm=4e-3)[0]
+        assert len(whole) == len(raised) + 1
+
+
+def crossings_by_numpy(activation, statistic, band, inner, begins):
+    """(time, joint, value, limit, armed) of every crossing, with the samples outside marked by numpy."""
+    needed, fresh = activation.needed(statistic.time), begins_at(statistic.time, begins)
+    found = []
+    for joint in range(statistic.values.shape[1]):
+        value, lower, upper = (item[:, joint].copy() for item in (statistic.values, band.lower, band.upper))
+        outside = (value > upper) | (value < lower)
+        calm = ~outside
+        if inner is not None:
+            calm &= ~((value > inner.upper[:, joint]) | (value < inner.lower[:, joint]))
+        status = statistic.status[:, joint].copy()
+        at, armed = crossings_of(statistic.time, outside, calm, status, needed, activation.wait, fresh)
+        for k, was_armed in zip(at, armed, strict=True):
+            limit = upper[k] if value[k] > upper[k] else lower[k]
+            found.append((statistic.time[k], joint, value[k], limit, bool(was_armed)))
+    return sorted(found, key=lambda item: item[:2])
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.data(), st.sampled_from([0, 1, 2, 40]), st.sampled_from([None, 1, 3]), st.booleans(), st.booleans())
+def test_samples_outside_are_marked_as_by_numpy(data, count, debounce, has_inner, begins_again):
+    time = data.draw(clocks(count))
+    likely = st.one_of(st.just(2.0), st.just(0.0), VALUES)
+    values, lower, upper = (data.draw(samples(count, 2, likely)) for _ in range(3))
+    status = data.draw(samples(count, 2, st.sampled_from([0.0, 0.0, 0.0, 1.0, 3.0]))).astype(np.uint8)
+    statistic, band = Signal(time, values, status, "N"), Band(lower - 1.0, upper - 1.0)
+    inner = Band(0.5 * band.lower, 0.5 * band.upper) if has_inner else None
+    begins = time[count // 2 : count // 2 + 1].tolist() if begins_again else []
+    activation = Activation(debounce, rearm=2e-3)
+    made = crossings_by_numpy(activation, statistic, band, inner, begins)
+    for needed in (None, lambda: activation.needed(time)):
+        alarms, crossings = activation.alarms(statistic, band, inner, begins, needed)
+        assert [(item.time, item.column, item.statistic, item.limit) for item in crossings] == [it[:4] for it in made]
+        assert [item.time for item in alarms] == [it[0] for it in made if it[4]]

@@ -1,0 +1,98 @@
+"""Files are bounded before they are parsed, and what is in bounds is parsed as tomllib and json parse it."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.base.errors import ConfigurationError
+from cdtool.base.files.bounded_loading import ContentError, parse_own_json, parse_toml, read_text
+from cdtool.commands.inject.injected_logs import read_injected
+from tests.command import cdtool
+from tests.project.pages import ROOT
+
+PIECES = st.lists(st.sampled_from(['"', "'", '\\"', "\\\\", "\n", "a", " ", "#", "[", "]", '""', "''"]), max_size=12)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '"""one line"""',
+        '"""two\nlines"""',
+        '"""with "a" quote and ""two"""',
+        '"""\\" \\\\"""',
+        "'''it's\nso'''",
+        '"""x"""""',
+    ],
+)
+def test_a_text_over_several_lines_may_contain_quotes_and_escapes(text):
+    document = f"note = {text}\nmass_kg = 3.0\n"
+    assert parse_toml(document) == tomllib.loads(document)
+
+
+@given(PIECES)
+def test_a_text_that_tomllib_reads_is_never_refused(pieces):
+    document = f'note = """{"".join(pieces)}"""\n'
+    try:
+        expected = tomllib.loads(document)
+    except tomllib.TOMLDecodeError:
+        return
+    assert parse_toml(document) == expected
+
+
+def test_a_text_that_does_not_end_is_refused_with_its_line():
+    with pytest.raises(ContentError, match="line 2 is not terminated"):
+        parse_toml('a = 1\nb = """' + '\\"' * 1000)
+
+
+def test_the_mark_at_the_start_of_a_windows_text_is_no_part_of_it(tmp_path):
+    file = tmp_path / "machine.toml"
+    file.write_bytes(b"\xef\xbb\xbf[machine]\r\n")
+    assert read_text(file, ConfigurationError) == "[machine]\n"
+
+
+NESTED = "[" * 200_000
+# These texts are not from a file, or the reader of a message catches what deep nesting raises.
+PARSED_ELSEWHERE = {
+    "cdtool/formats/machine_file.py": "the parameters of a machine, encoded two lines above",
+    "cdtool/commands/console/console.py": "the result of a command, encoded two lines above",
+    "cdtool/formats/messages/json_messages.py": "one message of a log, whose nesting is a reason",
+    "cdtool/commands/protocol/document/words.py": "a file of the package",
+    "cdtool/commands/init/command.py": "one value of an option",
+    "cdtool/base/findings/kinds.py": "a file of the package",
+}
+
+
+def test_every_json_and_toml_of_a_file_goes_through_the_bounded_loader():
+    parsing = {"json.load", "json.loads", "json.JSONDecoder", "tomllib.load", "tomllib.loads"}
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "cdtool").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and ast.unparse(node) in parsing
+    }
+    assert found - {"cdtool/base/files/bounded_loading.py"} == set(PARSED_ELSEWHERE)
+
+
+@pytest.mark.parametrize("text", [NESTED, f'{{"a": {NESTED}'])
+def test_nested_brackets_are_one_line_in_every_file(tmp_path, text):
+    for name in ("store.json", "injected.json", "results.json", "signature.json"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    gate = ROOT / "sample_logs/gate"
+    detect = ("detect", gate / "stiff/03.csv", "-m", gate / "machine.toml", "--signature", tmp_path / "signature.json")
+    for arguments in (
+        ("store", "status", tmp_path),
+        ("report", tmp_path / "results.json", "-o", tmp_path / "r.md"),
+        detect,
+    ):
+        outcome = cdtool(*arguments)
+        (line,) = outcome.err.splitlines()
+        assert (outcome.status, line.startswith("error: ")) == (2, True)
+    with pytest.raises(ConfigurationError, match=r"injected\.json: is no manifest"):
+        read_injected(tmp_path)
+    with pytest.raises(ContentError, match="nested too deeply"):
+        parse_own_json(text)

@@ -1,0 +1,149 @@
+"""The sentence of every kind of finding, word for word; other tests compare kinds and numbers."""
+
+from __future__ import annotations
+
+import ast
+import json
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import cdtool.base.findings
+from cdtool.base.findings import Finding, lines_of, remark, worst_first
+from cdtool.base.findings.kinds import Severity, kind_of, sections
+from cdtool.base.findings.words import FindingWords
+
+PACKAGE = Path(cdtool.__path__[0])
+KINDS = tomllib.loads((PACKAGE / "base" / "findings" / "kinds.toml").read_text(encoding="utf-8"))
+# Kind, numbers and sentence.
+SENTENCES = json.loads(Path(__file__).with_name("sentences.json").read_text(encoding="utf-8"))
+
+
+@cache
+def sources() -> list[ast.AST]:
+    """Return every node of the package's code outside of findings/."""
+    files = [path for path in PACKAGE.rglob("*.py") if path.parent.name != "findings"]
+    return [node for path in files for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+
+
+def literal_findings() -> Iterator[tuple[str, ast.expr]]:
+    """Yield the kind and the numbers of every `Finding("kind", channel, numbers)`."""
+    for node in sources():
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Finding":
+            numbers = [keyword.value for keyword in node.keywords if keyword.arg == "numbers"]
+            kinds = [item.value for item in ast.walk(node.args[0]) if isinstance(item, ast.Constant)]
+            yield from ((str(kind), (*node.args[2:3], *numbers, ast.Dict([], []))[0]) for kind in kinds)
+
+
+@pytest.mark.parametrize(("kind", "numbers", "sentence"), SENTENCES, ids=[kind for kind, _, _ in SENTENCES])
+def test_a_finding_is_written_as_one_sentence(kind, numbers, sentence):
+    assert Finding(kind, "", numbers).sentence == sentence
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_text_of_a_kind_is_part_of_a_sentence(kind):
+    cases = [(numbers, sentence) for name, numbers, sentence in SENTENCES if name == kind]
+    assert cases and all(numbers.keys() == set(kind_of(kind).numbers) for numbers, _ in cases)
+    for text in [text for words in kind_of(kind).words.values() for text in words.values()]:
+        assert any(text in _said(kind, numbers) for numbers, _ in cases), text
+
+
+def _said(kind: str, numbers: dict[str, object]) -> list[str]:
+    said: list[str] = []
+
+    class Recorded(FindingWords):
+        def _written(self, text):
+            said.append(text)
+            return super()._written(text)
+
+    Recorded(kind_of(kind), numbers).sentence()
+    return said
+
+
+def test_every_kind_is_made_by_the_package():
+    made = {kind for kind, _ in literal_findings()}
+    texts = {node.value for node in sources() if isinstance(node, ast.Constant)}  # as in a tuple of kinds
+    assert KINDS.keys() - made - {"remark"} <= {text for text in texts if "_" in str(text)}
+
+
+def test_findings_in_the_code_have_a_known_kind_and_its_numbers():
+    found = list(literal_findings())
+    assert len(found) > 100 and {kind for kind, _ in found} <= KINDS.keys()
+    for kind, numbers in found:
+        if isinstance(numbers, ast.Dict) and None not in numbers.keys:
+            named = [key.value for key in numbers.keys if isinstance(key, ast.Constant)]
+            assert sorted(named) == sorted(kind_of(kind).numbers), kind
+
+
+def test_code_asks_for_known_kinds():
+    """A mistyped kind would never be found. Other things have a `kind`, too: two of them have an underscore."""
+    asked = [node for node in sources() if isinstance(node, ast.Compare) and ast.unparse(node.left).endswith(".kind")]
+    names = {item.value for node in asked for item in ast.walk(node) if isinstance(item, ast.Constant)}
+    assert {name for name in names if "_" in str(name)} - {"ends_before", "ends_inside"} <= KINDS.keys()
+
+
+def test_the_table_of_kinds_is_complete_and_read_kind_by_kind():
+    assert list(sections()) == list(KINDS)
+    for name in KINDS:
+        kind = kind_of(name)
+        assert {kind.subject, kind.variant} - {""} <= set(kind.numbers)
+        assert kind.severity in Severity.__args__ and kind.sentence
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers", "said"),
+    [
+        ("the recorder lost its clock", {}, r"no kind of finding; a finding in words is remark\('\.\.\.'\)"),
+        ("missing_values", {"count": 1}, r"'missing_values' has the numbers \('count', 'values'\), not \('count',\)"),
+        ("no_clock", {"count": 1}, r"has the numbers \(\), not \('count',\)"),
+    ],
+)
+def test_a_wrong_kind_or_number_is_an_error_where_the_finding_is_made(kind, numbers, said):
+    with pytest.raises(ValueError, match=said):
+        Finding(kind, "torque", numbers)
+
+
+def test_subject_and_variant_tell_findings_of_one_kind_apart():
+    left_out = Finding("column_left_out", "", {"column": "mode", "what": "text"})
+    assert (left_out.subject, left_out.variant) == ("mode", "text")
+    assert (Finding("no_clock").subject, Finding("no_clock").variant) == ("", "")
+
+
+@pytest.mark.parametrize(("kind", "numbers", "sentence"), SENTENCES, ids=[kind for kind, _, _ in SENTENCES])
+def test_a_finding_is_hashable_and_its_values_are_json(kind, numbers, sentence):
+    finding = Finding(kind, "time", numbers, "loss", file="bag_0.mcap")
+    assert finding in {finding} and finding != Finding(kind, "time", numbers)
+    values = json.loads(json.dumps(finding.to_dict()))
+    assert values["kind"] == kind and values["message"] == f"bag_0.mcap: {sentence}"
+    assert (values["channel"], values["severity"], values["file"]) == ("time", "loss", "bag_0.mcap")
+
+
+def test_severity_is_that_of_the_kind_where_none_is_given():
+    numbers = {"sheet": "Notes", "reason": "no numbers"}
+    assert Finding("sheet_left_out", "", numbers).severity == "note"
+    assert Finding("sheet_left_out", "", numbers, "loss").severity == "loss"
+
+
+def test_numbers_stand_apart_from_the_sentence():
+    numbers = Finding("missing_values", "speed", {"count": 2, "values": 100}).to_dict()["numbers"]
+    assert numbers == {"count": 2, "values": 100}
+
+
+def test_a_finding_about_a_million_lines_holds_few_numbers():
+    finding = Finding("blank_lines", "", lines_of(range(2, 2_000_002, 2)))
+    assert finding.numbers == {"count": 1_000_000, "first": (2, 4, 6), "last": 2_000_000}
+    assert finding.message == "1000000 lines (2, 4, 6, ...) skipped: blank"
+
+
+def test_a_finding_names_its_channel_and_the_part_of_its_log():
+    assert str(remark("late")) == "late"
+    assert str(remark("late", "speed")) == "speed: late"
+    assert str(Finding("remark", "speed", {"text": "late"}, file="b.mcap")) == "speed: b.mcap: late"
+
+
+def test_losses_come_before_warnings_and_these_before_notes():
+    note, warning, loss = (remark(text, severity=text) for text in ("note", "warning", "loss"))
+    assert worst_first([note, warning, loss, warning]) == (loss, warning, warning, note)

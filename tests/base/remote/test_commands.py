@@ -1,0 +1,221 @@
+"""Commands whose files are at URLs: the results are those of local files."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+import cdtool as api
+from cdtool.base.remote import staging
+from tests.command import cdtool
+
+GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
+MACHINE = GATE / "machine.toml"
+
+
+@pytest.fixture
+def gate(memory):
+    """The sample logs of the gate at a URL."""
+    for path in GATE.rglob("*"):
+        if path.is_file():
+            memory.pipe_file(f"/gate/{path.relative_to(GATE).as_posix()}", path.read_bytes())
+    return "memory://gate"
+
+
+def test_a_benchmark_has_the_bytes_of_a_local_one(gate, memory, tmp_path):
+    here = cdtool("benchmark", GATE / "benchmark.toml", "-o", tmp_path / "results.json", "-o", tmp_path / "report.html")
+    there = cdtool(
+        "benchmark", f"{gate}/benchmark.toml", "-o", "memory://out/results.json", "-o", "memory://out/report.html"
+    )
+    assert (there.status, there.out.replace("memory://out", str(tmp_path))) == (here.status, here.out)
+    for name in ("results.json", "report.html", "results.traces.json.gz"):
+        assert memory.cat(f"/out/{name}") == (tmp_path / name).read_bytes(), name
+    assert "read from URLs: " in there.err and "URL" not in here.err
+
+
+def test_a_local_benchmark_file_may_name_logs_at_urls(gate, tmp_path):
+    text = (GATE / "benchmark.toml").read_text(encoding="utf-8")
+    text = text.replace('"machine.toml"', f'"{gate}/machine.toml"')
+    for group in ("free", "holdout", "stiff", "soft"):
+        text = text.replace(f'"{group}/', f'"{gate}/{group}/')
+    (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
+    done = cdtool("benchmark", tmp_path / "benchmark.toml", "-o", tmp_path / "results.json")
+    assert done.status == 0
+    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert {row["recording"] for row in results["recordings"]} >= {f"{gate}/stiff/01.mcap", f"{gate}/soft/04.csv"}
+
+
+def test_a_report_folder_is_written_and_replaced(gate, memory):
+    assert cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "pt", "-o", "memory://report").status == 0
+    assert {"/report/report.html", "/report/results.json", "/report/latency.png"} <= set(memory.find("/report"))
+    memory.pipe_file("/report/own.txt", b"mine")
+    refused = cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "pt", "-o", "memory://report")
+    assert refused.status == 2 and "memory://report/own.txt: is not part of a cdtool report" in refused.err
+    assert (
+        cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "gm", "-o", "memory://report", "--force").status
+        == 0
+    )
+    assert memory.cat("/report/own.txt") == b"mine"
+
+
+def test_a_signature_is_learned_used_and_updated(gate, memory, tmp_path):
+    free = [f"{gate}/free/{path.name}" for path in sorted((GATE / "free").iterdir())]
+    learned = cdtool(
+        "learn-signature", *free, "-m", f"{gate}/machine.toml", "-d", "feekf", "--force", "-o", "memory://g.json"
+    )
+    assert learned.status == 0, learned.err
+    here, there = [
+        cdtool("detect", log, "-m", MACHINE, "-s", "memory://g.json", "--json")
+        for log in (GATE / "stiff/03.csv", f"{gate}/stiff/03.csv")
+    ]
+    assert here.status == there.status and there.out == here.out.replace(str(GATE), gate)
+    before = memory.cat("/g.json")
+    more = sorted((GATE / "holdout").glob("*.csv"))[0]
+    updated = cdtool(
+        "signature", "update", "memory://g.json", f"{gate}/holdout/{more.name}", "-m", f"{gate}/machine.toml", "--json"
+    )
+    assert updated.status == 0, updated.err
+    assert (memory.cat("/g.json") != before) == bool(json.loads(updated.out)["added"])
+    assert cdtool("signature", "show", "memory://g.json").status == 0
+    text = learned.out.encode()
+    assert b"memory://g.json" in text
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mcap", "parquet", "h5", "mf4", "tdms", "feather"])
+def test_a_log_is_converted_and_read_again(gate, memory, tmp_path, suffix):
+    target = f"memory://out/stiff 03.{suffix}"
+    done = cdtool("convert", f"{gate}/stiff/03.csv", target, "-m", f"{gate}/machine.toml")
+    assert done.status == 0, done.err
+    here = tmp_path / f"stiff 03.{suffix}"
+    assert cdtool("convert", GATE / "stiff/03.csv", here, "-m", MACHINE).status == 0
+    companions = [Path(f"{here}.machine.toml"), f"{target}.machine.toml"]
+    if suffix not in (
+        "mf4",
+        "h5",
+        "tdms",
+        "parquet",
+        "feather",
+    ):  # these contain the time of writing or an order of their own
+        assert memory.cat(f"/out/{here.name}") == here.read_bytes()
+    if suffix in ("mcap", "h5", "mf4", "tdms", "csv", "parquet", "feather") and companions[0].exists():
+        first, second = (api.read(log, machine) for log, machine in zip((here, target), companions, strict=True))
+        assert list(first.channels) == list(second.channels)
+        for name, series in first.channels.items():
+            assert series.values.tobytes() == second[name].values.tobytes()
+        assert first.digest == second.digest or suffix in ("mf4", "h5", "tdms", "parquet", "feather")
+
+
+def test_the_other_commands_read_and_write_urls(gate, memory, tmp_path):
+    assert cdtool("benchmark", f"{gate}/benchmark.toml", "-o", "memory://out/results.json").status == 0
+    assert cdtool("report", "memory://out/results.json", "-o", "memory://out/report.md").status == 0
+    assert (
+        cdtool("compare", "memory://out/results.json", "memory://out/results.json", "-o", "memory://out/c.md").status
+        == 0
+    )
+    assert cdtool("plan", "--from", "memory://out/results.json", "--difference", "5").status in (0, 2)
+    assert cdtool("info", f"{gate}/stiff/01.mcap", "-m", f"{gate}/machine.toml").status == 0
+    assert cdtool("init", f"{gate}/stiff/03.csv", "-o", "memory://out/machine.toml").status in (0, 3)
+    assert cdtool("recover", f"{gate}/stiff/01.mcap", "-o", "memory://out/clean.mcap").status == 0
+    done = cdtool(
+        "explain", f"{gate}/stiff/03.csv", "-b", f"{gate}/benchmark.toml", "-d", "feekf", "--plot", "memory://out/e.png"
+    )
+    assert done.status == 0, done.err
+    assert cdtool("simulate", "gate", "-o", "memory://simulated", "--stiff", "1").status == 0
+    written = set(memory.find("/out"))
+    assert {f"/out/{name}" for name in ("report.md", "c.md", "machine.toml", "clean.mcap", "e.png")} <= written
+    assert memory.exists("/simulated/benchmark.toml")
+
+
+def test_runs_of_a_log_are_named_by_its_url(memory, tmp_path):
+    rows = [
+        f"{t / 100},{run},{(t % 500) / 100 * (run + 1)},1.5"
+        for run in range(3)
+        for t in range(run * 500, run * 500 + 500)
+    ]
+    memory.pipe_file("/logs/cycles #2.csv", "\n".join(["t,cycle,x,i", *rows]).encode())
+    machine = MACHINE.read_text(encoding="utf-8").partition("[channels]")[0]
+    machine += '[channels]\ntime = { column = "t", unit = "s" }\nposition = { column = "x", unit = "m" }\n'
+    machine += 'torque = { column = "i", unit = "A", scale = 0.56 }\n'
+    memory.pipe_file("/logs/machine.toml", machine.encode())
+    done = cdtool(
+        "detect",
+        "memory://logs/cycles #2.csv#1",
+        "-m",
+        "memory://logs/machine.toml",
+        "-d",
+        "pt",
+        "--limit",
+        "1000000",
+        "--operations",
+        "column:cycle",
+        "--json",
+    )
+    assert '"memory://logs/cycles #2.csv#1"' in done.out, done.err
+
+
+def test_no_copy_is_left_after_a_command(gate):
+    cdtool("benchmark", f"{gate}/benchmark.toml")
+    assert not staging._session.copies or staging._session.owned is not None
+    staging.release()
+    assert not [path for path in staging._session.own_folder().iterdir() if path.is_file()]
+
+
+def test_a_store_at_a_url_is_used_again(gate, memory, tmp_path):
+    runs = [
+        cdtool("benchmark", f"{gate}/benchmark.toml", "--store", "memory://store", "-o", f"memory://out/{i}.json")
+        for i in range(2)
+    ]
+    assert [run.status for run in runs] == [0, 0], runs[1].err
+    assert memory.cat("/out/0.json") == memory.cat("/out/1.json")
+    assert cdtool("benchmark", f"{gate}/benchmark.toml", "-o", "memory://out/2.json").status == 0
+    assert memory.cat("/out/0.json") == memory.cat("/out/2.json")
+    shown = cdtool("store", "status", "memory://store", "--json")
+    assert shown.status == 0 and [run["computed"] > 0 for run in json.loads(shown.out)["runs"]] == [False, True]
+    assert not [name for name in memory.find("/store") if name.endswith(".journal")]
+    assert cdtool("store", "gc", "memory://store", "--older-than", "0").status == 0
+
+
+def test_a_store_without_a_journal_writes_parts_more_often(memory, monkeypatch):
+    from cdtool.base.remote.remote_path import location
+    from cdtool.execution.store import store as module
+    from cdtool.execution.store.entry import Entry
+
+    monkeypatch.setattr(module, "_MOST_AT_RISK", 2)
+    opened = module.Store(location("memory://store"))
+    entries = [Entry(f"{i:016x}{0:048x}", "log", f"{i}.csv", "", "{}") for i in range(5)]
+    for entry in entries:
+        opened.add([entry])
+    assert len(memory.find("/store/parts")) == 2
+    again = module.Store(location("memory://store"), writes=False)
+    assert [again.get(entry.key) is not None for entry in entries] == [True] * 4 + [False]
+
+
+def test_a_rosbag2_folder_at_a_url_is_one_log(memory, tmp_path):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    shutil.copy(GATE / "stiff" / "01.mcap", folder / "bag_0.mcap")
+    (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  relative_file_paths:\n    - bag_0.mcap\n")
+    for path in folder.iterdir():
+        memory.pipe_file(f"/bag/{path.name}", path.read_bytes())
+    here, there = api.read(folder, MACHINE), api.read("memory://bag", MACHINE)
+    assert list(here.channels) == list(there.channels) and here.digest == there.digest
+    assert there.source == "memory://bag" and there.name == here.name
+
+
+@pytest.mark.parametrize("pattern", ["free/*.csv", "free/0[1-5].csv", "**/free/*.csv"])
+def test_a_pattern_of_a_url_names_the_logs_that_a_shell_would_name_in_a_folder(gate, tmp_path, pattern):
+    names = sorted((GATE / "free").glob("0[1-5].csv" if "[" in pattern else "*.csv"))
+    learn = ("learn-signature", "-m", MACHINE, "-d", "gm", "--force", "-o")
+    by_pattern = cdtool(*learn, tmp_path / "a.json", f"{gate}/{pattern}")
+    by_name = cdtool(*learn, tmp_path / "b.json", *(f"{gate}/free/{path.name}" for path in names))
+    assert by_pattern.status == by_name.status == 0
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_a_pattern_of_a_url_without_a_match_is_a_missing_file(gate):
+    done = cdtool("info", f"{gate}/fre/*.csv")
+    assert done.status == 2
+    assert f"{gate}/fre/*.csv: no such file" in done.err

@@ -1,0 +1,170 @@
+"""A path at a URL behaves like a local path wherever cdtool uses one."""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import re
+from pathlib import Path
+
+import pytest
+
+from cdtool.base.errors import ConfigurationError
+from cdtool.base.remote.remote_path import RemotePath, is_remote, joined, location
+from cdtool.base.remote.storage_error import StorageError
+from cdtool.commands.judging.runs import find_logs
+
+NAMES = [
+    "a/01.csv",
+    "a/02.csv",
+    "a/.hidden.csv",
+    "a/deep/er/03.csv",
+    "b c/ü#7.csv",
+    "b c/4?.csv",
+    "x.toml",
+    ".d/05.csv",
+]
+
+
+@pytest.fixture
+def tree(memory, tmp_path):
+    """The same files below a local folder and below a URL."""
+    for name in NAMES:
+        path = tmp_path / "logs" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(name.encode())
+        memory.pipe_file(f"/logs/{name}", name.encode())
+    return tmp_path / "logs", location("memory://logs")
+
+
+def test_a_text_is_a_local_path_or_a_url(tmp_path):
+    assert location("a/b.csv") == Path("a/b.csv") and not is_remote(location("a/b.csv"))
+    assert location(f"file://{tmp_path}/a b.csv") == tmp_path / "a b.csv"
+    assert location("file:///a%20b.csv") == Path("/a b.csv")
+    path = location("s3://bucket/a//b.csv")
+    assert is_remote(path) and location(path) is path and str(path) == "s3://bucket/a//b.csv"
+
+
+def test_names_are_those_of_a_local_path():
+    path, local = location("s3://bucket/one/two/log.tar.gz"), Path("/bucket/one/two/log.tar.gz")
+    for name in ("name", "stem", "suffix", "suffixes"):
+        assert getattr(path, name) == getattr(local, name)
+    assert str(path.parent) == "s3://bucket/one/two" and [str(item) for item in path.parents][-1] == "s3://bucket"
+    assert str(path.with_suffix(".csv")) == "s3://bucket/one/two/log.tar.csv"
+    assert str(path.with_name("b#7.csv")) == "s3://bucket/one/two/b#7.csv"
+    assert path.relative_to(location("s3://bucket/one")) == Path("two/log.tar.gz")
+    assert not path.is_relative_to(location("s3://bucket/other")) and not path.is_relative_to(Path("/bucket"))
+    assert not Path("/bucket").is_relative_to(path) and path.as_posix() == str(path) == path.as_uri()
+    assert path.is_absolute() and path.resolve() == path == path.absolute() == path.expanduser()
+    assert location("s3://bucket").parent == location("s3://bucket/") and location("s3://bucket").name == ""
+
+
+def test_paths_are_joined_as_local_ones():
+    base = location("s3://bucket/one")
+    assert str(base / "../machine.toml") == "s3://bucket/machine.toml"
+    assert str(base / "./a" / "b.csv") == "s3://bucket/one/a/b.csv"
+    assert str(base / "s3://other/x.csv") == "s3://other/x.csv" and base / "/local/x.csv" == Path("/local/x.csv")
+    assert Path("local") / base == base and joined(Path("local"), "s3://b/x") == location("s3://b/x")
+    assert joined(Path("local"), "x") == Path("local/x") and base.joinpath("a", "b") == base / "a/b"
+
+
+def test_it_compares_hashes_sorts_and_travels_to_other_processes():
+    path = location("s3://bucket/a.csv")
+    again = pickle.loads(pickle.dumps(path))
+    assert again == path and hash(again) == hash(path) and {path: 1}[again] == 1
+    assert copy.copy(path) == copy.deepcopy(path) == path and path != Path("s3:/bucket/a.csv")
+    assert Path("s3:/bucket/a.csv") != path
+    assert sorted([Path("z"), path, Path("a")]) == [Path("a"), path, Path("z")]
+    assert path < location("s3://bucket/b.csv") and path >= location("s3://bucket/a.csv")
+
+
+def test_credentials_travel_to_other_processes_but_not_into_texts():
+    path = location("sftp://robot:geheim@host/a.csv")
+    assert b"geheim" in pickle.dumps(path)
+    assert "geheim" not in f"{path} {path!r} {path.parent} {path.parts} {path.as_posix()} {bytes(path)!r}"
+
+
+def test_every_public_method_of_a_path_is_its_own():
+    inherited = {name for name in dir(Path) if not name.startswith("_")} - set(vars(RemotePath))
+    assert inherited <= {"cwd", "home", "from_uri", "info", "parser"}  # of the class, not of a path
+
+
+def test_what_is_not_possible_at_a_url_is_one_line(memory):
+    path = location("memory://logs/a.csv")
+    for refused in (path.touch, path.chmod, path.rename, lambda: path.open("w"), lambda: path.write_text("x")):
+        with pytest.raises(StorageError, match="not possible at a URL"):
+            refused()
+
+
+def test_content_is_read_by_any_way_of_opening(tree):
+    _, remote = tree
+    path = remote / "a/01.csv"
+    with open(path, "rb") as file, path.open(encoding="utf-8") as text:  # noqa: PTH123  what libraries do
+        assert file.read() == b"a/01.csv" and text.read() == "a/01.csv"
+    handle = os.open(path, os.O_RDONLY)
+    assert os.read(handle, 99) == b"a/01.csv"
+    os.close(handle)
+    assert path.read_bytes() == b"a/01.csv" and path.read_text() == "a/01.csv"
+    assert path.stat().st_size == 8 and path.is_file() and not path.is_dir() and path.exists()
+    assert path.parent.is_dir() and not path.parent.is_file() and path.samefile("memory://logs/a/01.csv")
+    assert [item.name for item in (remote / "a").iterdir()] == [".hidden.csv", "01.csv", "02.csv", "deep"]
+
+
+def test_a_missing_file_is_missing_as_a_local_one(memory):
+    path = location("memory://logs/none.csv")
+    assert not path.exists() and not path.is_file() and not path.is_dir() and not list(path.parent.glob("*"))
+    for reading in (path.open, path.stat, path.read_bytes, path.unlink, lambda: os.fspath(path), path.digest):
+        with pytest.raises(FileNotFoundError, match=r"memory://logs/none.csv: no such file"):
+            reading()
+    path.unlink(missing_ok=True)
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "*",
+        "*/*.csv",
+        "a/0[12].csv",
+        "**/*.csv",
+        "a/**/*.csv",
+        ".d/*.csv",
+        "*/ü#7.csv",
+        "b c/*",
+        "a/01.csv",
+    ],
+)
+def test_patterns_find_what_they_find_in_a_folder(tree, pattern):
+    local, remote = tree
+    expected = [path.relative_to(local).as_posix() for path in find_logs([pattern], local, "logs")]
+    assert [path.relative_to(remote).as_posix() for path in find_logs([pattern], remote, "logs")] == expected
+
+
+@pytest.mark.parametrize("pattern", ["a/.h*", "**", "a/0?", "none/*.csv", "a/01.csv/*", "[]"])
+def test_a_pattern_without_a_file_is_refused_as_in_a_folder(tree, pattern):
+    for base in tree:
+        with pytest.raises(ConfigurationError, match=re.escape(f"no file matches '{pattern}' in {base}")):
+            find_logs([pattern], base, "logs")
+
+
+def test_a_pattern_may_be_a_url_in_a_local_file(tree):
+    local, remote = tree
+    found = find_logs(["memory://logs/a/0*.csv", "a/01.csv"], local, "logs")
+    assert [str(path) for path in found] == [
+        str(remote / "a/01.csv"),
+        str(remote / "a/02.csv"),
+        str(local / "a/01.csv"),
+    ]
+
+
+def test_a_listing_is_asked_for_once_for_all_its_files(tree, monkeypatch):
+    _, remote = tree
+    asked = []
+    whole = type(tree[1])
+    from cdtool.base.remote import storage
+
+    info = storage.info
+    monkeypatch.setattr(storage, "info", lambda url: asked.append(url) or info(url))
+    found = find_logs(["a/*.csv"], remote, "logs")
+    assert len(found) == 2 and all(isinstance(path, whole) for path in found)
+    assert not [url for url in asked if url.endswith(("01.csv", "02.csv"))]

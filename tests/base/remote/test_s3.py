@@ -1,0 +1,352 @@
+"""Commands with the S3 server: several processes, names, errors, credentials, and a server that ends meanwhile."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+import cdtool as api
+from cdtool.base.errors import CdtoolError, is_lasting
+from cdtool.base.remote import storage
+from cdtool.base.remote.remote_path import location
+from tests.base.remote.s3_server import SECRET, S3Server
+from tests.command import cdtool
+
+ROOT = Path(__file__).parents[3]
+GATE = ROOT / "sample_logs" / "gate"
+MACHINE = GATE / "machine.toml"
+
+
+def shell(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in a process of its own."""
+    code = "from cdtool.commands.app import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+    )
+
+
+@pytest.fixture
+def gate(bucket):
+    """The sample logs of the gate in the bucket."""
+    return bucket.put_folder(GATE)
+
+
+@pytest.fixture
+def without_limits(gate, bucket):
+    """The same; the benchmark has no limits."""
+    text = (GATE / "benchmark.toml").read_text(encoding="utf-8").partition("[limits]")[0]
+    return bucket.put("gate/benchmark.toml", text.encode())
+
+
+def test_a_benchmark_in_several_processes_has_the_bytes_of_a_local_one(gate, bucket, tmp_path):
+    (tmp_path / "temporary").mkdir()
+    outputs = [f"{bucket.url}/out/results.json", f"{bucket.url}/out/report.html"]
+    there = shell(
+        "benchmark",
+        f"{gate}/benchmark.toml",
+        "-j",
+        2,
+        "-o",
+        outputs[0],
+        "-o",
+        outputs[1],
+        TMPDIR=str(tmp_path / "temporary"),
+    )
+    assert there.returncode == 0, there.stderr
+    here = cdtool("benchmark", GATE / "benchmark.toml", "-o", tmp_path / "results.json", "-o", tmp_path / "report.html")
+    assert there.stdout.replace(f"{bucket.url}/out", str(tmp_path)) == here.out
+    for name in ("results.json", "report.html", "results.traces.json.gz"):
+        assert bucket.get(f"out/{name}") == (tmp_path / name).read_bytes(), name
+    assert not list((tmp_path / "temporary").iterdir())
+    size, _, rest = there.stderr.partition("read from URLs: ")[2].partition(" MiB in ")
+    logs = sum(path.stat().st_size for path in GATE.rglob("*") if path.is_file()) / 2**20
+    assert 0.95 * logs < float(size) < 2.0 * logs and int(rest.split()[0]) >= 24
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "a b.csv",
+        "ü/Größe 日本.csv",
+        "log#7.csv",
+        "what?.csv",
+        "50%.csv",
+        "a+b&c=d.csv",
+        "[x].csv",
+        "a::b.csv",
+        "x//y.csv",
+    ],
+)
+def test_names_have_any_characters(bucket, name):
+    url = bucket.put(name, (GATE / "stiff" / "03.csv").read_bytes())
+    done = cdtool("info", url, "-m", MACHINE)
+    assert done.status in (0, 3) and done.out.startswith(f"{url}: csv"), done.err
+    assert api.read(url, MACHINE).digest == api.read(GATE / "stiff" / "03.csv", MACHINE).digest
+
+
+def test_patterns_and_hidden_names(bucket):
+    for name in ("2026/a/1.csv", "2026/b/2.csv", "2026/b/.3.csv", "2026/4.csv"):
+        bucket.put(name, b"x")
+    bucket.put("2026/", b"")  # the mark of a folder that other tools make
+    base = location(f"{bucket.url}/2026")
+    from cdtool.commands.judging.runs import find_logs
+
+    assert [path.name for path in find_logs(["*/*.csv"], base, "logs")] == ["1.csv", "2.csv"]
+    assert [path.name for path in find_logs(["**/*.csv"], base, "logs")] == ["4.csv", "1.csv", "2.csv"]
+    assert [path.name for path in find_logs([f"{bucket.url}/2026/*.csv"], Path(), "logs")] == ["4.csv"]
+
+
+def test_a_missing_object_or_bucket_is_one_line(bucket):
+    for url, words in [
+        (f"{bucket.url}/none.csv", "no such file"),
+        ("s3://no-such-bucket/a.csv", "no such file"),
+        (bucket.put("a/b.csv", b"").rpartition("/")[0], "is a folder"),
+    ]:
+        done = cdtool("info", url)
+        assert done.status != 0 and f"{url}: {words}" in done.err and len(done.err.splitlines()) == 1
+    done = cdtool("benchmark", "s3://no-such-bucket/benchmark.toml")
+    assert done.status == 2 and "s3://no-such-bucket/benchmark.toml: no such file" in done.err
+    out = cdtool("benchmark", GATE / "benchmark.toml", "-o", "s3://no-such-bucket/report.html")
+    assert out.status == 2 and "no bucket s3://no-such-bucket (create the bucket first)" in out.err
+
+
+def test_without_credentials_one_line_says_so(bucket, monkeypatch, tmp_path):
+    import s3fs
+
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    s3fs.S3FileSystem.clear_instance_cache()
+    done = cdtool("info", f"{bucket.url}/a.csv")
+    assert (
+        f"{bucket.url}/a.csv: cannot be read: no credentials are set" in done.err
+        or "no credentials are set" in done.err
+    )
+    assert done.status != 0 and len(done.err.splitlines()) == 1
+    s3fs.S3FileSystem.clear_instance_cache()
+
+
+def test_a_log_that_is_deleted_or_damaged_is_left_out_and_the_others_are_as_in_a_folder(gate, bucket, tmp_path):
+    import shutil
+
+    shutil.copytree(GATE, tmp_path / "gate")
+    damaged = (GATE / "stiff" / "01.mcap").read_bytes()[:3000]
+    (tmp_path / "gate" / "stiff" / "01.mcap").write_bytes(damaged)
+    bucket.put("gate/stiff/01.mcap", damaged)
+    there = cdtool("benchmark", f"{gate}/benchmark.toml", "-o", tmp_path / "there.json")
+    here = cdtool("benchmark", tmp_path / "gate" / "benchmark.toml", "-o", tmp_path / "here.json")
+    assert there.status == here.status != 0
+    assert (tmp_path / "there.json").read_bytes() == (tmp_path / "here.json").read_bytes()
+
+
+@pytest.fixture
+def changing(monkeypatch):
+    """changing(name, change): after a log of that name was copied, `change` is called."""
+    fetch = storage.fetch
+
+    def set_up(name, change):
+        def changed(url, target):
+            fetch(url, target)
+            if url.endswith(name):
+                change()
+
+        monkeypatch.setattr(storage, "fetch", changed)
+
+    return set_up
+
+
+def test_a_log_that_is_deleted_while_it_is_read_is_reported_once(without_limits, bucket, changing, tmp_path):
+    changing("stiff/03.csv", lambda: bucket.fs.rm_file(f"{bucket.name}/gate/stiff/03.csv"))
+    done = cdtool("benchmark", without_limits, "-o", tmp_path / "results.json")
+    skipped = json.loads((tmp_path / "results.json").read_text())["skipped"]
+    assert [item["recording"] for item in skipped] == ["stiff/03.csv"] and done.status == 3
+    assert "no such file" in skipped[0]["reason"] or "was removed" in skipped[0]["reason"]
+
+
+def test_a_log_that_is_replaced_while_it_is_read_is_reported_once(without_limits, bucket, changing, tmp_path):
+    contents = iter(b"\n" * count for count in range(1, 9))
+    log = (GATE / "stiff" / "03.csv").read_bytes()
+    changing("stiff/03.csv", lambda: bucket.put("gate/stiff/03.csv", log + next(contents)))
+    done = cdtool("benchmark", without_limits, "-o", tmp_path / "results.json")
+    skipped = json.loads((tmp_path / "results.json").read_text())["skipped"]
+    assert [item["recording"] for item in skipped] == ["stiff/03.csv"] and done.status == 3
+    assert "changed while it was read" in skipped[0]["reason"]
+
+
+def test_a_server_that_ends_meanwhile_is_one_line_per_log_and_nothing_lasting(monkeypatch, tmp_path):
+    with S3Server() as server:
+        server.set_environment(monkeypatch)
+        bucket = server.new_bucket()
+        gate = bucket.put_folder(GATE)
+        text = (GATE / "benchmark.toml").read_text(encoding="utf-8").partition("[limits]")[0]
+        bucket.put("gate/benchmark.toml", text.encode())
+        fetch, count = storage.fetch, iter(range(1000))
+
+        def ending(url, target):
+            if next(count) == 17:
+                server.stop()
+            fetch(url, target)
+
+        monkeypatch.setattr(storage, "fetch", ending)
+        done = cdtool(
+            "benchmark", f"{gate}/benchmark.toml", "--store", tmp_path / "store", "-o", tmp_path / "results.json"
+        )
+        assert "Traceback" not in done.err and SECRET not in done.out + done.err
+        assert done.status == 3, done.err
+        skipped = json.loads((tmp_path / "results.json").read_text())["skipped"]
+        assert skipped and all(
+            "the storage cannot be used" in item["reason"] or "cannot be reached, meanwhile" in item["reason"]
+            for item in skipped
+        )
+        with pytest.raises(CdtoolError) as caught:
+            api.read(f"{gate}/stiff/03.csv", MACHINE)
+        assert not is_lasting(caught.value)
+    status = json.loads(cdtool("store", "status", tmp_path / "store", "--json").out)
+    assert status["failed"] == 0  # a second run tries them again
+
+
+def test_credentials_are_nowhere(bucket, tmp_path):
+    log = bucket.put("a.csv", (GATE / "stiff" / "03.csv").read_bytes())
+    machine = bucket.put("machine.toml", MACHINE.read_bytes())
+    signed = f"{log}?X-Amz-Signature=5ecretS1gn&X-Amz-Credential=abcdef"
+    for url in (
+        signed,
+        "sftp://robot:geheim@127.0.0.1:1/a.csv",
+        "https://robot:geheim@127.0.0.1:1/a.csv?sig=5ecretS1gn",
+    ):
+        done = shell("info", url, "-m", machine)
+        assert done.returncode != 0 and len(done.stderr.strip().splitlines()) <= 2, done.stderr
+        for secret in ("5ecretS1gn", "abcdef", "geheim", "robot", SECRET):
+            assert secret not in done.stdout + done.stderr
+
+
+def test_credentials_of_urls_are_used_and_not_in_results(monkeypatch, tmp_path):
+    """An HTTP server that answers only with user info and query."""
+    from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+    asked = []
+
+    class Handler(SimpleHTTPRequestHandler):
+        def __init__(self, *arguments, **settings):
+            super().__init__(*arguments, directory=str(GATE), **settings)
+
+        def do_HEAD(self):
+            self._answer(super().do_HEAD)
+
+        def do_GET(self):
+            self._answer(super().do_GET)
+
+        def _answer(self, answer):
+            asked.append(self.path)
+            if "sig=5ecretS1gn" in self.path or self.path.endswith(".toml"):
+                answer()
+            else:
+                self.send_error(403)
+
+        def log_message(self, *_):
+            pass
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        base = f"http://127.0.0.1:{server.server_port}"
+        text = (GATE / "benchmark.toml").read_text(encoding="utf-8").partition("[learn]")[0]
+        text = text.replace('"machine.toml"', f'"{base}/machine.toml"').partition("detectors")[0]
+        names = {group: [f"{base}/{group}/0{i}.csv?sig=5ecretS1gn" for i in (3, 4)] for group in ("free", "stiff")}
+        text += f'detectors = ["pt"]\nsignature = {{ force = true }}\n[learn]\nlogs = {json.dumps(names["free"])}\n'
+        text += f"[impacts.stiff]\nlogs = {json.dumps(names['stiff'])}\n"
+        (tmp_path / "benchmark.toml").write_text(text)
+        done = cdtool(
+            "benchmark",
+            tmp_path / "benchmark.toml",
+            "-o",
+            tmp_path / "results.json",
+            "-o",
+            tmp_path / "report.html",
+            "--store",
+            tmp_path / "store",
+        )
+        assert done.status == 0, done.err
+        results = (tmp_path / "results.json").read_text()
+        assert f"{base}/stiff/03.csv" in results
+        shown = done.out + done.err + results + (tmp_path / "report.html").read_text()
+        shown += "".join(
+            path.read_bytes().decode("latin1") for path in (tmp_path / "store").rglob("*") if path.is_file()
+        )
+        assert "5ecretS1gn" not in shown and "sig=" not in shown
+        refused = cdtool("info", f"{base}/stiff/03.csv?sig=999999", "-m", MACHINE)
+        assert refused.status != 0 and "999999" not in refused.out + refused.err
+        assert any("sig=5ecretS1gn" in path for path in asked)
+    finally:
+        server.shutdown()
+
+
+def test_sigterm_leaves_no_copies(gate, tmp_path):
+    import signal
+
+    # A command that another one has started uses its folder, as this process may have one from a test before.
+    own = {name: value for name, value in os.environ.items() if name != "CDTOOL_REMOTE_FOLDER"}
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "from cdtool.commands.app import main; main()",
+            "benchmark",
+            f"{gate}/benchmark.toml",
+            "-j",
+            "2",
+        ],
+        env={**own, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    for _ in range(2000):
+        if list(tmp_path.glob("cdtool-remote-*")) or process.poll() is not None:  # there as long as the command runs
+            break
+        time.sleep(0.01)
+    assert process.poll() is None
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == 143
+    assert not list(tmp_path.glob("cdtool-remote-*"))
+
+
+def test_a_store_on_s3_is_used_again(gate, bucket, tmp_path):
+    for number in range(2):
+        done = cdtool(
+            "benchmark", f"{gate}/benchmark.toml", "--store", f"{bucket.url}/store", "-o", tmp_path / f"{number}.json"
+        )
+        assert done.status == 0, done.err
+    assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
+    bucket.put("gate/stiff/03.csv", (GATE / "stiff" / "04.csv").read_bytes() + b"\n")
+    assert cdtool("benchmark", f"{gate}/benchmark.toml", "--store", f"{bucket.url}/store").status in (0, 1, 3)
+    runs = json.loads(cdtool("store", "status", f"{bucket.url}/store", "--json").out)["runs"]
+    assert [run["computed"] for run in runs][:2] == [1, 0]
+
+
+def test_a_large_mcap_is_read_by_ranges(bucket, tmp_path):
+    from tests.formats.mcap.test_by_ranges import MACHINE as AXIS
+    from tests.formats.mcap.test_by_ranges import recorded
+
+    content = recorded()
+    url = bucket.put("large.mcap", content)
+    (tmp_path / "large.mcap").write_bytes(content)
+    (tmp_path / "axis.toml").write_text(AXIS)
+    from cdtool.base.remote import transferred
+
+    before = transferred.here()[0]
+    there = api.read(url, tmp_path / "axis.toml")
+    assert transferred.here()[0] - before < 0.1 * len(content)
+    here = api.read(tmp_path / "large.mcap", tmp_path / "axis.toml")
+    assert here["torque"].values.tobytes() == there["torque"].values.tobytes() and there.findings == here.findings
+    assert there.digest.startswith("etag:") and there.digest == api.read(url, tmp_path / "axis.toml").digest

@@ -1,0 +1,144 @@
+"""Errors of fsspec and of the libraries below it, as one line without secrets; versions of objects."""
+
+from __future__ import annotations
+
+import errno
+import pickle
+import sys
+from datetime import UTC, datetime
+from importlib import import_module
+
+import pytest
+
+from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, is_lasting
+from cdtool.base.files.bounded_loading import read_bytes
+from cdtool.base.remote import storage
+from cdtool.base.remote.remote_path import location
+from cdtool.base.remote.storage import ObjectInfo
+from cdtool.base.remote.storage_error import MissingObjectError, StorageError
+from tests.command import cdtool
+
+
+class NoCredentialsError(Exception):
+    """As botocore names it."""
+
+
+FAULTS = {
+    "missing": (FileNotFoundError("x"), "no such file"),
+    "denied": (PermissionError("Forbidden"), "access is denied: Forbidden"),
+    "no credentials": (NoCredentialsError("Unable to locate credentials"), "no credentials are set"),
+    "network": (ConnectionResetError("reset by peer"), "the storage cannot be used: reset by peer"),
+    "secret": (
+        RuntimeError("503, url='https://u:pw@host/a?X-Amz-Signature=abc'"),
+        "the storage cannot be used: 503, url='https://host/a'",
+    ),
+    "no space": (OSError(errno.ENOSPC, "No space left on device"), "No space left on device"),
+    "precondition": (OSError("PreconditionFailed: If-Match"), "was changed by another process meanwhile"),
+    "folder": (IsADirectoryError("x"), "is a folder"),
+    "without words": (TimeoutError(), "the storage cannot be used: TimeoutError"),
+    "many lines": (OSError("one\n  two"), "the storage cannot be used: one two"),
+}
+
+
+@pytest.fixture(params=FAULTS)
+def failing(request, memory, monkeypatch):
+    """A storage whose calls fail, with the reason that is shown."""
+    fault, shown = FAULTS[request.param]
+
+    def fail(*_: object, **__: object) -> None:
+        raise fault
+
+    monkeypatch.setattr(type(memory), "info", fail)
+    monkeypatch.setattr(type(memory), "ls", fail)
+    return shown
+
+
+def test_a_fault_is_one_line_that_is_not_lasting(failing):
+    path = location("memory://logs/a.csv")
+    with pytest.raises(StorageError) as caught:
+        path.stat()
+    fault = caught.value
+    assert fault.message == f"memory://logs/a.csv: {failing}" and fault.strerror == failing and fault.hint
+    assert isinstance(fault, CdtoolError) and isinstance(fault, OSError) and not is_lasting(fault)
+    again = pickle.loads(pickle.dumps(fault))
+    assert (type(again), str(again), again.errno) == (type(fault), str(fault), fault.errno)
+
+
+def test_a_fault_in_any_file_of_a_command_is_one_line(failing):
+    done = cdtool("info", "memory://logs/a.csv", "-m", "memory://logs/machine.toml")
+    assert done.status in (1, 2, 3, 4) and not done.out
+    assert failing in done.err and len(done.err.strip().splitlines()) == 1 and "Traceback" not in done.err
+
+
+def test_a_caller_gets_its_own_error_with_the_cause(failing):
+    with pytest.raises(ConfigurationError, match=r"^memory://logs/a\.toml: ") as caught:
+        read_bytes(location("memory://logs/a.toml"), ConfigurationError)
+    assert not is_lasting(caught.value)
+
+
+def test_a_missing_object_is_a_missing_file(memory):
+    with pytest.raises(MissingObjectError) as caught:
+        location("memory://logs/a.csv").stat()
+    assert isinstance(caught.value, FileNotFoundError) and isinstance(caught.value, StorageError)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert str(again) == str(caught.value) == "memory://logs/a.csv: no such file (check the path)"
+
+
+def test_without_fsspec_one_line_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fsspec.registry", None)
+    done = cdtool("info", "s3://bucket/a.csv")
+    assert done.err.splitlines() == [
+        "error: s3://bucket/a.csv: reading a URL needs fsspec, which is not installed (pip install '.[remote]')"
+    ]
+
+
+def test_without_the_package_of_a_protocol_one_line_names_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gcsfs", None)
+    monkeypatch.setitem(sys.modules, "s3fs", None)
+    registered = import_module("fsspec.registry")
+    for protocol in ("gs", "s3"):
+        monkeypatch.delitem(registered._registry, protocol, raising=False)
+    with pytest.raises(StorageError, match=r"gs:// needs a package that is not installed \(.*gcsfs.*\)"):
+        storage.info("gs://bucket/a.csv")
+    with pytest.raises(StorageError, match=r"s3:// needs .* \(pip install '\.\[remote\]'\)"):
+        storage.info("s3://bucket/a.csv")
+
+
+def test_an_unknown_protocol_is_answered_with_the_nearest():
+    done = cdtool("benchmark", "s33://bucket/benchmark.toml")
+    assert "s33://bucket/benchmark.toml: unknown protocol 's33' (did you mean s3" in done.err and done.status == 2
+
+
+def test_a_version_is_its_etag_and_size():
+    one, other = ObjectInfo(5, '"abc"', 10**18), ObjectInfo(5, '"abd"', 10**18)
+    assert one.digest.startswith("etag:") and one.digest != other.digest != ObjectInfo(6, '"abd"', 10**18).digest
+    assert one.digest == ObjectInfo(5, '"abc"', 2 * 10**18).digest
+    assert one.modified != other.modified and one.modified // 10**9 == 10**9
+    assert ObjectInfo(5, "", 123).digest.startswith("modified:") and ObjectInfo(5, "", 123).modified == 123
+
+
+@pytest.mark.parametrize(
+    ("found", "etag", "changed"),
+    [
+        (
+            {"size": 3, "ETag": '"e"', "LastModified": datetime(2020, 1, 1, tzinfo=UTC)},
+            '"e"',
+            1577836800 * 10**9,
+        ),
+        ({"size": 3, "etag": "e", "updated": "2020-01-01T00:00:00.5+00:00"}, "e", 1577836800_500_000_000),
+        ({"size": 3, "mtime": 12.5}, "", 12_500_000_000),
+        ({"size": None, "created": datetime(2020, 1, 1)}, "", 1577836800 * 10**9),
+        ({"size": 3, "LastModified": "yesterday"}, "", 0),
+    ],
+)
+def test_storages_name_version_and_time_differently(found, etag, changed):
+    info = storage._info_of(found)
+    assert (info.size, info.etag, info.changed) == (found["size"] or 0, etag, changed)
+
+
+def test_an_error_of_a_log_names_the_url_once(memory):
+    memory.pipe_file("/logs/a.csv", b"")
+    from cdtool.commands.judging.runs import read_log
+
+    with pytest.raises(RecordingError, match=r"^memory://logs/a\.csv: is empty"):
+        read_log("memory://logs/a.csv", "sample_logs/gate/machine.toml")

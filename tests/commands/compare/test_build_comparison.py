@@ -1,0 +1,465 @@
+"""Comparison of two builds: shown changes, pairing and refusals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.commands.compare.comparison import compare_builds
+from cdtool.commands.compare.comparison_json import to_json
+from cdtool.results.files.results_file import read_results
+from cdtool.results.files.results_file import to_json as results_json
+from cdtool.statistics.paired import fisher_p, mcnemar_p
+from cdtool.statistics.rates import poisson_difference_p
+from cdtool.statistics.sample_size import detectable_difference, impacts_for_unpaired
+from tests.commands.compare.questions import KEY, asked, latencies, row_of, single
+from tests.report.hostile import HOSTILE
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, ONSET, RULES, UNCERTAINTY, build_results
+
+
+def test_a_shift_of_every_latency_is_shown_with_its_size_in_both_directions():
+    old = latencies()
+    slower = [x + 5.0 for x in old]
+    worse, better = compare_builds(single(old), single(slower)), compare_builds(single(slower), single(old))
+    assert (worse.verdict, better.verdict) == ("worse", "better")
+    assert row_of(worse).words.startswith("slower by 5.0 ms (5.0 to 5.0); more force at the alarm by 50.0 N")
+    assert row_of(better).words.startswith("faster by 5.0 ms (5.0 to 5.0); less force at the alarm by 50.0 N")
+    assert row_of(worse).paired and row_of(worse).pairs == 30
+
+
+def test_the_interval_of_a_change_is_the_same_in_both_directions():
+    old, noise = latencies(), latencies(mean=5.0, std=2.0, seed=2)
+    new = [a + b for a, b in zip(old, noise, strict=True)]
+    there = asked(compare_builds(single(old), single(new)), "latency_ms").change
+    back = asked(compare_builds(single(new), single(old)), "latency_ms").change
+    assert there.value == pytest.approx(-back.value) and there.value == pytest.approx(np.mean(noise), abs=1e-3)
+    assert there.low < there.value < there.high
+    words = row_of(compare_builds(single(new), single(old))).words
+    assert f"faster by {-back.value:.1f} ms ({-back.high:.1f} to {-back.low:.1f})" in words
+
+
+def test_equal_results_show_no_change_and_are_reported_as_identical():
+    results = single(latencies(), false_alarms={KEY: 2})
+    found = compare_builds(results, single(latencies(), false_alarms={KEY: 2}, benchmark_sha256="another"))
+    assert found.verdict == "no change shown" and not found.changed and not found.notes
+    assert row_of(found).words == "no change shown (every latency is the same)"
+    assert compare_builds(results, results).words == "no change shown: both files contain the same results"
+
+
+def test_no_change_shown_states_the_detectable_change():
+    old = latencies()
+    noise = latencies(mean=0.0, std=3.0, seed=4)
+    found = compare_builds(
+        single(old, force=None), single([a + b for a, b in zip(old, noise, strict=True)], force=None)
+    )
+    assert found.verdict == "no change shown" and found.asked == 1
+    least = detectable_difference(30, float(np.std(noise, ddof=1)), 0.8, 0.95)
+    assert asked(found, "latency_ms").detectable == pytest.approx(least, rel=1e-3)
+    assert row_of(found).words.startswith("on the same 30 contacts: ") and not found.later
+    assert row_of(found).words.endswith(f"; no change shown (a change of {least:.1f} ms would have been shown)")
+
+
+def test_a_change_of_the_size_said_to_be_shown_is_shown_in_some_80_of_100():
+    rng = np.random.default_rng(5)
+    least = detectable_difference(12, 3.0)
+    old, shown = latencies(12), 0
+    for _ in range(60):
+        new = [a + b for a, b in zip(old, rng.normal(least, 3.0, 12), strict=True)]
+        shown += compare_builds(single(old, force=None), single(new, force=None)).verdict == "worse"
+    assert 0.65 * 60 <= shown <= 0.95 * 60
+
+
+@pytest.mark.parametrize("n", [10, 25])
+def test_the_detectable_unpaired_change_agrees_with_the_planned_sample_size(n):
+    drawn = np.random.default_rng(6).normal(size=n)
+    standard = 40.0 + 3.0 * (drawn - drawn.mean()) / drawn.std(ddof=1)
+    old, new = (single(x.tolist(), force=None, bytes_of=b, names=b) for x, b in ((standard, "a"), (standard, "b")))
+    found = compare_builds(old, new)
+    least = asked(found, "latency_ms").detectable
+    assert not row_of(found).paired
+    assert impacts_for_unpaired(1.0001 * least, 3.0) == n < impacts_for_unpaired(0.9999 * least, 3.0)
+
+
+def test_a_trace_of_rounding_is_no_change():
+    old = latencies()
+    found = compare_builds(single(old, force=None), single([x + 1e-4 for x in old], force=None))
+    assert found.verdict == "no change shown"
+
+
+def test_misses_of_the_same_contacts_are_compared_by_mcnemar_on_others_by_fisher():
+    old = latencies(40)
+    new = [MISSED] * 9 + old[9:]
+    paired = compare_builds(single(old), single(new))
+    question = asked(paired, "missed")
+    assert question.p == pytest.approx(mcnemar_p(0, 9)) and question.outcome == "worse"
+    assert "misses more: 9 of 40, before 0 of 40" in row_of(paired).words
+    other = compare_builds(single(old), single(new, bytes_of="other", names="x"))
+    assert asked(other, "missed").p == pytest.approx(fisher_p(0, 40, 9, 40))
+    assert "misses fewer: 0 of 40, before 9 of 40" in row_of(compare_builds(single(new), single(old))).words
+
+
+def test_misses_that_only_one_build_has_do_not_touch_the_latency_of_the_others():
+    old = latencies(40)
+    new = [MISSED] * 5 + [x + 2.0 for x in old[5:]]
+    latency = asked(compare_builds(single(old), single(new)), "latency_ms")
+    assert latency.change.value == pytest.approx(2.0) and latency.old_of == latency.new_of == 35
+    assert latency.old == pytest.approx(np.mean(old[5:]))
+
+
+def test_a_pair_not_assessable_in_one_build_is_counted_separately():
+    old = [*latencies(30), NOT_ASSESSABLE, MISSED]
+    new = [NOT_ASSESSABLE, *latencies(30)[1:], NOT_ASSESSABLE, MISSED]
+    found = compare_builds(single(old), single(new))
+    row = row_of(found)
+    assert row.one_not_assessable == 1 and row.pairs == 32
+    assert asked(found, "latency_ms").old_of == 29 and asked(found, "missed").old_of == 30
+    assert (asked(found, "not_assessable").old, asked(found, "not_assessable").new) == (1, 2)
+    assert row.words.endswith("; 1 of 32 contacts not assessable in one of the builds")
+
+
+def test_a_build_that_can_no_longer_assess_is_worse():
+    found = compare_builds(single(latencies()), single([NOT_ASSESSABLE] * 30))
+    assert found.verdict == "worse"
+    assert "nothing is assessable: not assessable 30 of 30, before 0 of 30" in row_of(found).words
+    assert asked(found, "latency_ms").outcome == "not_asked"
+    assert asked(found, "latency_ms").reason == "no contact has it in both"
+
+
+def test_false_alarms_are_compared_by_hours():
+    old = single(latencies(), false_alarms={KEY: 2}, hours=2.0)
+    new = single(latencies(), false_alarms={KEY: 15}, hours=1.0)
+    found = compare_builds(old, new)
+    question = asked(found, "false_alarms")
+    assert question.p == pytest.approx(poisson_difference_p(15, 1.0, 2, 2.0)) and found.verdict == "worse"
+    assert row_of(found).words == "more false alarms: 15 in 1 h, before 2 in 2 h"
+    assert row_of(compare_builds(new, old)).words == "fewer false alarms: 2 in 2 h, before 15 in 1 h"
+
+
+def test_an_impact_free_group_says_how_many_false_alarms_would_have_been_shown():
+    old = build_results({}, holdout=["momentum"])
+    found = compare_builds(old, build_results({}, holdout=["momentum"], benchmark_sha256="another"))
+    least = int(asked(found, "false_alarms").detectable)
+    assert row_of(found).words == f"no change shown ({least} false alarms instead of 0 would have been shown)"
+    shown = {
+        count: compare_builds(
+            old, build_results({}, holdout=["momentum"], false_alarms={("momentum", "holdout"): count})
+        ).verdict
+        for count in (least - 1, least)
+    }
+    assert shown == {least - 1: "inconclusive", least: "worse"}
+
+
+def test_the_false_alarms_that_would_have_been_shown_are_more_than_before():
+    old = single(latencies(), false_alarms={KEY: 20}, hours=2.0)
+    least = int(asked(compare_builds(old, old), "false_alarms").detectable)
+    assert least > 20
+    for count, outcome in ((least - 1, "inconclusive"), (least, "worse")):
+        new = single(latencies(), false_alarms={KEY: count}, hours=2.0)
+        assert asked(compare_builds(old, new), "false_alarms").outcome == outcome, count
+
+
+@pytest.mark.parametrize("other", [{}, {"bytes_of": "other", "names": "x"}], ids=["paired", "unpaired"])
+def test_the_misses_that_would_have_been_shown_are_the_least_that_are(other):
+    old = single([MISSED] * 10 + latencies(30), force=None)
+    found = compare_builds(old, single([*latencies(10), MISSED, *latencies(29)], force=None, **other))
+    least = int(asked(found, "missed").detectable)
+    assert found.asked == 2
+    for count, outcome in ((least - 1, "inconclusive"), (least, "worse")):
+        new = single(latencies(10) + [MISSED] * count + latencies(30 - count), force=None, **other)
+        assert asked(compare_builds(old, new), "missed").outcome == outcome, count
+
+
+def test_if_even_all_misses_would_show_nothing_this_is_stated():
+    old = single([MISSED] * 2 + latencies(9), force=None)
+    assert asked(compare_builds(old, single(latencies(11), force=None)), "missed").detectable == math.inf
+
+
+def test_a_detector_without_monitored_time_has_no_false_alarms_to_compare():
+    found = compare_builds(single(latencies(), hours=1.0), single(latencies(), hours=0.0))
+    assert asked(found, "false_alarms").reason == "nothing was monitored in one of them"
+
+
+def test_operations_not_assessable_in_one_build_count_without_contacts():
+    old = build_results({}, holdout=["momentum"])
+    new = replace(old, exposure=tuple(replace(item, not_assessable=40) for item in old.exposure))
+    found = compare_builds(old, new)
+    assert found.verdict == "worse"
+    assert row_of(found).words.startswith(
+        "nothing is assessable: not assessable 40 of 40, before 0 of 40 (probability by chance"
+    )
+
+
+def test_all_questions_are_corrected_together():
+    drawn = np.random.default_rng(8).normal(size=12)
+    change = 2.2 + 3.0 * (drawn - drawn.mean()) / drawn.std(ddof=1)
+    old = latencies(12)
+    new = [a + b for a, b in zip(old, change.tolist(), strict=True)]
+    alone = compare_builds(single(old, force=None), single(new, force=None))
+    assert alone.verdict == "worse" and 0.01 < asked(alone, "latency_ms").p < 0.05
+    noise = {("pure_torque", f"group {i}"): latencies(12, seed=20 + i) for i in range(6)}
+    moved = {
+        key: [x + y for x, y in zip(v, latencies(12, 0.0, 3.0, 40 + i), strict=True)]
+        for i, (key, v) in enumerate(noise.items())
+    }
+    together = compare_builds(
+        build_results({KEY: old, **noise}, force=None), build_results({KEY: new, **moved}, force=None)
+    )
+    assert together.asked == 7
+    (row,) = [row for row in together.rows if row.detector == "momentum" and row.group == "stiff"]
+    question = row.question("latency_ms")
+    assert question is not None and question.p == asked(alone, "latency_ms").p
+    assert question.corrected_p > 0.05 and question.outcome == "no change shown"
+    assert question.detectable > asked(alone, "latency_ms").detectable
+
+
+def test_one_better_and_one_worse_is_mixed():
+    old = {("momentum", "stiff"): latencies(), ("momentum", "soft"): latencies(seed=2)}
+    new = {key: [x + (5.0 if key[1] == "soft" else -5.0) for x in values] for key, values in old.items()}
+    assert compare_builds(build_results(old), build_results(new)).verdict == "mixed"
+
+
+def test_a_stricter_level_shows_less():
+    old = latencies(12)
+    new = [a + b for a, b in zip(old, latencies(12, 2.2, 3.0, 9), strict=True)]
+    verdicts = [compare_builds(single(old), single(new), level).verdict for level in (0.2, 0.001)]
+    assert verdicts == ["worse", "inconclusive"]
+    with pytest.raises(UsageError, match="significance level is 1"):
+        compare_builds(single(old), single(new), 1.0)
+
+
+@pytest.mark.parametrize(("unpaired", "n"), [(False, 4), (True, 3)])
+def test_too_few_recordings_to_show_anything_are_reported(unpaired, n):
+    other = {"bytes_of": "other", "names": "x"} if unpaired else {}
+    found = compare_builds(single(latencies(n)), single([x + 100.0 for x in latencies(n)], **other))
+    assert found.words.endswith("inconclusive: this sample is too small to detect any change")
+    same = "" if unpaired else "on the same 4 contacts: 4 later by 100 ms; "
+    assert "too few recordings for 2 tests" in row_of(found).words
+    assert row_of(found).words.startswith(f"{same}inconclusive: latency ")
+    assert asked(found, "latency_ms").detectable == math.inf
+
+
+def test_recordings_of_one_campaign_count_as_one():
+    old = latencies(12)
+    new = [x + 5.0 for x in old]
+    assert compare_builds(single(old), single(new)).verdict == "worse"
+    campaigns = [f"day {i % 3}" for i in range(12)]
+    for named in ({}, {"campaigns": campaigns}):
+        found = compare_builds(single(old, campaigns=campaigns), single(new, **named))
+        assert found.verdict == "inconclusive", named
+        assert asked(found, "latency_ms").p == pytest.approx(2 / 2**3)
+    assert compare_builds(single(old), single(new, campaigns=campaigns)).verdict == "inconclusive"
+
+
+def test_the_same_bytes_are_paired_under_any_name():
+    found = compare_builds(single(latencies()), single([x + 5.0 for x in latencies()], names="renamed-"))
+    assert row_of(found).paired and row_of(found).pairs == 30 and not found.notes
+
+
+def test_copies_of_a_recording_are_paired_one_to_one():
+    results = single(latencies())
+    copies = replace(results, recordings=tuple(replace(item, sha256="same") for item in results.recordings))
+    found = compare_builds(copies, replace(copies, provenance={**copies.provenance, "benchmark_sha256": "another"}))
+    assert row_of(found).pairs == 30 and row_of(found).words == "no change shown (every latency is the same)"
+
+
+def test_copies_under_other_names_are_paired_each_with_its_own():
+    old, new = single(latencies()), single([x + 5.0 for x in latencies()], names="renamed-")
+    old, new = (replace(b, recordings=tuple(replace(r, sha256="same") for r in b.recordings)) for b in (old, new))
+    assert row_of(compare_builds(old, new)).words.startswith("slower by 5.0 ms (5.0 to 5.0)")
+
+
+def test_a_recording_is_the_partner_of_one_only():
+    old, new = single(latencies()), single(latencies())
+    first, second, *others = new.recordings
+    swapped = (replace(first, sha256=second.sha256), replace(second, recording="stiff/new.csv", sha256="new"), *others)
+    found = compare_builds(old, replace(new, recordings=swapped))
+    assert row_of(found).pairs == 29
+    assert found.notes[0].startswith("stiff: 29 recordings are paired; 1 only in old and 1 only in new")
+
+
+def test_a_converted_recording_with_more_contacts_is_another_one():
+    new = single(latencies(), bytes_of="converted")
+    more = tuple(replace(item, contact=2, onset_s=ONSET + 1.0) for item in new.contacts)
+    assert not row_of(compare_builds(single(latencies()), replace(new, contacts=new.contacts + more))).paired
+
+
+@pytest.mark.parametrize(("moved", "paired"), [(0.9, True), (1.1, False)])
+def test_other_bytes_are_paired_by_name_where_the_onset_is_within_its_uncertainty(moved, paired):
+    new = single([x + 5.0 for x in latencies()], bytes_of="converted", begins=ONSET + moved * UNCERTAINTY)
+    found = compare_builds(single(latencies()), new)
+    assert row_of(found).paired is paired
+    assert found.notes == (() if paired else ("stiff: unpaired, the recordings differ (30 and 30)",))
+
+
+def test_some_onsets_that_agree_by_chance_do_not_choose_the_contacts():
+    old, new = single(latencies()), single([x + 5.0 for x in latencies()], bytes_of="fresh", begins=ONSET + 0.5)
+    near = tuple(replace(item, onset_s=ONSET) if i < 5 else item for i, item in enumerate(new.contacts))
+    found = compare_builds(old, replace(new, contacts=near))
+    assert not row_of(found).paired and asked(found, "latency_ms").old_of == 30
+
+
+def test_recordings_of_only_one_build_are_counted_and_not_paired():
+    more = single([*latencies(), *[500.0] * 10])
+    found = compare_builds(single(latencies()), more)
+    row = row_of(found)
+    assert found.verdict == "no change shown" and (row.pairs, row.old_contacts, row.new_contacts) == (30, 30, 40)
+    (note,) = found.notes
+    assert note.startswith("stiff: 30 recordings are paired; 0 only in old and 10 only in new")
+
+
+def test_other_contacts_in_the_same_bytes_are_refused():
+    old = single(latencies())
+    with pytest.raises(ConfigurationError, match=r"contact 1 begins at 5.000000 s in old and 5.004000 s in new"):
+        compare_builds(old, single(latencies(), begins=ONSET + 0.004))
+    two = replace(old, recordings=tuple(replace(item, contacts=2) for item in old.recordings))
+    with pytest.raises(
+        ConfigurationError, match=r"stiff/00\.csv: the same bytes, but its contacts are 1 in old and 2 in new"
+    ):
+        compare_builds(old, two)
+
+
+OTHER_RULES = {
+    "onset": ("above 30 N", "onset differs: load cell above 20 N"),
+    "label_file": ("labels.csv", "label_file differs: false in old, true in new"),
+    "synchronisation_s": (0.002, "synchronisation_s differs: 0.0 in old, 0.002 in new"),
+    "window_s": ({"stiff": 0.5}, r"window_s.stiff differs: 1.0 in old, 0.5 in new"),
+    "operations": ("motion", "operations differs: whole in old, motion in new"),
+    "watched_joints": ("arm", "watched_joints differs: none in old, arm in new"),
+    "mass_before_cell_kg": (2.0, "mass_before_cell_kg differs: 0.0 in old, 2.0 in new"),
+    "force_profiles": (
+        {"stiff": {"name": "gate", "steps": ({"from_s": 0.0, "at_most_n": 150.0},)}},
+        r"force_profiles.stiff.steps\[0\].at_most_n differs: 400.0 in old, 150.0 in new",
+    ),
+}
+
+
+@pytest.mark.parametrize("key", RULES)
+def test_other_rules_are_refused_by_their_key(key):
+    value, words = OTHER_RULES[key]
+    with pytest.raises(ConfigurationError, match=words) as fault:
+        compare_builds(single(latencies()), single(latencies(), **{key: value}))
+    assert "run one again" in fault.value.hint
+
+
+def test_what_is_under_test_may_differ_and_is_listed():
+    new = single(
+        latencies(),
+        tool_version="2.0",
+        gains={"momentum": {"bandwidth": 12.0}, "unknown": {"x": 1}},
+        debounce_samples=None,
+        learned_sha256={f"free/{i}.csv": f"free{i}" for i in range(8)} | {"more.csv": "more"},
+        machine_sha256="ab" * 32,
+    )
+    listed = {(item.key, item.old, item.new) for item in compare_builds(single(latencies()), new).changed}
+    assert listed == {
+        ("tool_version", "1.0", "2.0"),
+        ("gains.momentum.bandwidth", "10.0", "12.0"),
+        ("debounce_samples", "9", "default (9 ms)"),
+        ("learned_runs", "10 runs", "9 runs, 8 of them the same"),
+        ("machine_sha256", "none", "abababababab"),
+    }
+
+
+def test_the_same_runs_in_another_order_and_labels_in_another_folder_are_no_difference():
+    runs = {f"elsewhere/{i}.csv": f"free{i}" for i in reversed(range(10))}
+    old = single(latencies(), label_file="a/b/labels.csv")
+    found = compare_builds(old, single(latencies(), label_file="C:\\c\\labels.csv", learned_sha256=runs))
+    assert found.changed == ()
+
+
+def test_rules_of_a_group_that_only_one_holds_do_not_matter():
+    new = single(latencies(), window_s={"stiff": 1.0, "soft": 9.0})
+    assert compare_builds(single(latencies()), new).verdict == "no change shown"
+
+
+def test_results_from_a_file_are_compared_with_results_in_memory(tmp_path):
+    results = single(latencies())
+    (tmp_path / "results.json").write_text(results_json(results), encoding="utf-8")
+    assert compare_builds(read_results(tmp_path / "results.json"), results).verdict == "no change shown"
+
+
+def test_content_of_only_one_file_is_named_and_not_compared():
+    old = build_results({KEY: latencies(), ("pure_torque", "stiff"): latencies(), ("momentum", "soft"): latencies()})
+    new = build_results({KEY: latencies(), ("energy", "stiff"): latencies(), ("momentum", "wet"): latencies()})
+    found = compare_builds(old, new)
+    assert [(row.detector, row.group) for row in found.rows] == [KEY]
+    assert found.only_old == ("detector pure_torque", "group soft")
+    assert found.only_new == ("detector energy", "group wet")
+
+
+def test_a_detector_without_results_in_a_group_of_one_build_is_named():
+    old = build_results({KEY: latencies(), ("pure_torque", "stiff"): latencies()})
+    lost = replace(
+        old,
+        contacts=tuple(item for item in old.contacts if item.detector == "momentum"),
+        exposure=tuple(item for item in old.exposure if item.detector == "momentum"),
+    )
+    found = compare_builds(old, lost)
+    assert found.only_old == ("pure_torque in stiff",) and len(found.rows) == 1
+
+
+def test_nothing_in_common_is_an_error():
+    with pytest.raises(UsageError, match="no detector and group in common"):
+        compare_builds(single(latencies()), build_results({("energy", "stiff"): latencies()}))
+
+
+def test_nothing_depends_on_the_order_of_the_recordings():
+    old, new = single(latencies()), single(latencies(seed=3), bytes_of="x", names="x")
+    for other in (new, single(latencies(seed=3))):
+        turned = replace(other, contacts=other.contacts[::-1], recordings=other.recordings[::-1])
+        assert to_json(compare_builds(old, other)) == to_json(compare_builds(old, turned))
+
+
+@pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
+def test_hostile_names_are_compared_like_any_other(name):
+    outcomes = {("momentum", name): latencies()}
+    found = compare_builds(build_results(outcomes, window_s={}), build_results(outcomes, window_s={}))
+    assert row_of(found).group == name and found.verdict == "no change shown"
+
+
+OLD = [40.0 + number for number in range(16)]
+ON_THE_SAME = {
+    "all later": ([x + 21.0 + 70.0 * i / 15 for i, x in enumerate(OLD)], "16 later by 21.0 to 91.0 ms", True),
+    "mixed": (
+        [x + (8.0 if i < 9 else -2.0) for i, x in enumerate(OLD)],
+        "9 later by 8.0 ms, 7 earlier by 2.0 ms",
+        False,
+    ),
+    "missed": ([MISSED, *OLD[1:]], "1 newly missed", True),
+    "found": ([OLD[0] - 1.0, *OLD[1:]], "1 earlier by 1.0 ms", False),
+}
+
+
+@pytest.mark.parametrize("name", ON_THE_SAME)
+def test_what_happened_on_the_same_contacts_is_said_beside_the_inference(name):
+    new, words, later = ON_THE_SAME[name]
+    day = ["monday"] * 8 + ["tuesday"] * 8
+    found = compare_builds(single(OLD, campaigns=day), single(new, campaigns=day))
+    assert found.verdict == "inconclusive" and found.later == later
+    assert row_of(found).words.startswith(f"on the same 16 contacts: {words}; inconclusive: ")
+    start = f"{'missing more of' if name == 'missed' else 'later on'} the same contacts in 1 of 1 row; about other "
+    assert found.words.startswith(f"{start}recordings inconclusive: " if later else "inconclusive: ")
+
+
+def test_what_happened_on_the_few_recordings_in_both_is_said_though_all_are_compared_unpaired():
+    old = single(OLD)
+    new = single([x + 30.0 for x in OLD], names="b")
+    fresh = tuple(replace(item, sha256=f"fresh {i}") if i > 2 else item for i, item in enumerate(new.recordings))
+    found = compare_builds(old, replace(new, recordings=fresh))
+    row = row_of(found)
+    assert not row.paired and row.words.startswith("slower by 30.0 ms") and found.later == 1
+    assert "; on the same 3 contacts: 3 later by 30.0 ms" in row.words
+    assert found.notes == ("stiff: unpaired, 3 recordings are in both, 13 only in old and 13 only in new",)
+
+
+def test_a_row_that_is_later_comes_before_another_that_is_better():
+    names = [("momentum", "stiff"), ("momentum", "soft")]
+    days = {"campaigns": ["monday"] * 8 + ["tuesday"] * 8}
+    old = build_results({names[0]: OLD, names[1]: [MISSED] * 16}, **days)
+    found = compare_builds(old, build_results({names[0]: [x + 30.0 for x in OLD], names[1]: OLD}, **days))
+    start = "later on the same contacts in 1 of 2 rows; about other recordings better: "
+    assert found.verdict == "better" and found.words.startswith(start)

@@ -1,0 +1,232 @@
+"""`cdtool plan`: the required size of a test."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool as api
+from cdtool.base.errors import UsageError
+from cdtool.commands.compare.planning import measured_std
+from cdtool.results.files.results_file import to_json
+from cdtool.statistics.sample_size import (
+    exposure_for_rate,
+    impacts_for_difference,
+    impacts_for_missed_share,
+    impacts_for_unpaired,
+)
+from tests.command import cdtool
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, Outcome, build_results
+
+FIRST = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()
+SECOND = [x + y for x, y in zip(FIRST, np.random.default_rng(2).normal(20.0, 2.0, 30), strict=True)]
+
+
+def earlier(first: list[Outcome] = FIRST, second: list[Outcome] = SECOND, **options: object):
+    return build_results({("momentum", "stiff"): first, ("pure_torque", "stiff"): second}, **options)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "results.json"
+    path.write_text(to_json(earlier()), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ("--missed-at-most", "5%"),
+            "to show that at most 5 % are missed: 59 impacts without a miss; 93 with one miss allowed",
+        ),
+        (
+            ("--missed-at-most", "0.1", "--allowed", "2"),
+            "to show that at most 10 % are missed: 29 impacts without a miss; 61 with 2 misses allowed",
+        ),
+        (
+            ("--missed-at-most", "5 %", "--allowed", "0"),
+            "to show that at most 5 % are missed: 59 impacts without a miss",
+        ),
+        (
+            ("--false-alarms-at-most", "1/1000op"),
+            "a budget of 1/1000op false alarms: to set a safety factor for it, 999 impact-free operations to learn "
+            "from; to show that it is met, 2996 others without a false alarm; 4744 with one false alarm allowed",
+        ),
+        (
+            ("--false-alarms-at-most", "0.1/h", "--allowed", "0"),
+            "a budget of 1/10h false alarms: to set a safety factor for it, 10 impact-free hours to learn from; "
+            "to show that it is met, 30 others without a false alarm",
+        ),
+        (
+            ("--difference-ms", "5", "--std-ms", "8"),
+            "to detect a difference of 5 ms with 80 % power (standard deviation of the differences 8 ms): 23 impacts, "
+            "each scored for both",
+        ),
+        (
+            ("--difference-ms", "5", "--std-ms", "8", "--unpaired", "--power", "0.9"),
+            "to detect a difference of 5 ms with 90 % power (standard deviation within a set 8 ms): 55 impacts in "
+            "each of two sets",
+        ),
+    ],
+)
+def test_each_question_is_answered_in_one_sentence(arguments, words):
+    done = cdtool("plan", *arguments)
+    assert (done.status, done.out, done.err) == (0, f"{words}\n", "")
+
+
+def test_several_questions_are_answered_in_order_and_as_json():
+    arguments = ("--difference-ms", 5, "--std-ms", 8, "--missed-at-most", "5%", "--false-alarms-at-most", "0.1/h")
+    done = cdtool("plan", *arguments, "--json")
+    values = json.loads(done.out)
+    assert [item["question"] for item in values["answers"]] == ["difference", "missed", "false alarms"]
+    needs = [(need["purpose"], need["amount"], need["unit"]) for need in values["answers"][2]["needs"]]
+    assert needs == [("set", 10, "hours"), ("show", 30.0, "hours"), ("show", 47.5, "hours")]
+    assert [item["words"] for item in values["answers"]] == cdtool("plan", *arguments).out.splitlines()
+
+
+def test_the_amounts_are_never_too_small():
+    found = api.plan(missed_at_most="3%", false_alarms_at_most="0.03/h", allowed=4, significance=0.01)
+    missed, alarms = found.answers
+    assert [need.amount for need in missed.needs] == [impacts_for_missed_share(0.03, n, 0.99) for n in (0, 4)]
+    for need in alarms.needs[1:]:
+        exact = exposure_for_rate(0.03, need.allowed, 0.99)
+        assert exact <= need.amount < 1.01 * exact
+
+
+def test_a_stricter_level_needs_more():
+    impacts = [
+        api.plan(difference_ms=5.0, std_ms=8.0, significance=level).answers[0].needs[0] for level in (0.05, 0.005)
+    ]
+    assert [need.amount for need in impacts] == [23, impacts_for_difference(5.0, 8.0, level=0.995)]
+    assert impacts[1].amount > 35
+
+
+def test_the_spread_of_an_earlier_test_is_measured_in_pairs(source):
+    done = cdtool("plan", "--difference-ms", 1, "--from", source, "--detectors", "gm,pt", "--group", "stiff")
+    std = float(np.std(np.subtract(FIRST, SECOND), ddof=1))
+    assert done.out == (
+        f"to detect a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, "
+        "measured: momentum minus pure_torque in stiff, 30 contacts, one per recording): "
+        f"{impacts_for_difference(1.0, std)} impacts, each scored for both\n"
+    )
+
+
+def test_unpaired_the_spread_is_that_of_the_latencies(source):
+    one = measured_std(source, ["gm"], unpaired=True)
+    assert one.std == pytest.approx(np.std(FIRST, ddof=1))
+    both = measured_std(source, ["gm", "pt"], unpaired=True)
+    assert both.std == pytest.approx(math.sqrt(0.5 * (np.var(FIRST, ddof=1) + np.var(SECOND, ddof=1))))
+    done = cdtool("plan", "--difference-ms", 5, "--from", source, "--detectors", "gm", "--unpaired", "--json")
+    (answer,) = json.loads(done.out)["answers"]
+    assert (
+        answer["needs"][0]["amount"] == impacts_for_unpaired(5.0, one.std) and "in each of two sets" in answer["words"]
+    )
+
+
+def test_contacts_that_one_missed_are_left_out_and_counted():
+    found = measured_std(
+        earlier([MISSED, NOT_ASSESSABLE, *FIRST[2:]], [*SECOND[:2], MISSED, *SECOND[3:]]), ["gm", "pt"]
+    )
+    assert found.std == pytest.approx(np.std(np.subtract(FIRST[3:], SECOND[3:]), ddof=1))
+    assert found.source.endswith("27 contacts, one per recording, 3 missed or not assessable left out")
+
+
+def test_contacts_of_one_campaign_count_as_one():
+    shift = np.repeat(np.random.default_rng(5).normal(0.0, 10.0, 6), 5)
+    alike = earlier(FIRST, (np.array(FIRST) + shift).tolist(), campaigns=[f"day {i // 5}" for i in range(30)])
+    found = measured_std(alike, ["gm", "pt"])
+    assert found.std == pytest.approx(np.std(shift[::5], ddof=1))
+    assert "30 contacts, in 6 campaigns" in found.source
+    (answer,) = api.plan(difference_ms=5.0, std_ms=found).answers
+    assert answer.needs[0].unit == "recordings or campaigns"
+    assert answer.needs[0].amount == impacts_for_difference(5.0, found.std)
+    assert answer.words.endswith("each scored for both, with as many contacts in each as measured")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "there is no question (give --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most"),
+        (("--difference-ms", 5), "a difference of 5 ms without a standard deviation"),
+        (("--difference-ms", 0, "--std-ms", 8), "difference is 0"),
+        (("--difference-ms", 5, "--std-ms", 8, "--power", 1), "power is 1"),
+        (("--difference-ms", 5, "--std-ms", 8, "--level", 0), "significance level is 0"),
+        (("--difference-ms", 5, "--std-ms", 8, "--from", "r.json"), "--std-ms and --from cannot be combined"),
+        (("--std-ms", 8), "--std-ms has no effect (use it with --difference-ms)"),
+        (("--missed-at-most", "5%", "--unpaired"), "--unpaired has no effect"),
+        (("--missed-at-most", "5%", "--group", "stiff"), "--group has no effect (use it with --from)"),
+        (("--missed-at-most", "5%", "--detectors", "gm"), "--detectors has no effect"),
+        (("--missed-at-most", "5%", "--from", "r.json"), "--from has no effect"),
+        (("--difference-ms", 5, "--std-ms", 8, "--allowed", 2), "--allowed has no effect"),
+        (("--missed-at-most", "5"), "missed share is '5' (give 5% or 0.05"),
+        (("--missed-at-most", "five"), "missed share is 'five'"),
+        (("--missed-at-most", "5%x"), "missed share is '5%x'"),
+        (("--false-alarms-at-most", "often"), "false-alarm budget is 'often'"),
+        (("--difference-ms", 5, "--from", "absent.json"), "absent.json: no such file"),
+        (("--difference-ms", 5, "--from", "results.json"), "0 detectors are given (give two detectors of momentum"),
+        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm"), "1 detectors are given"),
+        (("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,momentum"), "1 detectors are given"),
+        (
+            ("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,ptt"),
+            "detector 'ptt' is not in the results",
+        ),
+        (
+            ("--difference-ms", 5, "--from", "results.json", "--detectors", "gm,pt", "--group", "stif"),
+            "group 'stif' has no contacts (did you mean stiff?",
+        ),
+    ],
+)
+def test_an_incomplete_question_exits_with_2_and_names_the_option(source, monkeypatch, arguments, message):
+    monkeypatch.chdir(source.parent)
+    done = cdtool("plan", *arguments)
+    assert done.status == 2 and message in done.err and done.out == ""
+
+
+def test_a_standard_deviation_requires_two_recordings():
+    for outcomes in ([40.0], [MISSED] * 5):
+        with pytest.raises(UsageError, match="at least 2 are required"):
+            measured_std(earlier(outcomes, outcomes), ["gm", "pt"])
+
+
+def test_a_group_is_required_if_there_are_several():
+    results = build_results(
+        {(name, group): FIRST for name in ("momentum", "pure_torque") for group in ("stiff", "soft")}
+    )
+    with pytest.raises(UsageError, match=r"no group is given \(known: soft, stiff\)"):
+        measured_std(results, ["gm", "pt"])
+
+
+def test_only_the_contacts_of_the_group_named_count():
+    groups = {"stiff": SECOND, "soft": [3.0 * x for x in SECOND]}
+    results = build_results(
+        {("momentum", group): FIRST for group in groups} | {("pure_torque", g): x for g, x in groups.items()}
+    )
+    found = {group: measured_std(results, ["gm", "pt"], group).std for group in groups}
+    assert found == {
+        group: pytest.approx(np.std(np.subtract(FIRST, second), ddof=1)) for group, second in groups.items()
+    }
+
+
+def test_integers_are_shown_with_all_digits():
+    done = cdtool("plan", "--false-alarms-at-most", "1/1000000op")
+    assert "a budget of 1/1000000op false alarms" in done.out and "999999 impact-free operations" in done.out
+    assert "2995733 others" in done.out and "e+" not in done.out
+    assert "e+" not in cdtool("plan", "--missed-at-most", "0.000001").out
+
+
+def test_one_operation_is_singular():
+    done = cdtool("plan", "--false-alarms-at-most", "1/op")
+    assert "1 impact-free operation to learn from" in done.out
+    assert "1 impact-free hour to learn from" in cdtool("plan", "--false-alarms-at-most", "1/h").out
+
+
+@pytest.mark.parametrize("command", ["plan", "compare"])
+def test_a_level_indistinguishable_from_0_is_refused(source, command):
+    asked = ("--missed-at-most", "5%") if command == "plan" else (source, source)
+    done = cdtool(command, *asked, "--level", "1e-300")
+    assert done.status == 2 and "significance level is 1e-300" in done.err and "0.000000001" in done.err

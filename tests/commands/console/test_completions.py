@@ -1,0 +1,124 @@
+"""What the Tab key completes: commands, options, and the values of options."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer import Context
+from typer.main import get_command
+
+from cdtool.commands.app import app
+from cdtool.commands.console import completions
+from cdtool.commands.tune.search.objective import Goal
+from cdtool.commands.tune.tuning import IMPACTS
+from cdtool.detectors import DETECTORS
+from cdtool.formats.written_files import WRITERS
+from cdtool.recordings.operations import HOW_TO_CUT
+from cdtool.thresholds import THRESHOLDS
+
+
+def completed(*words):
+    """The completions of the value of the last option or argument of a command."""
+    *names, option, typed = words
+    command = get_command(app)
+    context = Context(command)
+    for name in names:
+        command = command.get_command(context, name)
+        context = Context(command, parent=context)
+    named = [item for item in command.params if option in item.opts]
+    (parameter,) = named or command.params[:1]
+    return [item.value for item in parameter.shell_complete(context, typed)]
+
+
+def test_a_shell_completes_commands_options_and_values():
+    script = Path(sys.executable).with_name("cdtool")
+    for line, expected in (("det", "detect"), ("detect --dete", "--detector"), ("detect -d fe", "feekf")):
+        words = f"cdtool {line}".split()
+        asked = {"COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1), "_CDTOOL_COMPLETE": "complete_bash"}
+        done = subprocess.run([script], env=os.environ | asked, capture_output=True, text=True, check=True)
+        assert done.stdout.split() == [expected]
+
+
+@pytest.mark.parametrize("command", ["detect", "explain", "learn-signature"])
+def test_detectors_are_completed_by_name_and_short_name(command):
+    assert completed(command, "--detector", "f") == ["friction_ekf", "feekf"]
+    assert set(completed(command, "-d", "p")) == {"pure_torque", "pure_inertia", "pt", "pi"}
+
+
+def test_a_list_of_detectors_is_completed_at_its_last_name():
+    assert completed("benchmark", "--detectors", "gm,k") == ["gm,kalman_momentum", "gm,kmo"]
+    assert completions.detector_list("gm,g") == [], "each once"
+
+
+def test_every_registered_name_is_a_completion():
+    assert completions.detectors("") == [*DETECTORS.names(), *DETECTORS.short_names]
+    assert completions.thresholds("") == THRESHOLDS.names()
+    assert completions.operations("") == list(HOW_TO_CUT)
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("learn-signature", "--threshold", "cu"), ["cusum"]),
+        (("learn-signature", "--rule", "t"), ["thesis"]),
+        (("learn-signature", "--sides", "o"), ["one"]),
+        (("learn-signature", "--align", "p"), ["position"]),
+        (("signature", "update", "--operations", "m"), ["motion"]),
+        (("list", "KIND", "w"), ["writers"]),
+        (("tune", "--thresholds", "signature,gl"), ["signature,glr"]),
+        (("tune", "--objective", "p"), ["p95"]),
+        (("plan", "--detectors", "feekf,g"), ["feekf,gm"]),
+        (("simulate", "gate", "--format", "mi"), ["mixed"]),
+    ],
+)
+def test_other_values_are_completed(words, expected):
+    assert completed(*words) == expected
+
+
+def test_values_that_are_listed_by_hand_are_those_that_the_commands_accept():
+    assert completed("tune", "--objective", "") == [item.value for item in Goal]
+    assert completed("tune", "--impacts", "") == list(IMPACTS)
+    assert {f".{name}" for name in completed("inject", "--format", "")} == set(WRITERS) - {".hdf5"}
+
+
+def test_a_benchmark_file_is_completed_by_its_suffix(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("benchmark.toml", "bench.csv", ".hidden.toml"):
+        (tmp_path / name).touch()
+    (tmp_path / "beam").mkdir()
+    assert completed("benchmark", "FILE", "be") == ["beam/", "benchmark.toml"]
+    assert completed("benchmark", "FILE", "") == ["beam/", "benchmark.toml"], "no hidden file"
+    assert completed("benchmark", "FILE", "s3://b") == []
+    assert completed("benchmark", "FILE", "none/b") == []
+
+
+def test_a_folder_without_a_choice_is_entered(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sample_logs" / "gate").mkdir(parents=True)
+    (tmp_path / "sample_logs" / "gate" / "results.json").touch()
+    (tmp_path / "sample_logs" / "gate" / "results.parquet").mkdir()
+    inside = ["sample_logs/gate/results.json", "sample_logs/gate/results.parquet"]
+    assert completed("report", "RESULTS", "sam") == inside
+    assert completed("compare", "OLD", "sample_logs/gate/results.p") == inside[1:]
+
+
+HEAVY = ("numpy", "scipy", "pandas", "rich", "matplotlib", "numba")
+
+
+def test_completing_a_value_imports_no_library_for_computing_or_drawing():
+    code = f"""
+import sys
+from cdtool.commands.app import app
+from typer.main import get_command
+from typer import Context
+group = get_command(app)
+for name, option in (("benchmark", "--detectors"), ("learn-signature", "--threshold"), ("list", "kind")):
+    command = group.get_command(Context(group), name)
+    parameter = next(item for item in command.params if option in (*item.opts, item.name))
+    assert parameter.shell_complete(Context(command), ""), option
+print([name for name in {HEAVY!r} if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,85 @@
+"""Progress of convert, recover and init: only on a terminal, and only for long tasks."""
+
+from __future__ import annotations
+
+import sys
+from time import sleep
+
+import pytest
+
+from cdtool.commands.console.late_progress import late_progress
+from cdtool.commands.convert.converting import convert
+from cdtool.commands.convert.recovering import recover
+from tests.commands.convert.bags import write_part
+from tests.commands.convert.kinds import table
+
+
+class Terminal:
+    """A stderr that claims to be a terminal and records its output."""
+
+    encoding = "utf-8"
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        self.text += text
+        return len(text)
+
+    def flush(self) -> None:
+        pass
+
+
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Replace stderr by a terminal; not a fixture, since pytest replaces stderr after fixtures."""
+    made = Terminal()
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", made)
+    return made
+
+
+def test_nothing_is_drawn_without_a_terminal(capsys):
+    with late_progress("converting", after=0.0) as advance:
+        assert advance is None
+    assert capsys.readouterr().err == ""
+
+
+def test_nothing_is_drawn_for_a_short_task(monkeypatch):
+    stderr = terminal(monkeypatch)
+    with late_progress("converting", after=60.0) as advance:
+        assert advance is not None
+        advance(1, 2)
+    assert stderr.text == ""
+
+
+def test_a_bar_appears_for_a_long_task_and_disappears_at_the_end(monkeypatch):
+    stderr = terminal(monkeypatch)
+    with late_progress("converting", after=0.0) as advance:
+        sleep(0.3)
+        assert advance is not None
+        advance(3, 7)
+        sleep(0.3)
+    assert "converting" in stderr.text and "3/7" in stderr.text
+    assert stderr.text.rstrip("\r\n").endswith("\x1b[2K")  # the line is cleared
+
+
+def test_an_error_in_the_block_is_raised_and_removes_the_bar(monkeypatch):
+    stderr = terminal(monkeypatch)
+    with pytest.raises(ValueError, match="mine"), late_progress("converting", after=0.0):
+        sleep(0.3)
+        raise ValueError("mine")
+    assert stderr.text.rstrip("\r\n").endswith("\x1b[2K")
+
+
+def test_convert_counts_its_rows_and_recover_its_messages_up_to_all_of_them(tmp_path):
+    log = table(tmp_path / "run.csv", rows=40_000)
+    steps: list[tuple[int, int]] = []
+    convert(log, tmp_path / "out.csv", progress=lambda done, total: steps.append((done, total)))
+    assert steps == sorted(steps) and steps[-1] == (40_000, 40_000)
+    steps.clear()
+    part = write_part(tmp_path / "part.mcap", 0.0)
+    recover(part, tmp_path / "out.mcap", progress=lambda done, total: steps.append((done, total)))
+    assert steps[-1] == (192, 192)

@@ -1,0 +1,54 @@
+"""Tables in terminals of 60 and 80 columns: names and numbers are not split, and every column is shown."""
+
+from __future__ import annotations
+
+import re
+import sys
+
+import pytest
+
+from cdtool.commands.console.console import column_blocks, column_width, table
+
+HEADINGS = [("group", "left"), ("detector", "left"), ("latency\nms", "right"), ("range\nms", "right"), ("why", "left")]
+ROWS = [
+    ("stiff", "inertial_momentum", "128.5", "30.0 to 34.0 / 30.0 to 34.0", "too few contacts could be assessed at all"),
+    ("holdout", "kalman_momentum", "-", "-", ""),
+]
+
+
+@pytest.fixture
+def terminal(monkeypatch, capsys):
+    """terminal(columns): print the table in a terminal of that width; return its lines."""
+
+    def shown(columns: int, rows=ROWS) -> list[str]:
+        monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+        monkeypatch.setenv("COLUMNS", str(columns))
+        table(HEADINGS, rows)
+        return re.sub("\x1b\\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+
+    return shown
+
+
+@pytest.mark.parametrize("columns", [60, 80, 200])
+def test_no_name_or_number_is_split_and_no_column_is_left_out(terminal, columns):
+    lines = terminal(columns)
+    assert max(map(len, lines)) <= columns
+    text = "\n".join(lines)
+    assert all(row[i] in text for row in ROWS for i in range(4))
+    assert all(word in text.split() for word in ROWS[0][4].split())
+    assert sum("inertial_momentum" in line for line in lines) == {60: 3, 80: 2, 200: 1}[columns]
+
+
+def test_a_name_longer_than_the_terminal_is_folded_without_loss(terminal):
+    name = "x" * 150
+    lines = terminal(60, [("stiff", name, "1", "2", "")])
+    assert sum(line.count("x") for line in lines) % 150 == 0 and max(map(len, lines)) <= 60
+
+
+def test_blocks_repeat_the_names_and_keep_the_order():
+    widths = [
+        column_width(heading, side, [row[i] for row in ROWS], i < 2) for i, (heading, side) in enumerate(HEADINGS)
+    ]
+    assert column_blocks(widths, 200) == [[0, 1, 2, 3, 4]]
+    assert column_blocks(widths, 62) == [[0, 1, 2], [0, 1, 3], [0, 1, 4]]
+    assert [i for block in column_blocks(widths, 62) for i in block if i > 1] == [2, 3, 4]

@@ -1,0 +1,228 @@
+"""`benchmark`, `detect --benchmark` and `explain --benchmark` agree on every number of the same recording."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdtool.commands.console.console import number
+from cdtool.commands.detecting import prepared_detector
+from tests.command import cdtool
+
+SAMPLES = Path(__file__).parents[3] / "sample_logs"
+OF_THE_LOG = ("recording", "group", "detector")
+# Other settings that affect numbers, all different from their defaults.
+SETTINGS = """
+joints = {joints}
+operations = "motion"
+window_s = 0.4
+[activation]
+debounce = 12
+hysteresis = 0.1
+[signature]
+safety_factor = 4.0
+[onset]
+above_n = {above}
+hold_s = 0.005
+sigmas = 6.0
+separation_s = 0.5
+synchronisation_s = 0.004
+labels = "labels.csv"
+[force]
+mass_before_cell_kg = {mass}
+"""
+
+
+@pytest.fixture(autouse=True)
+def learn_once(monkeypatch):
+    """Learn the threshold once per file and detector instead of in each command."""
+    monkeypatch.setattr(prepared_detector, "prepare_benchmark", cache(prepared_detector.prepare_benchmark))
+
+
+def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
+    """Return a copy of a sample's benchmark in which every setting that affects numbers differs from its default."""
+    base = SAMPLES / sample
+    values = tomllib.loads((base / "benchmark.toml").read_text(encoding="utf-8"))
+    gate = sample == "gate"
+
+    def logs(table: dict[str, Any]) -> str:
+        return json.dumps([str(base / pattern) for pattern in table["logs"]])
+
+    groups = "".join(f"[impacts.{name}]\nlogs = {logs(item)}\n" for name, item in values["impacts"].items())
+    settings = SETTINGS.format(
+        joints='["gate"]' if gate else '["arm"]', above=30.0 if gate else 0.8, mass=20.0 if gate else 0.0
+    )
+    first = sorted((base / "stiff").glob("*.csv"))[0]
+    (folder / "labels.csv").write_text(
+        f"recording,start_s,end_s,kind,uncertainty_s\n{first},{6.25 if gate else 1.5},,bump,0.02\n", encoding="utf-8"
+    )
+    head = f'machine = "{base / "machine.toml"}"\ndetectors = {json.dumps(values["detectors"])}\n'
+    file = folder / "benchmark.toml"
+    top, tables = settings.split("[activation]")
+    file.write_text(
+        f"{head}{top}[activation]{tables}[learn]\nlogs = {logs(values['learn'])}\n{groups}", encoding="utf-8"
+    )
+    return file
+
+
+def rows_of(values: Any) -> dict[tuple[str, int], dict[str, Any]]:
+    """Contact rows by log and number, without the fields that only a benchmark has."""
+    found = {}
+    for row in values:
+        log = str(row.get("recording") or row["operation"].partition("#")[0])
+        found[log, row["contact"]] = {
+            name: value for name, value in row.items() if name not in (*OF_THE_LOG, "operation")
+        }
+    return found
+
+
+def check(file: Path, detector: str) -> int:
+    done = cdtool("benchmark", file, "--json", "--detectors", detector)
+    assert done.status in (0, 1, 3), done.err
+    results = json.loads(done.out)
+    truth = rows_of(results["contacts"])
+    assert truth
+    paths = sorted({str(file.parent / log) for log, _ in truth})
+    detected = cdtool("detect", *paths, "--benchmark", file, "--detector", detector, "--json")
+    items = json.loads(detected.out)
+    assert rows_of([row for item in items for row in item["contacts"]]) == truth
+    shown = cdtool("detect", *paths, "--benchmark", file, "--detector", detector).out
+    false = {}
+    for path in paths:
+        values = json.loads(cdtool("explain", path, "--benchmark", file, "--detector", detector, "--json").out)
+        own = rows_of(values["contacts"])
+        assert own and all(truth[key] == row for key, row in own.items())
+        alarms = {item["time_s"]: item for item in values["alarms"] if item["role"] == "detection"}
+        missed = {item["onset_s"]: item for item in values["missed"]}
+        for row in own.values():
+            if row["outcome"] == "detected":
+                item = alarms[row["alarm_s"]]
+                for name in ("onset_s", "statistic", "limit", "side", "joint"):
+                    assert item[name] == row[name]
+                (late,) = re.findall(r"(-?\d+) ms after the contact", item["words"][0]) or [None]
+                if late is not None and not row["clipped"]:
+                    assert int(late) == round(row["latency_ms"])
+                assert number(row["latency_ms"], 3) in shown
+            else:
+                assert missed[row["onset_s"]]["watched_ms"] == row["watched_ms"]
+        for item in values["alarms"]:
+            if item["role"] == "false alarm":
+                false[item["operation"].partition("#")[0], item["time_s"]] = item["statistic"]
+    names = {item["recording"] for item in results["recordings"] if item["group"] != "holdout"}
+    alone = [item for item in results["false_alarms"] if item["recording"] in names]
+    assert {(item["recording"], item["time_s"]): item["statistic"] for item in alone} == false
+    return len(truth)
+
+
+@pytest.mark.parametrize(
+    ("sample", "detector"), [("gate", "pi"), ("gate", "pt"), ("arm/trial_1", "igm"), ("arm/trial_2", "gm")]
+)
+def test_of_every_impact_of_the_sample_logs(sample, detector):
+    assert check(SAMPLES / sample / "benchmark.toml", detector) == (8 if sample == "gate" else 6)
+
+
+@pytest.mark.parametrize(("sample", "detector"), [("gate", "gm"), ("arm/trial_1", "igm")])
+def test_with_every_relevant_setting_changed_from_its_default(sample, detector, tmp_path):
+    assert check(benchmark_with_other_settings(tmp_path, sample), detector) >= 6
+
+
+def test_individual_options_give_the_results_of_the_file(tmp_path):
+    """The results of `detect` with individual options and with the file are the same: levels, limit, latency."""
+    log, machine = SAMPLES / "gate" / "soft" / "03.csv", SAMPLES / "gate" / "machine.toml"
+    file = tmp_path / "benchmark.toml"
+    file.write_text(
+        f'machine = "{machine}"\ndetectors = ["pi"]\nthreshold = {{ name = "limit", limits = 1.2 }}\n'
+        f'[learn]\nlogs = ["{SAMPLES}/gate/free/*.csv"]\n[impacts.soft]\nlogs = ["{log}"]\nwindow_s = 0.7\n'
+        "[onset]\nabove_n = 25.0\nback_to_n = 5.0\nhold_s = 0.004\nseparation_s = 0.8\nsynchronisation_s = 0.003\n"
+        "[force]\nmass_before_cell_kg = 10.0\n",
+        encoding="utf-8",
+    )
+    options = ("--window", 0.7, "--onset-above", 25, "--onset-back-to", 5, "--onset-hold", 0.004)
+    options += ("--onset-separation", 0.8, "--synchronisation", 0.003, "--mass-before-cell", 10)
+    by_file = json.loads(cdtool("benchmark", file, "--json").out)["contacts"]
+    for command in ("detect", "explain"):
+        by_hand = json.loads(cdtool(command, log, "-m", machine, "-d", "pi", "--limit", 1.2, *options, "--json").out)
+        rows = by_hand[0]["contacts"] if command == "detect" else by_hand["contacts"]
+        assert list(rows_of(rows).values()) == list(rows_of(by_file).values())
+
+
+@pytest.mark.parametrize("command", ["detect", "explain"])
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--machine", "m.toml"),
+        ("--operations", "whole"),
+        ("--limit", "3"),
+        ("--debounce", 3),
+        ("--no-latch",),
+        ("--onset-above", 3),
+        ("--onset-hold", 0),
+        ("--onset-sigmas", 5),
+        ("--labels", "l.csv"),
+        ("--window", 1),
+        ("--mass-before-cell", 0),
+    ],
+)
+def test_a_setting_together_with_the_benchmark_file_is_refused(command, option):
+    file = SAMPLES / "gate" / "benchmark.toml"
+    done = cdtool(command, SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, *option)
+    assert done.status == 2
+    assert done.err.startswith(
+        f"error: {'--latch' if option[0] == '--no-latch' else option[0]} cannot be combined with"
+    )
+
+
+def test_a_detector_is_required_if_the_file_has_several():
+    file = SAMPLES / "gate" / "benchmark.toml"
+    done = cdtool("explain", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file)
+    assert done.status == 2 and "names 5 detectors (give --detector, one of pure_inertia" in done.err
+    done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, "-d", "vo")
+    assert done.status == 2 and "does not name detector 'vo'" in done.err
+    done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "-d", "pi", "--limit", 3)
+    assert done.status == 2 and "no machine file is given (give --machine FILE or --benchmark FILE)" in done.err
+
+
+def test_a_signature_of_all_joints_fits_a_benchmark_file_without_joints(tmp_path):
+    gate = Path(__file__).parents[3] / "sample_logs" / "gate"
+    logs = sorted((gate / "free").iterdir())
+    made = cdtool("learn-signature", *logs, "-m", gate / "machine.toml", "-d", "feekf", "-o", tmp_path / "s.json")
+    assert made.status == 0, made.err
+    done = cdtool("detect", gate / "stiff" / "03.csv", "-b", gate / "benchmark.toml", "-s", tmp_path / "s.json")
+    assert done.status == 0 and "alarm" in done.out, done.err
+
+
+def test_detect_and_explain_count_the_same_runs_and_name_those_left_out(tmp_path):
+    gate = Path(__file__).parents[3] / "sample_logs" / "gate"
+    shutil.copy(gate / "machine.toml", tmp_path)
+    (tmp_path / "free").mkdir()
+    for i in range(3, 8):
+        shutil.copy(gate / "free" / f"0{i}.csv", tmp_path / "free")
+    # A stray run at half the speed and a copy of another run: neither is learned from.
+    lines = (gate / "free" / "08.csv").read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines]
+    slow = [rows[0], *([str(2 * int(row[0])), row[1], str(0.5 * float(row[2])), *row[3:]] for row in rows[1:])]
+    (tmp_path / "free" / "stray.csv").write_text("\n".join(map(",".join, slow)) + "\n", encoding="utf-8")
+    shutil.copy(gate / "free" / "03.csv", tmp_path / "free" / "twin.csv")
+    file = tmp_path / "benchmark.toml"
+    file.write_text(
+        f'machine = "machine.toml"\ndetectors = ["gm"]\n[learn]\nlogs = ["free/*.csv"]\n[signature]\nforce = true\n'
+        f'[impacts.stiff]\nlogs = ["{gate}/stiff/03.csv"]\n[onset]\nabove_n = 20.0\nback_to_n = 8.0\n',
+        encoding="utf-8",
+    )
+    scored = cdtool("benchmark", file, "-o", tmp_path / "results.json")
+    names = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))["provenance"]["learned_runs"]
+    assert len(names) == 5
+    for command in ("detect", "explain"):
+        done = cdtool(command, gate / "stiff" / "03.csv", "-b", file)
+        words = " ".join(done.out.split())
+        assert f"{'learned from' if command == 'detect' else 'Compared with'} 5 impact-free runs" in words
+        for name in ("free/stray.csv", "free/twin.csv"):
+            assert f"left out: {name}: " in done.err and f"left out: {name}: " in scored.err
+        assert done.status == scored.status == 3

@@ -1,0 +1,302 @@
+from __future__ import annotations
+
+import tomllib
+from dataclasses import asdict
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import OutputError, RecordingError, UsageError
+from cdtool.base.files.writing import replaced
+from cdtool.commands.convert.converting import convert
+from cdtool.commands.judging.runs import read_log
+from cdtool.formats.channels.reading import survey
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.formats.written_files import WRITERS
+from tests.command import cdtool
+from tests.commands.convert.kinds import KINDS, SEVERAL_CLOCKS, needs, table
+from tests.formats.container_files import assert_same, logged, machine_file, two_clocks
+
+
+def gate(folder: Path) -> tuple[Path, Path]:
+    machine = machine_file(folder)
+    machine.write_text(machine.read_text().replace('"time", unit = "s"', '"time", unit = "ms"'))
+    return table(folder / "run.csv"), machine
+
+
+@pytest.mark.parametrize(
+    ("there", "back"), [pair for pair in product(KINDS, KINDS) if ".csv" in pair or len({*pair}) == 1]
+)
+def test_a_table_is_unchanged_bit_for_bit_through_any_two_containers(there, back, tmp_path):
+    needs(there, back)
+    log, machine = gate(tmp_path)
+    first = convert(log, tmp_path / f"first{there}", machine=machine)
+    second = convert(first.files[0], tmp_path / f"second{back}", machine=first.machine_files[0])
+    original = logged(log, machine)
+    # A message's time in MCAP is an integer number of nanoseconds; its exact time is passed on to the next container.
+    assert_same(original, logged(first.files[0], first.machine_files[0]), exact_time=there != ".mcap")
+    assert_same(original, logged(second.files[0], second.machine_files[0]), exact_time=back != ".mcap")
+
+
+@pytest.mark.parametrize(("there", "back"), [*product(SEVERAL_CLOCKS, SEVERAL_CLOCKS)])
+def test_each_channel_keeps_its_own_clock_through_any_two_containers(there, back, tmp_path):
+    needs(there, back)
+    log, machine = two_clocks(tmp_path / "run.mcap"), machine_file(tmp_path)
+    original = logged(log, machine)
+    first = convert(log, tmp_path / f"first{there}", machine=machine)
+    second = convert(first.files[0], tmp_path / f"second{back}", machine=first.machine_files[0])
+    assert first.clocks == second.clocks == 2
+    result = logged(second.files[0], second.machine_files[0])
+    assert_same(original, result, exact_time=back != ".mcap")
+    assert len(result["speed"]) == 300 and len(result["acceleration"]) == 700
+
+
+def test_each_of_two_clocks_gets_its_own_csv_table_without_resampling(tmp_path):
+    log, machine = two_clocks(tmp_path / "run.mcap"), machine_file(tmp_path)
+    done = convert(log, tmp_path / "out.csv", machine=machine)
+    assert [Path(path).name for path in done.files] == ["out.1.csv", "out.2.csv"]
+    original = logged(log, machine)
+    parts = [logged(path, machine_path) for path, machine_path in zip(done.files, done.machine_files, strict=True)]
+    assert [set(part.channels) for part in parts] == [{"torque", "speed"}, {"acceleration"}]
+    for part in parts:
+        for name, series in part.channels.items():
+            assert series.values.tobytes() == original[name].values.tobytes()
+            assert series.time.tobytes() == original[name].time.tobytes()
+
+
+@pytest.mark.parametrize("suffix", [suffix for suffix in SEVERAL_CLOCKS if suffix != ".mf4"])
+def test_the_start_of_a_log_on_an_epoch_is_kept(suffix, tmp_path):
+    needs(suffix)
+    log = two_clocks(tmp_path / "run.mcap", start_ns=1_700_000_000_123_456_789)
+    machine = machine_file(tmp_path)
+    done = convert(log, tmp_path / f"out{suffix}", machine=machine)
+    assert logged(done.files[0], done.machine_files[0]).origin == logged(log, machine).origin > 1.6e9
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_without_a_machine_file_all_columns_are_written_with_their_units(suffix, tmp_path):
+    needs(suffix)
+    log, _ = gate(tmp_path)
+    done = convert(log, tmp_path / f"all{suffix}")
+    assert done.machine_files == () and done.columns == 3
+    columns = survey(tmp_path / f"all{suffix}").columns
+    for name, column in survey(log).columns.items():
+        short = name.split(" ")[0]
+        known = {short, f"{short} [{column.unit}]", f"/clock_1 {short}"}
+        (found,) = [column for key, column in columns.items() if key in known]
+        assert found.values.tobytes() == column.values.tobytes()
+        assert suffix == ".mcap" or found.unit == column.unit
+
+
+def test_the_new_machine_file_is_unchanged_except_for_the_channels(tmp_path):
+    log, machine = gate(tmp_path)
+    done = convert(log, tmp_path / "out.csv", machine=machine)
+    before, after = tomllib.loads(machine.read_text()), tomllib.loads(Path(done.machine_files[0]).read_text())
+    assert {k: v for k, v in before.items() if k != "channels"} == {k: v for k, v in after.items() if k != "channels"}
+    assert after["channels"]["speed_low_pass_hz"] == 40
+    assert "# m/s" in Path(done.machine_files[0]).read_text()
+    assert asdict(read_machine_file(done.machine_files[0]).machine) == asdict(read_machine_file(machine).machine)
+
+
+def test_a_robots_urdf_is_found_from_another_folder(tmp_path):
+    pytest.importorskip("pinocchio")
+    examples = Path(__file__).parents[3] / "docs" / "examples"
+    names = ["z", "q1", "q2", "vz", "w1", "w2", "i_z", "i_1", "i_2", "cell"]
+    rows = np.random.default_rng(1).normal(size=(50, len(names)))
+    text = "\n".join(",".join(map(repr, [k / 100, *row.tolist()])) for k, row in enumerate(rows))
+    (tmp_path / "run.csv").write_text(",".join(["t", *names]) + "\n" + text + "\n")
+    done = convert(tmp_path / "run.csv", tmp_path / "out.mcap", machine=examples / "scara.toml")
+    assert_same(
+        logged(tmp_path / "run.csv", examples / "scara.toml"), logged(done.files[0], done.machine_files[0]), False
+    )
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_every_file_states_its_origin(suffix, tmp_path):
+    needs(suffix)
+    log, machine = gate(tmp_path)
+    path = Path(convert(log, tmp_path / f"out{suffix}", machine=machine).files[0])
+    told = PROVENANCE[suffix](path)
+    original = logged(log, machine)
+    assert told["cdtool.source"] == "run.csv" and told["cdtool.sha256"] == original.digest
+    assert told["cdtool.machine"] == "gate" and len(told["cdtool.machine_fingerprint"]) == 64
+    assert told["cdtool.version"]
+
+
+def test_the_same_log_gives_the_same_bytes(tmp_path):
+    log, machine = gate(tmp_path)
+    for suffix in (".csv", ".mcap"):
+        one, two = (convert(log, tmp_path / f"{name}{suffix}", machine=machine).files[0] for name in "ab")
+        assert Path(one).read_bytes() == Path(two).read_bytes()
+
+
+def test_nothing_is_overwritten_without_force_and_the_log_never(tmp_path):
+    log, machine = gate(tmp_path)
+    (tmp_path / "out.csv").write_text("mine")
+    with pytest.raises(UsageError, match=r"out\.csv: already exists"):
+        convert(log, tmp_path / "out.csv", machine=machine)
+    assert (tmp_path / "out.csv").read_text() == "mine"
+    convert(log, tmp_path / "out.csv", machine=machine, force=True)
+    assert (tmp_path / "out.csv").read_text() != "mine"
+    with pytest.raises(UsageError, match="is the log itself"):
+        convert(log, log, machine=machine, force=True)
+
+
+def test_a_write_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
+    log, machine = gate(tmp_path)
+    before = sorted(tmp_path.iterdir())
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("cdtool.formats.exports.csv_writing.write_csv_table", fail)
+    with pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space left on device"):
+        convert(log, tmp_path / "out.csv", machine=machine)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_an_unknown_suffix_lists_what_can_be_written(tmp_path):
+    log, _ = gate(tmp_path)
+    with pytest.raises(UsageError, match=r"'\.xlsx' cannot be written.*\.csv.*\.mcap.*\.parquet"):
+        convert(log, tmp_path / "out.xlsx")
+
+
+def test_a_log_without_a_clock_is_written_only_to_formats_without_one(tmp_path):
+    log = tmp_path / "run.csv"
+    log.write_text("a,b\n" + "".join(f"{k % 7},{k % 5}\n" for k in range(50)))
+    with pytest.raises(UsageError, match=r"no column of the log is recognised as its clock, and this container needs"):
+        convert(log, tmp_path / "out.mcap")
+    assert convert(log, tmp_path / "out.csv").columns == 2
+
+
+def of_csv(path: Path) -> dict[str, str]:
+    lines = [line[2:].split(": ", 1) for line in path.read_text().splitlines() if line.startswith("# ")]
+    return dict(lines)
+
+
+def of_mcap(path: Path) -> dict[str, str]:
+    from mcap.reader import make_reader
+
+    with path.open("rb") as file:
+        return dict(next(iter(make_reader(file).iter_metadata())).metadata)
+
+
+def of_parquet(path: Path) -> dict[str, str]:
+    import pyarrow.feather
+    import pyarrow.parquet
+
+    table = pyarrow.parquet.read_table(path) if path.suffix == ".parquet" else pyarrow.feather.read_table(path)
+    return {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
+
+
+def of_hdf5(path: Path) -> dict[str, str]:
+    import h5py
+
+    with h5py.File(path) as file:
+        return {key: str(value) for key, value in file.attrs.items()}
+
+
+def of_mdf(path: Path) -> dict[str, str]:
+    import asammdf
+
+    with asammdf.MDF(path) as log:
+        return dict(line.split(": ", 1) for line in str(log.header.description).splitlines())
+
+
+def of_tdms(path: Path) -> dict[str, str]:
+    import nptdms
+
+    return dict(nptdms.TdmsFile.read_metadata(path).properties)
+
+
+PROVENANCE = {
+    ".csv": of_csv,
+    ".mcap": of_mcap,
+    ".parquet": of_parquet,
+    ".feather": of_parquet,
+    ".h5": of_hdf5,
+    ".hdf5": of_hdf5,
+    ".mf4": of_mdf,
+    ".tdms": of_tdms,
+}
+
+
+def test_an_error_names_the_file_that_was_asked_for_and_not_the_temporary_one(tmp_path):
+    target = tmp_path / "out.parquet"
+    with pytest.raises(RecordingError, match=r"out\.parquet: no pyarrow") as told, replaced(target) as (part,):
+        raise RecordingError(f"{part}: no pyarrow", "pip install '.[parquet]'")
+    assert part.name not in str(told.value) and "pip install" in told.value.hint
+    assert list(tmp_path.iterdir()) == []
+
+
+GATE_TABLE = """[machine]
+type = "linear_axis"
+name = "gate"
+load_mass = 100.0
+coordinates = "load"
+[channels]
+time = { column = "t", unit = "s" }
+position = { column = "x", unit = "m" }
+torque = { column = "F", unit = "N" }
+"""
+
+
+def test_a_clock_that_begins_at_5_s_begins_there_in_mcap_too(tmp_path):
+    rows = "\n".join(f"{5 + i / 1000:.3f},{i / 1000},{i % 7}" for i in range(200))
+    (tmp_path / "log.csv").write_text(f"t,x,F\n{rows}\n", encoding="utf-8")
+    (tmp_path / "gate.toml").write_text(GATE_TABLE, encoding="utf-8")
+    done = convert(tmp_path / "log.csv", tmp_path / "log.mcap", machine=tmp_path / "gate.toml")
+    before = read_log(tmp_path / "log.csv", read_machine_file(tmp_path / "gate.toml"))
+    after = read_log(done.files[0], read_machine_file(done.machine_files[0]))
+    assert before["torque"].time[0] == 5.0
+    assert after["torque"].time.tolist() == before["torque"].time.tolist()
+    assert after.origin == before.origin
+
+
+def unverified_log(path):
+    from mcap.writer import Writer
+
+    with path.open("wb") as file:
+        writer = Writer(file, enable_crcs=False)
+        writer.start()
+        channel = writer.register_channel("/a", "json", 0)
+        for i in range(20):
+            writer.add_message(channel, i * 10**6, b'{"data": %d}' % i, i * 10**6)
+        writer.finish()
+    return path
+
+
+def test_unverified_data_stays_unverified_and_marked_after_converting(tmp_path):
+    log = unverified_log(tmp_path / "log.mcap")
+    done = cdtool("convert", log, tmp_path / "out.mcap")
+    assert done.status == 0 and "20 of 20 messages without a checksum: unverified" in done.err
+    assert any(
+        "20 of 20 messages without a checksum" in str(finding) for finding in survey(tmp_path / "out.mcap").findings
+    )
+
+
+@pytest.mark.parametrize("suffix", KINDS)
+def test_names_that_are_equal_for_a_container_are_made_unique(suffix, tmp_path):
+    needs(suffix)
+    rows = "\n".join(f"{i / 100:.2f},{i},{-i}" for i in range(20))
+    (tmp_path / "log.csv").write_text(f"t [s],a.b,a/b\n{rows}\n", encoding="utf-8")
+    done = convert(tmp_path / "log.csv", tmp_path / f"out{suffix}")
+    ends = {(column.values[0], column.values[-1]) for column in survey(Path(done.files[0])).columns.values()}
+    assert {(0.0, 19.0), (0.0, -19.0)} <= ends
+
+
+def test_the_kinds_of_a_label_are_kept(tmp_path):
+    text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\ntime = { column = "t", unit = "s" }\n'
+    text += (
+        'speed = { column = "v", unit = "m/s" }\nlabel = { column = "k", kinds = { 1 = "hard", "2.5" = "so\\"ft" } }\n'
+    )
+    (tmp_path / "machine.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "log.csv").write_text(
+        "t,v,k\n" + "".join(f"{i / 10},0.{i},{i % 3}\n" for i in range(9)), encoding="utf-8"
+    )
+    machine = read_machine_file(tmp_path / "machine.toml")
+    convert(tmp_path / "log.csv", tmp_path / "new.h5", machine=machine)
+    again = read_machine_file(tmp_path / "new.h5.machine.toml")
+    assert {item.channel: item.kinds for item in again.columns.sources}["label"] == ((1.0, "hard"), (2.5, 'so"ft'))

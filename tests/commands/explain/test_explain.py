@@ -1,0 +1,262 @@
+"""`cdtool explain` from a user's view."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import cdtool as api
+from tests.command import Outcome, cdtool, one_line
+
+GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
+
+
+@pytest.fixture
+def explain(gate_folder: Path) -> Callable[..., Outcome]:
+    def run(log: str, *arguments: object) -> Outcome:
+        return cdtool("explain", gate_folder / log, "-m", gate_folder / "machine.toml", *arguments)
+
+    return run
+
+
+def margins(text: str) -> list[list[float]]:
+    """The number rows of the printed tables."""
+    rows = [line.split() for line in text.splitlines()]
+    return [[float(cell) for cell in row] for row in rows if row and all(is_number(cell) for cell in row)]
+
+
+def is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def test_the_help_contains_an_example():
+    done = cdtool("explain", "--help")
+    assert done.status == 0 and "Example: cdtool explain" in one_line(done.out)
+
+
+def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_mover(explain, feekf_signature, tmp_path):
+    plot = tmp_path / "why.svg"
+    done = explain("stiff/01.csv", "-s", feekf_signature, "--plot", plot)
+    assert done.status == 0 and done.err == ""
+    told = " ".join(done.out.split())
+    assert "ms after the contact (onset at" in told and "load cell)" in told
+    assert "gate: above its upper limit" in told and "debounce: 9 consecutive samples outside" in told
+    assert "Moved first: acceleration down" in told
+    assert "Likely cause: a contact: speed of gate" in told and "N (normal:" in told
+    assert "Compared with 11 impact-free runs at the same position in the motion." in told
+    assert "References:" in told and "reference_speed within the usual range" in told
+    assert "speed down" in told and "speed" not in told.partition("Within their usual range")[2].partition(".")[0]
+    rows = margins(done.out)
+    assert [row[1] for row in rows if row[0] != 0.0] == pytest.approx([-100, -50, -20, -10, -5, 0])
+    for _, _, signal, limit, margin, share in rows:
+        assert margin == pytest.approx(limit - signal, abs=1.1)  # both are printed with four digits
+        assert (margin < 0.0) == (share > 100.0)
+    assert max(map(len, done.out.splitlines())) <= 100
+    assert f"plot written to {plot}" in done.out and plot.read_text().count("<svg") == 1
+
+
+def test_a_missed_contact_is_explained_with_its_closest_approach(explain):
+    done = explain("soft/02.csv", "-d", "pi", "--limit", "30")
+    told = " ".join(done.out.split())
+    assert done.status == 0
+    assert "missed: no alarm within 1000 ms" in told
+    assert "from its limit of" in told and "For 9 consecutive samples it was at" in told
+    assert "First input of pure_inertia: acceleration" in told
+    assert max(map(len, done.out.splitlines())) <= 100
+
+
+def test_a_low_limit_gives_a_false_alarm_that_points_to_the_command(explain):
+    done = explain("holdout/01.csv", "-d", "gm", "--limit", "100")
+    told = " ".join(done.out.split())
+    assert done.status == 0
+    assert "false alarm at" in told and "no contact belongs to it" in told
+    assert "The command moved first" in told
+    assert "from onset" not in told and "to alarm" in told
+
+
+def test_a_log_without_events_states_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
+    done = explain("holdout/01.csv", "-s", feekf_signature, "--plot", tmp_path / "why.png")
+    assert done.status == 0 and "no alarm and no missed contact" in " ".join(done.out.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_json_is_strict_and_contains_every_number(explain):
+    done = explain("soft/01.csv", "-d", "pi", "--limit", "30", "--json")
+    values = json.loads(done.out, parse_constant=lambda name: pytest.fail(name))
+    (missed,) = values["missed"]
+    assert values["alarms"] == [] and values["verdicts"][0]["verdict"] == "no alarm"
+    near = missed["joints"][0]
+    assert missed["outcome"] == "missed" and missed["debounce_samples"] == 9
+    assert near["nearest"]["margin"] == pytest.approx(30.0 - abs(near["nearest"]["statistic"]))
+    assert near["nearest"]["share_of_limit"] == pytest.approx(abs(near["nearest"]["statistic"]) / 30.0)
+    assert near["outside_before_contact_from_s"] is None
+    still = [item for item in missed["moved"] if item["time_s"] is None]
+    assert {item["reason"] for item in still} == {"no departure found"}
+    assert missed["not_compared_because"] == "limits set by hand" and missed["compared_with_runs"] == 0
+
+
+def test_the_json_has_the_cause_and_the_comparison_of_every_channel(explain, feekf_signature):
+    (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
+    cause = alarm["likely_cause"]
+    assert cause["kind"] == "contact" and cause["transient"] is None and cause["lost"] is None
+    assert [shift["channel"] for shift in cause["shifts"]] == ["speed", "torque"]
+    assert alarm["not_compared_because"] is None and alarm["compared_with_runs"] > 5
+    for item in alarm["moved"]:
+        assert item["normal_spread"] > 0.0 and item["unit"]
+        if item["time_s"] is not None:
+            assert abs(item["value"] - item["normal_mean"]) > 3.0 * item["normal_spread"]
+
+
+def test_an_older_signature_file_gets_a_hint_to_relearn_it(explain, feekf_signature, tmp_path):
+    values = json.loads(feekf_signature.read_text())
+    del values["normal_motion"]
+    old = tmp_path / "old.json"
+    old.write_text(json.dumps({**values, "schema_version": 3}))
+    told = " ".join(explain("stiff/01.csv", "-s", old).out.split())
+    assert "No impact-free runs to compare with: the signature file has no normal motion" in told
+    assert "relearn it with cdtool learn-signature" in told
+    assert "usual range" not in told
+
+
+def test_the_alarm_in_the_json_is_that_of_detect(explain, feekf_signature, gate_folder):
+    (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
+    machine = ("-m", gate_folder / "machine.toml", "-s", feekf_signature, "--json")
+    (detected,) = json.loads(cdtool("detect", gate_folder / "stiff/01.csv", *machine).out)
+    for key in ("time_s", "joint", "side", "statistic", "limit"):
+        assert alarm[key] == detected["alarms"][0][key]
+    assert alarm["onset_s"] == detected["contacts"][0]["onset_s"] and alarm["role"] == "detection"
+    assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(0.008)
+
+
+def test_the_given_debounce_is_the_one_shown(explain):
+    for debounce in (1, 4):
+        done = explain("stiff/01.csv", "-d", "gm", "--limit", "250", "--debounce", debounce, "--json")
+        (alarm,) = json.loads(done.out)["alarms"]
+        assert alarm["debounce_samples"] == debounce
+        assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(1e-3 * (debounce - 1))
+
+
+def test_a_folder_gets_a_figure_of_every_event(explain, tmp_path):
+    done = explain("stiff/01.csv", "-d", "gm", "--limit", "100", "--plot", tmp_path)
+    events = done.out.count(", momentum: ")
+    assert events >= 2
+    assert [path.name for path in sorted(tmp_path.iterdir())] == [f"{i:03d}_01.png" for i in range(1, events + 1)]
+
+
+def test_an_arm_is_explained_joint_by_joint():
+    arm = GATE.parent / "arm" / "trial_1"
+    done = cdtool("explain", arm / "stiff" / "01.csv", "-m", arm / "machine.toml", "-d", "gm", "--limit", "4", "--json")
+    (alarm,) = json.loads(done.out)["alarms"]
+    assert alarm["joint"] == "arm" and {item["joint"] for item in alarm["moved"]} == {"arm"}
+    assert alarm["moved"][0]["channel"] == "acceleration"
+    assert "position" in alarm["detector_reads"]  # a model of coupled links requires the pose
+
+
+@pytest.mark.parametrize(
+    ("log", "arguments", "words"),
+    [
+        ("stiff/01.csv", ("--limit", "250"), ("a limit requires a detector",)),
+        ("stiff/01.csv", ("-d", "gm"), ("a signature, a limit or a warm-up",)),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "many"), ("--limit", "many")),
+        ("stiff/01.csv", ("-d", "gmm", "--limit", "3"), ("gmm", "did you mean gm")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--plot", "why.gif"), ("why.gif", ".svg")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "from 1 to")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
+        ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
+        # The figure's folder is checked before the log.
+        ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "create")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is monitored")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is monitored")),
+        ("machine.toml", ("-d", "gm", "--limit", "3"), ("machine.toml",)),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(explain, log, arguments, words):
+    done = explain(log, *arguments)
+    assert done.status == 2 and done.out == ""
+    assert done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
+    assert all(word in done.err for word in words), done.err
+
+
+def test_a_partly_lost_log_is_explained_with_status_3(gate_folder, feekf_signature, tmp_path):
+    half = tmp_path / "half.csv"
+    half.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes()[:-20])
+    done = cdtool("explain", half, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
+    assert done.status == 3 and "alarm at" in one_line(done.out) and "last line" in one_line(done.err)
+
+
+def test_names_from_files_cannot_control_the_terminal(explain, gate_folder, tmp_path):
+    evil = tmp_path / "a\x1b[2Jb\u202ec.csv"
+    evil.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes())
+    done = cdtool("explain", evil, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", "250")
+    assert done.status == 0 and "\x1b" not in done.out and "\u202e" not in done.out
+
+
+def test_the_same_explanation_comes_from_python(gate_folder, feekf_signature, explain):
+    from cdtool.results.explanation.words import words
+
+    explained = api.explain(gate_folder / "stiff/01.csv", gate_folder / "machine.toml", signature=feekf_signature)
+    ((_, event),) = explained.events
+    (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
+    assert alarm["words"] == words(event) and alarm["time_s"] == event.alarm.time
+
+
+def test_the_examples_on_the_page_are_what_the_commands_print(tmp_path, monkeypatch):
+    root = GATE.parents[1]
+    page = (root / "docs" / "explain.md").read_text(encoding="utf-8")
+    (tmp_path / "sample_logs").symlink_to(root / "sample_logs")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"^```(?:sh|text)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 6
+    for commands, shown in zip(blocks[::2], blocks[1::2], strict=True):
+        for line in commands.splitlines():
+            words = [[*sorted(Path().glob(word))] if "*" in word else [word] for word in shlex.split(line)]
+            done = cdtool(*itertools.chain(*words[1:]))
+            assert done.status == 0, done.err
+        printed = [line.rstrip() for line in done.out.split("\nplot written")[0].rstrip().splitlines()]
+        assert printed == shown.splitlines()
+
+
+@pytest.mark.parametrize(("columns", "width"), [(40, 60), (72, 72), (200, 100)])
+def test_sentences_are_as_wide_as_the_terminal_from_60_to_100_columns(monkeypatch, columns, width):
+    from cdtool.commands.console import console as module
+
+    monkeypatch.setattr(module.sys.stdout, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert module.columns_to_fill() == width
+
+
+def test_a_pipe_gets_100_columns_for_any_terminal(monkeypatch):
+    from cdtool.commands.console import console as module
+
+    monkeypatch.setattr(module.sys.stdout, "isatty", lambda: False, raising=False)
+    monkeypatch.setenv("COLUMNS", "70")
+    assert module.columns_to_fill() == 100
+
+
+def test_an_update_of_the_signature_updates_what_is_normal_too(gate_folder, feekf_signature, tmp_path):
+    copy = tmp_path / "gate.json"
+    copy.write_bytes(feekf_signature.read_bytes())
+    before = json.loads(copy.read_text())["normal_motion"][0]
+    done = cdtool("signature", "update", copy, gate_folder / "holdout" / "01.csv", "-m", gate_folder / "machine.toml")
+    assert done.status == 0, done.err
+    after = json.loads(copy.read_text())["normal_motion"][0]
+    assert (before["runs"], after["runs"]) == (11, 12)
+    one, other = (item["channels"]["torque"]["samples"]["by_travel"]["mean"][50][0] for item in (before, after))
+    assert one != other and other == pytest.approx(one, rel=0.05)
+
+
+def test_a_benchmark_compares_its_events_with_the_runs_learned_from(gate_folder):
+    done = api.benchmark(gate_folder / "benchmark.toml", detectors=["pt"])
+    told = [line for trace in done.traces for panel in trace.panels for line in panel.why]
+    assert any(line.startswith("Compared with 11 impact-free runs") for line in told), told[:5]
+    assert any(line.startswith("Likely cause: a contact") for line in told)

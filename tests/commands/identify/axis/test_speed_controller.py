@@ -1,0 +1,454 @@
+"""Controllers identified from simulated gates, from the EMPS axis, and from a plain Python controller of this file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import cdtool
+from cdtool.base.arrays import FloatArray
+from cdtool.commands.identify.axis.speed_controller import (
+    ControllerFit,
+    ControllerKind,
+    ControllerSettings,
+    identify_controller,
+)
+from cdtool.commands.identify.axis.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
+from cdtool.commands.identify.estimate import Estimate, IdentificationError, Missing, NotIdentifiable
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import as_recording
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
+from cdtool.recordings.recording import Recording, Series
+from tests.data_folder import DATA, needs_data
+
+GATE = GateParameters()
+TRUE = {
+    "speed_gain": GATE.speed_gain,
+    "integral_gain": GATE.integral_gain,
+    "anti_windup_rate": GATE.anti_windup_rate,
+    "slew_limit": GATE.force_slew_limit,
+}
+EXAMPLES = Path(__file__).parents[4] / "docs" / "examples"
+
+
+@pytest.fixture(scope="module")
+def gate() -> list[Recording]:
+    runs = [simulate_gate_run(GATE, np.random.default_rng([1, number]), "none") for number in range(14)]
+    return [as_recording(run, f"run {number}", GATE) for number, run in enumerate(runs)]
+
+
+@pytest.fixture(scope="module")
+def runs(gate: list[Recording]) -> list[AxisRun]:
+    return [axis_run(recording) for recording in gate]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loop:
+    """A sampled controller in plain Python; its speeds and references are random, no machine is simulated."""
+
+    speed_gain: float = 500.0
+    integral_gain: float = 3000.0
+    position_gain: float = 0.0
+    anti_windup_rate: float = 8.0
+    slew_limit: float = math.inf
+    force_limit: float = math.inf
+    feed_forward: float = 0.0
+    delay: int = 0
+    period: float = 1e-3
+
+    def run(self, seed: int, count: int = 3000) -> AxisRun:
+        rng = np.random.default_rng(seed)
+        reference = smooth(rng, count, 200.0, 0.3)
+        speed = reference + smooth(rng, count, 30.0, 0.01) + 0.02 * np.linspace(-1.0, 1.0, count)
+        position = np.cumsum(speed) * self.period
+        target = np.cumsum(reference) * self.period + smooth(rng, count, 100.0, 1e-3)
+        error = reference + self.position_gain * (target - position) - speed
+        command = self.command(error) + self.feed_forward * np.gradient(reference, self.period)
+        return AxisRun(
+            f"seed {seed}",
+            0.0,
+            self.period,
+            command.copy(),
+            speed=speed,
+            position=position,
+            reference_position=target if self.position_gain else None,
+            reference_speed=reference,
+            reference_torque=np.concatenate((np.full(self.delay, command[0]), command[: count - self.delay])),
+        )
+
+    def command(self, error: FloatArray) -> FloatArray:
+        integral, command, commands = 0.0, None, []
+        for value in error.tolist():
+            wanted = self.speed_gain * value + integral
+            change = self.slew_limit * self.period
+            command = wanted if command is None else command + min(max(wanted - command, -change), change)
+            command = min(max(command, -self.force_limit), self.force_limit)
+            integral += (self.integral_gain * value + self.anti_windup_rate * (command - wanted)) * self.period
+            commands.append(command)
+        return np.array(commands)
+
+
+def smooth(rng: np.random.Generator, count: int, samples: float, deviation: float) -> FloatArray:
+    """Return a random signal whose correlation ends after about so many samples."""
+    noise = np.convolve(rng.standard_normal(count + 1000), np.exp(-np.arange(1000) / samples), "same")
+    noise = np.convolve(noise, np.exp(-np.arange(1000) / samples), "same")[500 : 500 + count]
+    return np.asarray(deviation * noise / np.std(noise))
+
+
+def coloured(rng: np.random.Generator, count: int, deviation: float, samples: float) -> FloatArray:
+    """Return first-order coloured noise."""
+    keep, values, value = math.exp(-1.0 / samples), np.empty(count), 0.0
+    for index, white in enumerate(rng.standard_normal(count).tolist()):
+        value = keep * value + math.sqrt(1.0 - keep**2) * deviation * white
+        values[index] = value
+    return values
+
+
+def measured_only(run: AxisRun) -> AxisRun:
+    return replace(run, reference_torque=None)
+
+
+def missing(fit: ControllerFit, key: str) -> NotIdentifiable:
+    (found,) = (item for item in fit.identified.not_identifiable if item.key == key)
+    return found
+
+
+def deviation(estimate: Estimate, true: float) -> float:
+    """Return how many standard errors an estimate is off."""
+    return abs(estimate.value - true) / estimate.standard_error
+
+
+def simulated(error: FloatArray, **values: float) -> FloatArray:
+    rest = {"period": 1e-3, "slew_limit": math.inf, "force_limit": math.inf, "substeps": 1.0}
+    numbers = tuple({**dict.fromkeys(PARAMETER_ORDER, 0.0), **rest, **values}[name] for name in PARAMETER_ORDER)
+    inputs = np.vstack((error, np.zeros((2, len(error)))))
+    output = np.empty(len(error))
+    simulate_controller(numbers, np.array([0, len(error)]), np.zeros(1), np.array([np.nan]), inputs, output)
+    return output
+
+
+# The kernel
+
+
+def test_the_integral_of_a_constant_error_is_a_ramp() -> None:
+    force = simulated(np.full(500, 0.1), speed_gain=1000.0, integral_gain=5000.0)
+    np.testing.assert_allclose(force, 100.0 + 0.5 * np.arange(500), rtol=1e-12)
+
+
+def test_a_lag_follows_a_step_exponentially() -> None:
+    error = np.concatenate((np.zeros(10), np.full(100, 0.1)))
+    force = simulated(error, speed_gain=1000.0, lag=0.02)
+    np.testing.assert_allclose(force[10:], 100.0 * (1.0 - np.exp(-np.arange(1, 101) / 20.0)), rtol=1e-12)
+
+
+def test_a_delay_is_a_shift_and_substeps_leave_a_proportional_controller_as_it_is() -> None:
+    error = np.sin(np.arange(300) / 20.0)
+    force = simulated(error, speed_gain=2.0, delay_samples=3.0, substeps=4.0)
+    np.testing.assert_allclose(force[3:], 2.0 * error[:-3], atol=1e-12)
+
+
+@pytest.mark.parametrize("loop", [Loop(), Loop(slew_limit=900.0), Loop(force_limit=6.0, slew_limit=2000.0)])
+def test_the_kernel_is_the_controller_in_plain_python(loop: Loop) -> None:
+    run = loop.run(1)
+    assert run.reference_speed is not None and run.speed is not None and run.reference_torque is not None
+    gains = {"speed_gain": loop.speed_gain, "integral_gain": loop.integral_gain, "anti_windup_rate": 8.0}
+    limits = {"slew_limit": loop.slew_limit, "force_limit": loop.force_limit}
+    force = simulated(run.reference_speed - run.speed, **gains, **limits)
+    np.testing.assert_allclose(force, run.reference_torque, atol=1e-9)
+
+
+# The simulated gate
+
+
+def test_a_logged_command_shows_every_parameter_of_the_gate(runs: list[AxisRun]) -> None:
+    fit = identify_controller(runs)
+    assert fit.kind is ControllerKind.PI and fit.is_command and fit.delay_samples == 0
+    for key, value in TRUE.items():
+        assert fit.identified[key].value == pytest.approx(value, rel=1e-6)
+    assert fit.identified["speed_filter_hz"].value == pytest.approx(60.0, rel=1e-3)
+    assert fit.controller is not None and fit.controller.speed_filter_order == 2
+    assert fit.controller.force_limit == math.inf
+    assert missing(fit, "force_limit").missing == (Missing.SATURATION,)
+    assert missing(fit, "force_limit").numbers["largest_n"] < GATE.force_limit
+
+
+def test_measured_torque_shows_the_gains_of_the_gate_within_their_standard_errors(runs: list[AxisRun]) -> None:
+    fit = identify_controller([measured_only(run) for run in runs])
+    assert fit.kind is ControllerKind.PI and not fit.is_command
+    for key in ("speed_gain", "integral_gain"):
+        assert fit.identified[key].value == pytest.approx(TRUE[key], rel=0.03)
+        assert fit.identified[key].relative_error < 0.02
+    for key, value in TRUE.items():
+        assert deviation(fit.identified[key], value) < 3.0
+    assert fit.lag == pytest.approx(GATE.current_lag + GATE.torque_filter_time, rel=0.3)
+
+
+def test_a_log_without_references_shows_the_gains_at_constant_speed(runs: list[AxisRun]) -> None:
+    blind = [replace(run, reference_speed=None) for run in runs]
+    fit = identify_controller(blind)
+    for key in ("speed_gain", "integral_gain"):
+        assert fit.identified[key].value == pytest.approx(TRUE[key], rel=0.01)
+    for key in ("anti_windup_rate", "slew_limit", "force_limit"):
+        assert missing(fit, key).missing == (Missing.REFERENCE_SPEED,)
+    measured = identify_controller([measured_only(run) for run in blind])
+    for key in ("speed_gain", "integral_gain"):
+        assert deviation(measured.identified[key], TRUE[key]) < 3.0
+        assert 0.005 < measured.identified[key].relative_error < 0.2
+
+
+def test_rounded_units_of_a_written_log_are_no_obstacle(tmp_path: Path) -> None:
+    folder = tmp_path / "gate"
+    cdtool.simulate_gate(folder, {"free": 3}, seed=3)
+    machine_file = read_machine_file(folder / "machine.toml")
+    fit = identify_controller(
+        [axis_run(cdtool.read(file, machine_file)) for file in sorted((folder / "free").iterdir())]
+    )
+    for key, value in TRUE.items():
+        assert fit.identified[key].value == pytest.approx(value, rel=5e-4)
+        assert deviation(fit.identified[key], value) < 3.0
+
+
+def test_the_torque_filter_separates_the_force_lag(runs: list[AxisRun]) -> None:
+    unknown = identify_controller(runs[:3])
+    assert missing(unknown, "force_lag").numbers["lag_s"] == pytest.approx(unknown.lag)
+    assert missing(unknown, "force_lag").missing == (Missing.TORQUE_FILTER,)
+    assert unknown.controller is not None and unknown.controller.force_lag == 0.0
+    known = identify_controller(runs[:3], ControllerSettings(torque_filter_time=GATE.torque_filter_time))
+    assert deviation(known.identified["force_lag"], GATE.current_lag) < 3.0
+    assert known.controller is not None and known.controller.force_lag == known.identified["force_lag"].value
+
+
+def test_a_gap_in_the_speed_costs_little(runs: list[AxisRun]) -> None:
+    gapped = []
+    for number, run in enumerate(runs[:3]):
+        assert run.speed is not None
+        speed = run.speed.copy()
+        speed[600 + 100 * number : 660 + 100 * number] = np.nan
+        gapped.append(replace(run, speed=speed))
+    fit = identify_controller(gapped)
+    for key, value in TRUE.items():
+        assert fit.identified[key].value == pytest.approx(value, rel=0.01)
+
+
+# Logs that are not the controller's own channels: wrong by no more than what they state
+
+
+def resampled(recording: Recording, step: int) -> Recording:
+    channels = {
+        name: Series(series.time[::step], series.values[::step, 0], series.unit)
+        for name, series in recording.channels.items()
+    }
+    return replace(recording, channels=channels)
+
+
+@pytest.mark.parametrize("step", [4, 10, 50])
+def test_a_log_slower_than_its_controller_has_larger_standard_errors(gate: list[Recording], step: int) -> None:
+    fit = identify_controller([axis_run(resampled(recording, step)) for recording in gate[:4]])
+    for key in ("speed_gain", "integral_gain", "slew_limit"):
+        assert deviation(fit.identified[key], TRUE[key]) < 3.0
+    assert fit.identified["speed_gain"].relative_error > 1e-3
+
+
+def test_a_speed_with_jittered_stamps_has_larger_standard_errors(gate: list[Recording]) -> None:
+    rng = np.random.default_rng(5)
+    jittered = []
+    for recording in gate[:4]:
+        speed = recording["speed"]
+        time = speed.time + 4e-4 + rng.uniform(-3e-4, 3e-4, len(speed))
+        channels = {**recording.channels, "speed": Series(time, speed.values[:, 0], "m/s")}
+        jittered.append(axis_run(replace(recording, channels=channels)))
+    fit = identify_controller(jittered)
+    for key, value in TRUE.items():
+        assert key not in fit.identified or deviation(fit.identified[key], value) < 3.0
+    assert 1e-4 < fit.identified["speed_gain"].relative_error < 0.02
+
+
+def with_noisy_speed(run: AxisRun) -> AxisRun:
+    assert run.speed is not None
+    return replace(run, speed=run.speed + 1e-3 * np.random.default_rng(5).standard_normal(len(run)))
+
+
+def test_noise_that_the_controller_never_saw_is_in_the_standard_errors(runs: list[AxisRun]) -> None:
+    noisy = [replace(with_noisy_speed(run), position=None, reference_torque=None) for run in runs[:3]]
+    fit = identify_controller(noisy)
+    assert abs(fit.identified["speed_gain"].value - GATE.speed_gain) > 100.0
+    for key in ("speed_gain", "integral_gain"):
+        assert deviation(fit.identified[key], TRUE[key]) < 3.0
+
+
+def test_a_noisy_speed_is_replaced_by_the_position_that_the_controller_used(runs: list[AxisRun]) -> None:
+    fit = identify_controller([with_noisy_speed(run) for run in runs[:3]])
+    assert fit.speed_from_position
+    for key, value in TRUE.items():
+        assert fit.identified[key].value == pytest.approx(value, rel=1e-4)
+
+
+def test_a_torque_feed_forward_is_not_counted_as_a_gain() -> None:
+    fit = identify_controller([Loop(feed_forward=100.0).run(seed) for seed in range(3)])
+    for key, value in (("speed_gain", 500.0), ("integral_gain", 3000.0)):
+        assert key not in fit.identified or deviation(fit.identified[key], value) < 3.0
+
+
+# Structures
+
+
+@pytest.mark.parametrize(
+    ("loop", "kind"),
+    [
+        (Loop(integral_gain=0.0), ControllerKind.P),
+        (Loop(), ControllerKind.PI),
+        (Loop(integral_gain=0.0, position_gain=20.0), ControllerKind.CASCADE_P),
+        (Loop(position_gain=20.0), ControllerKind.CASCADE_PI),
+    ],
+)
+def test_the_data_choose_the_structure(loop: Loop, kind: ControllerKind) -> None:
+    fit = identify_controller([loop.run(seed) for seed in range(3)])
+    assert fit.kind is kind
+    for key in ("speed_gain", "integral_gain", "position_gain"):
+        value = getattr(loop, key)
+        if value:
+            assert fit.identified[key].value == pytest.approx(value, rel=1e-6)
+        else:
+            assert key not in fit.identified
+            assert key not in [item.key for item in fit.identified.not_identifiable]
+    assert fit.controller is not None
+    assert fit.controller.position_gain == pytest.approx(loop.position_gain, rel=1e-6)
+
+
+@pytest.mark.parametrize("delay", [0, 1, 4])
+def test_a_delay_between_error_and_command_is_counted(delay: int) -> None:
+    fit = identify_controller([Loop(delay=delay).run(seed) for seed in range(2)])
+    assert fit.delay_samples == delay
+    assert fit.identified["delay"].value == pytest.approx(delay * 1e-3)
+    assert fit.identified["speed_gain"].value == pytest.approx(500.0, rel=1e-6)
+
+
+def test_a_force_limit_that_is_reached_is_identified_with_the_anti_windup() -> None:
+    loop = Loop(force_limit=8.0, speed_gain=800.0)
+    fit = identify_controller([loop.run(seed) for seed in range(3)])
+    assert fit.identified["force_limit"].value == pytest.approx(8.0, rel=1e-6)
+    assert fit.identified["anti_windup_rate"].value == pytest.approx(8.0, rel=1e-4)
+    assert missing(fit, "slew_limit").missing == (Missing.SATURATION,)
+
+
+def test_a_controller_without_limits_leaves_its_anti_windup_unknown() -> None:
+    fit = identify_controller([Loop().run(seed) for seed in range(2)])
+    for key in ("anti_windup_rate", "slew_limit", "force_limit"):
+        assert missing(fit, key).missing == (Missing.SATURATION,)
+    assert fit.controller is not None
+    assert (fit.controller.slew_limit, fit.controller.anti_windup_rate) == (math.inf, 0.0)
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.floats(10.0, 1e5), st.floats(1.0, 30.0), st.floats(1e-3, 1e3))
+def test_gains_of_any_size_are_identified_in_any_unit_of_force(gain: float, rate: float, unit: float) -> None:
+    run = Loop(speed_gain=gain * unit, integral_gain=gain * rate * unit).run(1, 1500)
+    fit = identify_controller([run])
+    assert fit.identified["speed_gain"].value == pytest.approx(gain * unit, rel=1e-5)
+    assert fit.identified["integral_gain"].value == pytest.approx(gain * rate * unit, rel=1e-4)
+
+
+def test_a_rotary_axis_has_its_own_units() -> None:
+    fit = identify_controller([Loop().run(1)], ControllerSettings(units=("N m", "rad")))
+    assert fit.identified["speed_gain"].unit == "N m s/rad"
+    assert fit.identified["integral_gain"].unit == "N m/rad"
+
+
+def test_the_standard_errors_cover_coloured_noise_of_the_torque() -> None:
+    """Over 12 sets of runs the mean square of (value - true) / standard error is near 1: within 0.2 and 2.2."""
+    loop, squares = Loop(), []
+    for group in range(12):
+        rng = np.random.default_rng([7, group])
+        noisy = []
+        for number in range(2):
+            run = measured_only(loop.run(100 * group + number, 2000))
+            noisy.append(replace(run, torque=run.torque + coloured(rng, len(run), 2.0, 10.0)))
+        fit = identify_controller(noisy)
+        squares.append(
+            [deviation(fit.identified[key], getattr(loop, key)) ** 2 for key in ("speed_gain", "integral_gain")]
+        )
+    mean = np.mean(squares, axis=0)
+    assert np.all(mean > 0.2) and np.all(mean < 2.2)
+
+
+# The EMPS axis
+
+
+@needs_data("emps/DATA_EMPS.mat")
+def test_the_emps_cascade_has_its_published_gains() -> None:
+    """Published: kp = 160.18 1/s, kv = 243.45 V s/m; 35.15 N/V."""
+    assert DATA is not None
+    recording = cdtool.read(DATA / "emps" / "DATA_EMPS.mat", read_machine_file(EXAMPLES / "emps.toml"))
+    fit = identify_controller([axis_run(recording)])
+    assert fit.kind is ControllerKind.CASCADE_P and fit.speed_from_position and not fit.speed_feed_forward
+    assert fit.identified["position_gain"].value == pytest.approx(160.18, rel=0.002)
+    assert fit.identified["speed_gain"].value == pytest.approx(243.45 * 35.15, rel=0.01)
+    assert "speed_filter_hz" in fit.identified
+
+
+@needs_data("emps/DATA_EMPS_PULSES.mat")
+def test_pulses_added_to_the_emps_command_are_not_counted_as_a_gain() -> None:
+    assert DATA is not None
+    recording = cdtool.read(DATA / "emps" / "DATA_EMPS_PULSES.mat", read_machine_file(EXAMPLES / "emps.toml"))
+    run = axis_run(recording)
+    # The first ten seconds, with ten of the pulses.
+    part = replace(run, **{name: getattr(run, name)[:10_000] for name in ("torque", "position", "reference_position")})
+    fit = identify_controller([replace(part, speed=None)])
+    assert "speed_gain" not in fit.identified or deviation(fit.identified["speed_gain"], 243.45 * 35.15) < 3.0
+
+
+# What cannot be identified
+
+
+def test_a_standstill_with_a_noisy_torque_shows_no_gains(runs: list[AxisRun]) -> None:
+    channels = ("torque", "speed", "position", "reference_speed")
+    still = [
+        replace(measured_only(run), **{channel: getattr(run, channel)[:290] for channel in channels})
+        for run in runs[:3]
+    ]
+    fit = identify_controller(still)
+    assert fit.controller is None
+    assert missing(fit, "speed_gain").missing == (Missing.ACCELERATION,)
+
+
+def test_references_of_another_motion_explain_nothing() -> None:
+    runs = [Loop().run(seed) for seed in range(3)]
+    turned = runs[1:] + runs[:1]
+    swapped = [replace(run, reference_speed=other.reference_speed) for run, other in zip(runs, turned, strict=True)]
+    fit = identify_controller(swapped)
+    assert fit.controller is None
+    assert missing(fit, "speed_gain").missing == (Missing.OTHER_CONTROLLER,)
+
+
+def test_unsteady_motion_without_references_shows_no_gains() -> None:
+    fit = identify_controller([replace(Loop().run(seed), reference_speed=None) for seed in range(2)])
+    assert fit.controller is None and "speed_gain" not in fit.identified
+    assert missing(fit, "speed_gain").missing == (Missing.REFERENCE_SPEED,)
+
+
+def test_a_position_alone_without_references_shows_nothing(runs: list[AxisRun]) -> None:
+    fit = identify_controller([replace(run, speed=None, reference_speed=None) for run in runs[:2]])
+    assert fit.controller is None and not fit.identified.estimates
+    assert math.isnan(fit.residual_rms)
+
+
+def test_a_wrong_sign_is_an_error_that_says_where_to_look() -> None:
+    run = Loop().run(1)
+    assert run.reference_torque is not None
+    with pytest.raises(IdentificationError, match=r"seed 1: .*falls where .*rises.*signs") as error:
+        identify_controller([replace(run, reference_torque=-run.reference_torque)])
+    assert "\n" not in str(error.value)
+
+
+def test_runs_of_different_rates_and_no_runs_are_refused() -> None:
+    with pytest.raises(IdentificationError, match="no runs"):
+        identify_controller([])
+    with pytest.raises(IdentificationError, match=r"0\.001 s, seed 2 every 0\.002 s"):
+        identify_controller([Loop().run(1), Loop(period=2e-3).run(2)])

@@ -1,0 +1,104 @@
+"""A torque that lags the motion is found and undone, and an axis whose torque does not lag keeps its mass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.commands.identify.axis.filtered_regression import LagForm, TorqueLag, shifted
+from cdtool.commands.identify.axis.rigid_axis import (
+    RigidAxisSettings,
+    identify_rigid_axis,
+    low_passed_force,
+    predict_force,
+)
+from cdtool.machines.axis_model.axis_run import AxisRun
+from cdtool.machines.axis_model.sensor_filters import first_order_low_pass
+from tests.commands.identify.axis.test_rigid_axis import TRUTH, emps, gate_runs, simulated
+from tests.data_folder import needs_data
+
+PERIOD = 5e-3
+QUICK = RigidAxisSettings(cross_validate=False)
+
+
+def low_passed(run: AxisRun, time_constant: float) -> AxisRun:
+    return replace(run, torque=first_order_low_pass(run.torque, time_constant, PERIOD))
+
+
+def delayed(run: AxisRun, time: float) -> AxisRun:
+    samples = round(time / PERIOD)
+    held = np.full(samples, run.torque[0])
+    return replace(run, torque=np.concatenate((held, run.torque[:-samples])))
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return simulated(3, acceleration=2.0)
+
+
+@pytest.mark.parametrize(("change", "time"), [(low_passed, 0.01), (low_passed, 0.05), (delayed, 0.02), (delayed, 0.05)])
+def test_a_lag_is_found_and_the_mass_is_that_without_it(runs, change, time):
+    fit = identify_rigid_axis([change(run, time) for run in runs], 0.0, QUICK)
+    uncorrected = identify_rigid_axis([change(run, time) for run in runs], 0.0, replace(QUICK, torque_filter_time=0.0))
+    assert (
+        fit.torque_lag.time
+        == fit.identified["torque_filter_time"].value
+        == pytest.approx(time, abs=max(4e-3, 0.1 * time))
+    )
+    assert fit.torque_lag.form is (LagForm.DELAY if change is delayed else LagForm.LOW_PASS)
+    assert fit.identified["load_mass"].value == pytest.approx(TRUTH["load_mass"], rel=0.03)
+    assert abs(fit.total_mass - TRUTH["load_mass"]) < 2.0 * fit.total_mass_error
+    assert abs(uncorrected.total_mass - TRUTH["load_mass"]) > 2.0 * abs(fit.total_mass - TRUTH["load_mass"])
+    assert uncorrected.torque_lag.time == 0.0 and "torque_filter_time" not in uncorrected.identified
+
+
+def test_a_stated_low_pass_is_undone_and_not_written_again(runs):
+    lagging = [low_passed(run, 0.05) for run in runs]
+    fit = identify_rigid_axis(lagging, 0.0, replace(QUICK, torque_filter_time=0.05))
+    plain = identify_rigid_axis(runs, 0.0, QUICK)
+    assert fit.torque_lag == TorqueLag(0.05) and "torque_filter_time" not in fit.identified
+    assert fit.total_mass == pytest.approx(plain.total_mass, rel=5e-3)
+    # Prediction and measured force are both without the lag.
+    error = predict_force(fit, lagging[0]) - low_passed_force(fit, lagging[0])
+    known = np.isfinite(error)
+    assert np.sqrt(np.mean(error[known] ** 2)) < 0.15 * np.nanstd(low_passed_force(fit, lagging[0]))
+
+
+def test_an_axis_whose_torque_does_not_lag_shows_no_lag(runs):
+    for free in (runs, simulated(4, noise=20.0), simulated(5, speeds=(0.2, 0.2)), gate_runs(3)):
+        fit = identify_rigid_axis(free, 0.0, QUICK)
+        assert fit.torque_lag.time == 0.0 and "torque_filter_time" not in fit.identified
+
+
+def test_gaps_do_not_hide_a_lag(runs):
+    rng = np.random.default_rng(1)
+    holed = []
+    for run in runs:
+        torque = low_passed(run, 0.05).torque.copy()
+        for first in rng.integers(0, len(torque) - 20, 5):
+            torque[first : first + 20] = np.nan
+        holed.append(replace(run, torque=torque))
+    fit = identify_rigid_axis(holed, 0.0, QUICK)
+    assert fit.torque_lag.time == pytest.approx(0.05, abs=5e-3)
+    assert fit.total_mass == pytest.approx(TRUTH["load_mass"], rel=0.03)
+
+
+def test_a_run_at_rest_beside_the_others_does_not_hide_their_lag(runs):
+    rest = replace(runs[0], torque=np.zeros(400), position=np.zeros(400))
+    fit = identify_rigid_axis([*(low_passed(run, 0.05) for run in runs), rest], 0.0, QUICK)
+    assert fit.torque_lag.time == pytest.approx(0.05, abs=5e-3)
+
+
+@pytest.mark.parametrize("samples", [-2.5, -1.0, 0.0, 0.25, 3.0])
+def test_a_shift_moves_a_line_and_marks_what_is_not_known(samples):
+    moved = shifted(np.arange(8.0), samples)
+    expected = np.arange(8.0) + samples
+    inside = (expected >= 0.0) & (expected <= 7.0)
+    assert np.array_equal(np.isfinite(moved), inside) and np.array_equal(moved[inside], expected[inside])
+
+
+@needs_data("emps/DATA_EMPS.mat")
+def test_a_real_axis_with_a_torque_from_its_command_has_no_lag():
+    assert identify_rigid_axis([emps()], 0.0, QUICK).torque_lag.time == 0.0

@@ -1,0 +1,275 @@
+"""Unseen torque, friction and decisions of robots: the same numbers as in the identification; and the command."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.commands.identify.identification_outputs import evidence_of, identification_summary
+from cdtool.commands.identify.identifying import IdentifiedMachine
+from cdtool.commands.identify.identifying_robot import LoadedRuns
+from cdtool.commands.identify.robot.robot_evidence import (
+    FrictionAnswer,
+    RobotJointEvidence,
+    decision_of,
+    excitation_needs,
+    robot_evidence,
+)
+from cdtool.commands.identify.robot.robot_run import robot_run
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.machines.planar_arm import PlanarArm
+from tests.command import cdtool as command
+from tests.commands.identify.robot_motion import channels_of, coloured, fourier, planar_arm, ur10e, write_log
+from tests.data_folder import UR10E_LOGS
+from tests.synthetic.robots import JOINTS, six_joint_urdf, urdf_robot
+
+ROOT = Path(__file__).parents[4]
+ARM = """[machine]
+type = "planar_arm"
+coordinates = "load"
+link_mass = [1.3, 1.6]
+link_length = 0.3
+centre_of_mass = [0.14, 0.18]
+link_inertia = [0.012, 0.018]
+coulomb_slope = 50.0
+"""
+TRUE = replace(
+    planar_arm(),
+    coordinates="load",
+    motor_inertia=(0.0, 0.0),
+    transmission_ratio=(1.0, 1.0),
+    viscous_friction=(0.4, 0.3),
+    coulomb_friction=(2.4, 1.8),
+    coulomb_slope=(50.0, 50.0),
+    constant_force=(0.3, -0.1),
+)
+RIGHT = "viscous_friction = [0.4, 0.3]\ncoulomb_friction = [2.4, 1.8]\nconstant_force = [0.3, -0.1]\n"
+
+
+def arm_files(folder: Path, text: str, noise: float) -> Path:
+    for seed in (1, 2):
+        motion = fourier(seed, 2, 12.0, 0.01)
+        write_log(folder / f"run{seed}.csv", motion.run(TRUE, noise * coloured(seed, (1200, 2), 5.0)))
+    path = folder / "machine.toml"
+    path.write_text(text + channels_of(2), encoding="utf-8")
+    return path
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[IdentifiedMachine, tuple[RobotJointEvidence, ...]]:
+    folder = tmp_path_factory.mktemp("arm")
+    path = arm_files(folder, ARM, 0.05)
+    logs = [str(folder / "run*.csv")]
+    done = cdtool.identify(logs, path)
+    return done, tuple(item.robot for item in evidence_of(done, logs, path) if item.robot)
+
+
+def test_new_friction_is_decided_and_drawn_as_it_is(arm) -> None:
+    done, evidence = arm
+    for joint, item in enumerate(evidence):
+        decision = decision_of(done, joint)
+        assert decision.answer is FrictionAnswer.NEW
+        assert decision.after < 0.1 * decision.before
+        assert item.units == ("N m", "rad")
+        curve = item.friction
+        truth = TRUE.viscous_friction[joint] * curve.points.abscissa
+        truth = truth + TRUE.coulomb_friction[joint] * np.sign(curve.points.abscissa) + TRUE.constant_force[joint]
+        fast = np.abs(curve.points.abscissa) > 0.2
+        assert curve.points.mean[fast] == pytest.approx(truth[fast], abs=0.15)
+        assert np.interp(0.5, curve.speed, curve.new) == pytest.approx(
+            0.5 * TRUE.viscous_friction[joint] + TRUE.coulomb_friction[joint] + TRUE.constant_force[joint], abs=0.1
+        )
+        # The file has no friction.
+        assert np.max(np.abs(curve.previous)) == 0.0
+
+
+def test_the_residual_of_unseen_parts_is_that_of_the_worst_run(arm) -> None:
+    done, evidence = arm
+    for joint, item in enumerate(evidence):
+        decision, unseen = decision_of(done, joint), item.unseen
+        assert unseen.of_runs == 2
+        assert rms(unseen.measured - unseen.predicted) == pytest.approx(decision.after, rel=0.3)
+        assert rms(unseen.measured - unseen.previous) == pytest.approx(decision.before, rel=0.3)
+        # Lines are interrupted at reversals.
+        assert np.isnan(unseen.predicted).any()
+        assert (np.diff(unseen.time) >= 0.0).all()
+
+
+def test_friction_that_is_right_is_kept_with_the_error_of_the_other(tmp_path: Path) -> None:
+    path = arm_files(tmp_path, ARM + RIGHT, 0.5)
+    logs = [str(tmp_path / "run*.csv")]
+    done = cdtool.identify(logs, path)
+    evidence = evidence_of(done, logs, path)
+    for joint, item in enumerate(evidence):
+        decision = decision_of(done, joint)
+        assert decision.answer is FrictionAnswer.NOT_BETTER
+        assert decision.after == pytest.approx(decision.before, rel=0.1)
+        assert item.robot is not None
+        assert item.robot.friction is not None
+        assert np.interp(0.5, item.robot.friction.speed, item.robot.friction.previous) == pytest.approx(
+            0.5 * TRUE.viscous_friction[joint] + TRUE.coulomb_friction[joint] + TRUE.constant_force[joint], abs=0.01
+        )
+    summary = identification_summary(done, evidence)
+    assert summary["joints"][0]["friction_decision"]["answer"] == "not_better"
+    assert summary["joints"][0]["motion"]["missing"] == []
+
+
+def test_a_joint_that_rests_has_nothing_but_its_need() -> None:
+    folder = ROOT / "sample_logs" / "arm" / "trial_1"
+    logs = [str(folder / "free" / "0[1-3].*")]
+    done = cdtool.identify(logs, folder / "machine.toml")
+    _, forearm = evidence_of(done, logs, folder / "machine.toml")
+    decision = decision_of(done, 1)
+    assert decision is not None
+    assert decision.answer is FrictionAnswer.NOT_MOVED
+    assert math.isnan(decision.before)
+    assert forearm.robot is not None
+    assert forearm.robot.unseen is None
+    assert excitation_needs(forearm.robot.motion)
+    # No speed is made up from the noise at rest.
+    assert all(not plan.speeds for plan in forearm.plan)
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, Any]]:
+    """What the command prints and writes as JSON of the UR10e."""
+    pytest.importorskip("pinocchio")
+    folder = tmp_path_factory.mktemp("ur10e")
+    ur10e(folder)
+    done = command(
+        "identify", UR10E_LOGS / "no_torque.csv.gz", "-m", folder / "machine.toml", "-o", folder / "ur10e.json"
+    )
+    assert done.status == 0, done.err
+    return done.out, json.loads((folder / "ur10e.json").read_text(encoding="utf-8"))
+
+
+def test_the_residuals_of_the_ur10e_are_those_that_chose_its_friction(
+    real: tuple[str, dict[str, Any]],
+) -> None:
+    joints = real[1]["joints"]
+    assert [joint["friction_decision"]["answer"] for joint in joints] == ["new", *["not_better"] * 3, "new", "new"]
+    for joint in joints:
+        # One run: what is shown is all of it.
+        decision, unseen = joint["friction_decision"], joint["unseen_run"]
+        assert unseen["error"] == pytest.approx(decision["after"], rel=1e-6)
+        assert unseen["previous_error"] == pytest.approx(decision["before"], rel=1e-6)
+        assert decision["form"] in ("friction", "friction_alone")
+
+
+def test_the_command_states_what_the_ur10e_does_not_show(real: tuple[str, dict[str, Any]]) -> None:
+    out, values = real
+    (line,) = [line for line in out.splitlines() if "full set of base parameters" in line]
+    assert "is not identifiable from this motion: condition number 91" in line
+    assert "of 36 not determined" in line
+    assert out.count("old: not better by more than one standard error") == 3
+    assert "errors do not contain how friction differs from day to day" in out
+    assert "joint3 over 2 rad at up to 0.56 rad/s (logged: 0.32 rad, 0.56 rad/s)" in out
+    assert values["inertia_plan"]["joints"][2]["logged_range"] == pytest.approx(0.32, abs=0.01)
+
+
+def loaded_arm(mass: float, along: float) -> PlanarArm:
+    """The arm whose forearm and a point mass are one body."""
+    total = 1.6 + mass
+    centre = (1.6 * 0.18 + mass * along) / total
+    inertia = 0.018 + 1.6 * (0.18 - centre) ** 2 + mass * (along - centre) ** 2
+    return replace(TRUE, link_mass=(1.3, total), centre_of_mass=(0.14, centre), link_inertia=(0.012, inertia))
+
+
+def currents(folder: Path) -> list[object]:
+    """Logs of the arm with currents in A, without and with a payload; returns the command's arguments."""
+    for name, machine, seed in (("free", TRUE, 1), ("loaded", loaded_arm(0.7, 0.25), 2)):
+        run = fourier(seed, 2, 12.0, 0.01).run(machine, 0.02 * coloured(seed, (1200, 2), 5.0))
+        write_log(folder / f"{name}.csv", replace(run, torque=run.torque / np.array([12.0, 8.0])))
+    (folder / "machine.toml").write_text(ARM + channels_of(2, "[10.0, 10.0]"), encoding="utf-8")
+    return ["identify", folder / "free.csv", "-m", folder / "machine.toml", "--loaded-logs", folder / "loaded.csv"]
+
+
+def test_the_command_identifies_torque_constants(tmp_path: Path) -> None:
+    arguments = [*currents(tmp_path), "--payload", 0.7, "--payload-link", "forearm", "--payload-centre", "0.25,0,0"]
+    outputs = ["-o", tmp_path / "new.toml", "-o", tmp_path / "new.html", "-o", tmp_path / "new.json"]
+    done = command(*arguments, *outputs)
+    assert done.status == 0, done.err
+    assert "channels.torque.scale" in done.out
+    values = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
+    assert values["channels"]["torque"]["scale"] == pytest.approx([12.0, 8.0], rel=0.03)
+    shown = json.loads((tmp_path / "new.json").read_text(encoding="utf-8"))["joints"]
+    # By the new constants the friction is that of the arm.
+    assert values["machine"]["coulomb_friction"] == pytest.approx([2.4, 1.8], rel=0.05)
+    assert all(joint["friction_decision"]["after"] < 0.2 for joint in shown)
+
+
+def test_torques_of_the_evidence_are_by_the_new_constants(tmp_path: Path) -> None:
+    currents(tmp_path)
+    payload = LoadedRuns((tmp_path / "loaded.csv",), 0.7, "forearm", (0.25, 0.0, 0.0))
+    path = tmp_path / "machine.toml"
+    done = cdtool.identify([tmp_path / "free.csv"], path, other_logs=payload)
+    run = robot_run(cdtool.read(tmp_path / "free.csv", read_machine_file(path)))
+    evidence = robot_evidence(done, [run], TRUE)
+    for joint, item in enumerate(evidence):
+        assert item.unseen is not None
+        decision = decision_of(done, joint)
+        assert decision is not None
+        assert rms(item.unseen.measured - item.unseen.predicted) == pytest.approx(decision.after, rel=0.05)
+
+
+def test_the_command_identifies_torque_constants_of_a_robot_from_a_urdf(tmp_path: Path) -> None:
+    pytest.importorskip("pinocchio")
+    urdf = six_joint_urdf(("revolute",) * 6)
+    heavier = urdf.replace('<mass value="0.8"/>', '<mass value="3.8"/>')
+    # A point mass of 3 kg at the centre of mass of the last link: its inertia there does not change.
+    values = {"joints": list(JOINTS), "drive_inertia": 0.3, "viscous_friction": 2.0, "coulomb_friction": 1.0}
+    (tmp_path / "other").mkdir()
+    loaded = urdf_robot(tmp_path / "other", heavier, {**values, "coulomb_slope": 50.0})
+    robot = urdf_robot(tmp_path, urdf, {**values, "coulomb_slope": 50.0})
+    constants = np.array([10.0, 12.0, 9.0, 30.0, 8.0, 7.0])
+    for name, machine, seed in (("free", robot, 1), ("loaded", loaded, 2)):
+        run = fourier(seed, 6, 8.0, 0.02).run(machine, 0.02 * coloured(seed, (400, 6), 5.0))
+        write_log(tmp_path / f"{name}.csv", replace(run, torque=run.torque / constants))
+    text = f"""[machine]
+type = "urdf_robot"
+urdf = "robot.urdf"
+joints = {json.dumps(list(JOINTS))}
+drive_inertia = 0.3
+viscous_friction = 2.0
+coulomb_friction = 1.0
+coulomb_slope = 50.0
+"""
+    (tmp_path / "machine.toml").write_text(text + channels_of(6, "[9.0, 9.0, 9.0, 9.0, 9.0, 9.0]"), encoding="utf-8")
+    command_line = ["identify", tmp_path / "free.csv", "-m", tmp_path / "machine.toml", "-o", tmp_path / "new.toml"]
+    payload = ["--loaded-logs", tmp_path / "loaded.csv", "--payload", 3.0, "--payload-centre", "0.15,0.05,0.08"]
+    done = command(*command_line, *payload)
+    assert done.status == 0, done.err
+    found = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))["channels"]["torque"]["scale"]
+    known = [joint for joint in range(6) if f"{JOINTS[joint]}: not identifiable: torque constant" not in done.out]
+    assert len(known) >= 4
+    assert [found[joint] for joint in known] == pytest.approx([constants[joint] for joint in known], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--payload-link", "hand"], "hand"),
+        (["--payload-centre", "0,0,0.1"], "off the link's axis"),
+    ],
+)
+def test_a_payload_that_does_not_fit_is_one_line_and_nothing_is_written(
+    tmp_path: Path, options: list[object], message: str
+) -> None:
+    arguments = [*currents(tmp_path), "--payload", 0.7, "-o", tmp_path / "new.toml", *options]
+    done = command(*arguments)
+    assert done.status != 0
+    assert len(done.err.strip().splitlines()) == 1
+    assert message in done.err
+    assert not (tmp_path / "new.toml").exists()

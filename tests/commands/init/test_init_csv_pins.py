@@ -1,0 +1,100 @@
+"""`cdtool init --csv KEY=VALUE`: a draft from a table that is not read without settings."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import cdtool as api
+from cdtool.base.errors import ConfigurationError, UsageError
+from tests.command import cdtool, one_line
+
+LOGS = Path(__file__).parents[3] / "sample_logs"
+
+
+@pytest.fixture
+def glued(tmp_path):
+    """A table whose last name contains separators: more names than cells."""
+    rows = "".join(f"{10 * i},{0.01 * i * i:.2f},{2 * i}.0\n" for i in range(60))
+    path = tmp_path / "glued.txt"
+    path.write_text("Time (ms),Position (mm),Speed (mm/s):Kp=0.1,Kd=0\n" + rows, encoding="utf-8")
+    return path
+
+
+def test_a_table_that_cannot_be_read_names_the_option(glued, tmp_path):
+    done = cdtool("init", glued, "-o", tmp_path / "m.toml")
+    assert done.status == 2 and "--csv header=false" in one_line(done.err)
+    assert not (tmp_path / "m.toml").exists()
+
+
+def test_the_settings_are_used_and_are_part_of_the_draft(glued, tmp_path):
+    done = cdtool("init", glued, "-o", tmp_path / "m.toml", "--csv", "header=false", "--csv", "separator=comma")
+    assert done.status == 0, done.err
+    values = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))
+    assert values["csv"] == {"header": False, "separator": "comma"} and values["channels"]["time"]["column"] == 0
+    assert cdtool("info", glued, "-m", tmp_path / "m.toml").status == 0
+
+
+def test_lists_and_numbers_are_written_as_toml(glued, tmp_path):
+    csv = {"header": False, "skip_lines": 1, "missing": ["-", 'say "no"']}
+    api.init(glued, tmp_path / "m.toml", csv=csv)
+    assert tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"] == csv
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("--csv", "header"), "--csv header: is no KEY=VALUE"),
+        (("--csv", "heder=false"), "--csv: heder: unknown key (did you mean header?"),
+        (("--csv", "decimal=x"), "--csv: decimal: is 'x'"),
+        (("--csv", "encoding=idna"), "--csv: encoding: is 'idna'"),
+        (("--csv", "header=false", "--machine", "m.toml"), "--csv and --machine: both state how tables are read"),
+    ],
+)
+def test_a_wrong_setting_is_one_line(glued, tmp_path, given, words):
+    done = cdtool("init", glued, "-o", tmp_path / ("study" if "--machine" in given else "m.toml"), *given)
+    assert done.status == 2 and words in one_line(done.err) and len(done.err.strip().splitlines()) <= 3
+
+
+def test_a_log_that_is_not_a_table_has_no_settings(tmp_path):
+    log = next(iter(sorted(LOGS.rglob("*.mcap"))))
+    with pytest.raises(UsageError, match="not a text table"):
+        api.init(log, tmp_path / "m.toml", csv={"header": False})
+
+
+def test_a_wrong_key_is_refused_in_python_too(glued, tmp_path):
+    with pytest.raises(ConfigurationError, match="unknown key"):
+        api.init(glued, tmp_path / "m.toml", csv={"heder": False})
+
+
+def words_in(tmp_path, words):
+    rows = [f"{0.01 * i:.2f},{0.1 * i:.1f},{i % 7}.5" for i in range(200)]
+    for number, word in enumerate(words):
+        rows[20 + 10 * number] = f"{0.01 * (20 + 10 * number):.2f},{word},0.5"
+    path = tmp_path / "words.csv"
+    path.write_text("t [s],Position [mm],Current [A]\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def test_a_word_in_a_column_of_numbers_is_drafted_as_missing_with_a_mark(tmp_path):
+    log = words_in(tmp_path, ["ERROR", "ERROR"])
+    done = cdtool("init", log, "-o", tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text(encoding="utf-8")
+    assert done.status in (0, 3) and tomllib.loads(text)["csv"] == {"missing": ["ERROR"]}
+    assert '"ERROR" in line 22, column Position' in one_line(text) and "CHECK: do they stand for" in one_line(text)
+    seen = cdtool("info", log, "-m", tmp_path / "m.toml")
+    assert "2 of 200 values are missing" in one_line(seen.out)
+
+
+def test_all_words_of_a_column_are_drafted_unless_they_are_many(tmp_path):
+    api.init(words_in(tmp_path, ["OVL", "ERROR", "off"]), tmp_path / "m.toml")
+    csv = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"]
+    assert csv == {"missing": ["OVL", "ERROR", "off"]}
+    done = cdtool("init", words_in(tmp_path, ["a", "b", "c", "d", "e"]), "-o", tmp_path / "n.toml")
+    assert done.status == 2 and "is not a number" in one_line(done.err)
+
+
+def test_given_words_stay_and_another_one_is_added(tmp_path):
+    log = words_in(tmp_path, ["OVL", "ERROR"])
+    api.init(log, tmp_path / "m.toml", csv={"missing": ["OVL"]})
+    assert tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"] == {"missing": ["OVL", "ERROR"]}

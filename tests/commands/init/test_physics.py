@@ -1,0 +1,250 @@
+"""`cdtool init`: what the values say against names, units and shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool import init, init_study
+from cdtool.commands.init import motion_evidence as motion
+from cdtool.commands.init.stream import Stream
+from tests.commands.init.drafts import drafted, drafted_columns, stroke
+from tests.commands.init.layouts.motion import arm_motion
+from tests.data_folder import data, needs_data
+
+
+def stream(time, values, name="x"):
+    return Stream(name, (name,), None, time, values[:, np.newaxis])
+
+
+@settings(max_examples=25, deadline=None)
+@given(ahead=st.floats(-8.0, 8.0).filter(lambda value: abs(value) > 0.5), gain=st.floats(0.2, 5.0))
+def test_the_lead_of_a_set_value_is_found(ahead, gain):
+    time = np.arange(3000) * 2e-3
+    one = stream(time, np.sin(3.0 * time) + 0.4 * np.sin(7.0 * time))
+    shifted = time + ahead * 2e-3
+    other = stream(time, gain * (np.sin(3.0 * shifted) + 0.4 * np.sin(7.0 * shifted)) + 1.0)
+    assert motion.lead(one, other) == pytest.approx(ahead, rel=0.1, abs=0.1)
+
+
+def test_noise_alone_is_no_lead():
+    noise, time = np.random.default_rng(1), np.arange(3000) * 2e-3
+    one = stream(time, np.sin(3.0 * time))
+    assert motion.lead(one, stream(time, np.sin(3.0 * time) + noise.normal(0.0, 0.05, 3000))) == 0.0
+
+
+def test_inertia_and_friction_of_opposite_signs_are_no_drive():
+    time = np.arange(4000) * 1e-3
+    speed = np.sin(5.0 * time) * (1.0 + 0.2 * np.sin(time))
+    acceleration = np.gradient(speed, time)
+    drive = 0.3 * acceleration + 1.0 * np.sign(speed)
+    odd = 0.3 * acceleration - 1.0 * np.sign(speed)
+    assert motion.drive_fit(stream(time, drive), stream(time, speed)) > 0.9
+    assert motion.drive_fit(stream(time, odd), stream(time, speed)) == 0.0
+
+
+def test_a_weight_on_a_link_is_explained_by_the_position():
+    time = np.arange(4000) * 1e-3
+    angle, speed = np.sin(time) + 0.5, np.cos(time)
+    drive = 0.2 * np.gradient(speed, time) + 0.3 * np.sign(speed) + 20.0 * np.cos(angle)
+    assert motion.drive_fit(stream(time, drive), stream(time, speed), stream(time, angle)) > 0.9
+
+
+def test_a_unit_is_used_where_the_name_says_nothing(tmp_path):
+    run = stroke()
+    draft = drafted_columns(
+        tmp_path,
+        {"t [s]": run.time, "CH 1 [mm]": run.travel * 1e3, "CH 2 [mm/s]": run.speed * 1e3, "CH 3 [N]": run.force,
+         "CH 4 [m/s²]": np.gradient(run.speed, run.time)},
+    )  # fmt: skip
+    columns = {name: part["column"] for name, part in draft.channels.items() if name != "time"}
+    assert columns == {
+        "position": "CH 1 [mm]", "speed": "CH 2 [mm/s]", "force": "CH 3 [N]", "acceleration": "CH 4 [m/s²]",
+    }  # fmt: skip
+
+
+def test_position_and_speed_are_found_without_names_and_marked(tmp_path):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"time": run.time, "uno": run.speed, "due": run.travel, "tre": run.torque})
+    assert draft.channels["position"]["column"] == "due" and draft.channels["speed"]["column"] == "uno"
+    assert draft.channels["torque"]["column"] == "tre"
+    assert all(draft.checked(name) for name in ("position", "speed", "torque"))
+
+
+def test_a_force_component_is_no_position(tmp_path):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"t": run.time, "force_x": run.force, "vel": run.speed})
+    assert "position" not in draft.channels and draft.channels["force"]["column"] == "force_x"
+
+
+def test_an_axis_at_rest_is_no_load_cell(tmp_path):
+    run = stroke()
+    quiver = 0.12 + 2e-4 * np.exp(-(((run.time - 2.0) / 0.02) ** 2)) + 1e-7 * np.sin(900.0 * run.time)
+    draft = drafted_columns(tmp_path, {"t": run.time, "pos_1": run.travel, "pos_2": quiver, "vel_1": run.speed})
+    assert "force" not in draft.channels
+
+
+@pytest.mark.parametrize("name", ["computed_torque", "model_torque", "torque_target"])
+def test_a_modelled_effort_is_no_measured_one(tmp_path, name):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"t": run.time, "pos": run.travel, "vel": run.speed, name: run.torque})
+    assert "torque" not in draft.channels
+    assert any(name in item.columns for item in draft.done.unmapped) is ("target" not in name)
+
+
+def test_the_measured_of_two_like_names_is_the_one_behind(tmp_path):
+    run = stroke()
+    late = np.interp(run.time - 0.02, run.time, run.travel)
+    draft = drafted_columns(tmp_path, {"t": run.time, "xa pos": run.travel, "xb pos": late})
+    assert draft.channels["position"]["column"] == "xb pos" and draft.checked("position")
+    assert draft.channels["reference_position"]["column"] == "xa pos" and draft.checked("reference_position")
+
+
+def test_positions_of_different_parts_are_no_set_values_of_each_other(tmp_path):
+    run = stroke()
+    late = np.interp(run.time - 0.02, run.time, run.travel)
+    draft = drafted_columns(tmp_path, {"t": run.time, "leaf angle": run.travel, "handle angle": late})
+    assert draft.channels["position"]["column"] == "leaf angle" and "reference_position" not in draft.channels
+
+
+def test_the_other_side_of_a_gear_is_no_set_value(tmp_path):
+    run = stroke()
+    late = np.interp(run.time - 0.02, run.time, run.travel)
+    columns = {"t": run.time, "gear_position": late, "joint_position": run.travel, "joint_velocity": run.speed}
+    draft = drafted_columns(tmp_path, columns)
+    assert "reference_position" not in draft.channels
+
+
+def test_an_inertial_sensor_is_no_speed_by_its_values(tmp_path):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"t": run.time, "angle": run.travel, "trunk_imu_y": run.speed})
+    assert "speed" not in draft.channels
+
+
+@pytest.mark.parametrize(("others", "found"), [((), True), (("accy", "accz"), False)])
+def test_one_of_three_axes_of_an_accelerometer_is_the_joints_only_if_it_fits(tmp_path, others, found):
+    run, noise = stroke(), np.random.default_rng(2)
+    names = ("acc x", *(name.replace("acc", "acc ") for name in others))
+    columns = {name: 9.81 + noise.normal(0.0, 1.0, len(run.time)) for name in names}
+    draft = drafted_columns(tmp_path, {"t": run.time, "pos": run.travel, "vel": run.speed, **columns})
+    assert ("acceleration" in draft.channels) is found
+
+
+def test_what_depends_on_places_alone_is_no_effort():
+    m = arm_motion(np.random.default_rng(3), 3, duration=20.0)
+    q = m.position
+    reach = 0.4 * np.cos(q[:, 1]) + 0.3 * np.cos(q[:, 1] + q[:, 2])
+    pose = Stream("p", (), None, m.time, np.column_stack([reach * np.cos(q[:, 0]), reach * np.sin(q[:, 0]), reach]))
+    place, speed, effort = (Stream("x", (), None, m.time, values) for values in (q, m.speed, m.effort))
+    assert motion.drive_fit(pose, speed, place) < 0.6 < motion.drive_fit(effort, speed, place)
+
+
+def test_a_speed_that_the_position_does_not_follow_is_left_out_with_the_reason(tmp_path):
+    run = stroke()
+    other = np.sin(3.0 * run.time)
+    columns = {"t [s]": run.time, "pos [m]": run.travel, "vel [m/s]": other}
+    draft = drafted_columns(tmp_path, columns, left_out=("speed",))
+    assert "left out: it does not follow the derivative of the position" in " ".join(draft.text.split("\n# "))
+
+
+def test_a_reversed_speed_is_recognised_and_marked(tmp_path):
+    run = stroke()
+    columns = {
+        "t [s]": run.time,
+        "pos a [m]": run.travel,
+        "vel b [m/s]": np.sin(3.0 * run.time),
+        "vel c [m/s]": -run.speed,
+    }
+    draft = drafted_columns(tmp_path, columns)
+    assert draft.channels["speed"]["column"] == "vel c [m/s]"
+    assert "opposite in sign" in draft.said("speed") and draft.checked("position")
+
+
+def test_units_are_not_derived_from_a_placeholder_clock(tmp_path):
+    """Without a clock, position and speed per sample say nothing about counts or units."""
+    run = stroke()
+    irregular = np.random.default_rng(1).normal(0.0, 1.0, len(run.time))
+    counts = np.round(run.travel * 4000.0)
+    draft = drafted_columns(tmp_path, {"noise": irregular, "pos_counts": counts, "vel": run.speed})
+    assert draft.channels["time"] == {"rate_hz": 1000.0} and draft.checked("time")
+    assert draft.channels["position"]["scale"] == 1.0 and "placeholder" in draft.said("position")
+
+
+def test_fractions_of_a_second_alone_are_no_clock(tmp_path):
+    run = stroke()
+    parts = {"nanosec": np.mod(run.time, 1.0) * 1e9}
+    draft = drafted_columns(tmp_path, {**parts, "pos": run.travel, "vel": run.speed})
+    assert "column" not in draft.channels["time"] and draft.checked("time")
+
+
+def test_a_named_clock_is_taken_before_a_counter(tmp_path):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"seqno": np.arange(4000.0), "tm_ms": run.time * 1e3, "pos": run.travel})
+    assert draft.channels["time"] == {"column": "tm_ms", "unit": "ms"}
+
+
+def test_a_travel_beyond_any_machine_is_in_millimetres(tmp_path):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"t [s]": run.time, "pos": run.travel * 1e3, "vel": run.speed * 1e3})
+    assert (draft.unit("position"), draft.unit("speed")) == ("mm", "mm/s") and draft.checked("position")
+
+
+@pytest.mark.parametrize(("step", "expected"), [(1e-3, 22.0), (1e-2, 4.7)])
+def test_the_low_pass_of_a_derived_speed_follows_from_the_steps_of_the_position(tmp_path, step, expected):
+    """The corner where quantisation noise is 1 % of the largest speed: (3 (0.01 v)^2 / (8 pi^2 T s^2))^(1/3)."""
+    run = stroke(period=5e-3)
+    draft = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": np.round(run.travel / step) * step})
+    noise = step / np.sqrt(12.0)
+    corner = (3.0 * 0.01**2 / (8.0 * np.pi**2 * 5e-3 * noise**2)) ** (1.0 / 3.0)
+    assert draft.channels["speed_low_pass_hz"] == pytest.approx(corner, rel=0.1) == pytest.approx(expected, rel=0.1)
+    assert draft.checked("speed_low_pass_hz")
+
+
+def test_a_fine_position_or_a_logged_speed_needs_no_low_pass(tmp_path):
+    run = stroke()
+    fine = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": run.travel})
+    logged = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": np.round(run.travel, 2), "vel [m/s]": run.speed})
+    assert "speed_low_pass_hz" not in fine.channels and "speed_low_pass_hz" not in logged.channels
+
+
+@needs_data("ur3/id1.bag")
+def test_the_sign_of_a_real_robots_torque_is_reversed_with_the_reason(tmp_path):
+    """The log has the torque that the load exerts on the drive; the motion of two joints is too small to show it."""
+    draft = drafted(data("ur3/id1.bag"), tmp_path)
+    assert draft.channels["torque"]["scale"] == -1.0
+    assert "gives power to the machine where friction takes it" in draft.said("torque")
+
+
+@needs_data("ur3/id1.bag")
+def test_a_sign_that_the_first_log_does_not_show_is_found_in_the_others(tmp_path):
+    bags = sorted(data("ur3").glob("*.bag"))
+    assert init(bags[0], tmp_path / "first.toml").text.count("scale = -1.0") == 0
+    init_study(bags, tmp_path / "study")
+    assert "scale = -1.0" in (tmp_path / "study" / "machine.toml").read_text(encoding="utf-8")
+
+
+@needs_data("ur_collisions/onsets.csv")
+@pytest.mark.parametrize("name", ["Drift00_NF_1", "Drift00_WF_1", "Drift60_NF_3"])
+def test_an_angle_without_a_name_is_known_by_the_circle_of_its_tool(tmp_path, name):
+    """Column 8, a coordinate of the tool, is nearly the derivative of column 7; neither is that of a joint."""
+    draft = drafted(data(f"ur_collisions/{name}.csv"), tmp_path)
+    assert draft.channels["position"] == {"column": 1, "unit": "deg"} and draft.checked("position")
+    assert draft.channels["torque"]["column"] == 13 and draft.checked("torque")
+    assert draft.machine["type"] == "rotary_axis" and not {"speed", "force"} & draft.channels.keys()
+
+
+@needs_data("cnc_mill/experiment_01.csv")
+def test_row_numbers_are_no_clock_in_milliseconds(tmp_path):
+    """Steps of 0.1 s follow from position and speed; neither states its unit."""
+    draft = drafted(data("cnc_mill/experiment_01.csv"), tmp_path)
+    assert draft.channels["time"] == {"column": 0, "rate_hz": pytest.approx(10.0, rel=0.01)} and draft.checked("time")
+    assert (draft.unit("position"), draft.unit("speed")) == ("deg", "deg/s") and draft.checked("position")
+
+
+@needs_data("ur10e_motions/ur-20_01_17-p1.csv")
+def test_noise_of_an_encoder_is_no_load_cell(tmp_path):
+    """A robot at rest: nothing tells its columns apart."""
+    draft = drafted(data("ur10e_motions/ur-20_01_17-p1.csv"), tmp_path)
+    assert draft.channels.keys() == {"time"}

@@ -1,0 +1,49 @@
+"""The files of `cdtool coverage`: a figure with a panel per class of speed, all cells as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cdtool.base.errors import UsageError
+from cdtool.commands.inject.coverage.files import check_coverage_files, write_coverage
+from tests.report.html.coverage_case import coverage_case
+
+
+def test_the_figure_has_a_panel_per_detector_and_class_of_speed(tmp_path: Path) -> None:
+    target = tmp_path / "map.svg"
+    write_coverage(coverage_case(speeds=(0.1, 0.3)), [target])
+    text = target.read_text(encoding="utf-8")
+    titles = [f"{name}, {speed} m/s" for name in ("quick", "slow") for speed in ("0.100", "0.300")]
+    assert all(f">{title}<" in text for title in titles)
+    write_coverage(coverage_case(), [target])
+    text = target.read_text(encoding="utf-8")
+    assert ">quick<" in text and "m/s<" not in text
+
+
+def test_the_json_has_the_reasons_and_the_speeds(tmp_path: Path) -> None:
+    targets = [tmp_path / "map.json", tmp_path / "map.html"]
+    write_coverage(coverage_case(), targets)
+    values = json.loads(targets[0].read_text(encoding="utf-8"))
+    assert values["most_telling"][0] == {
+        "detector": "slow",
+        "position": 0.5,
+        "stiffness": 1e4,
+        "speed": None,
+        "reason": "missed_in_part",
+    }
+    assert values["speeds"] == [{"speed": None, "lowest": 0.2, "highest": 0.2}]
+    assert len(values["cells"]) == 8
+    check_coverage_files(targets, [])  # its own files may be rewritten
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [(["map.docx"], "is"), (["a.html", "a.html"], "twice"), (["no/a.html"], "no folder"), (["in.json"], "is read")],
+)
+def test_a_target_that_cannot_be_written_is_refused(tmp_path: Path, names: list[str], message: str) -> None:
+    (tmp_path / "in.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(UsageError, match=message):
+        check_coverage_files([tmp_path / name for name in names], [tmp_path / "in.json"], force=True)

@@ -1,0 +1,175 @@
+"""The map of latency over position and stiffness: means, ranges, misses, and what a test would tell most."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from cdtool.commands.inject.coverage.coverage_map import (
+    CellKey,
+    CoverageMap,
+    MappedContact,
+    SpeedClass,
+    TellingReason,
+    coverage_map,
+    speed_classes,
+)
+from cdtool.results.limits import LimitRule
+from cdtool.results.results import ContactResult
+
+NEAR, FAR = CellKey(0.5, 1e4), CellKey(1.0, 1e4)
+
+
+def row(recording: str, latency: float | None, outcome: str = "detected", detector: str = "gm") -> ContactResult:
+    return ContactResult(
+        recording=recording,
+        group="injected_x",
+        detector=detector,
+        joint="axis",
+        onset_s=1.0,
+        onset_uncertainty_s=0.0,
+        alarm_s=None if latency is None else 1.0 + 1e-3 * latency,
+        latency_ms=latency,
+        outcome=outcome,
+        force_at_alarm_n=None if latency is None else 10.0 * latency,
+        peak_force_n=1000.0,
+    )
+
+
+def made(
+    rows: list[ContactResult], cells: dict[str, tuple[CellKey, str]], limits: tuple[LimitRule, ...] = ()
+) -> CoverageMap:
+    contacts = {name: MappedContact(key, reaction, 1.2) for name, (key, reaction) in cells.items()}
+    return coverage_map(rows, contacts, ["gm", "pt"], ("m", "m/s"), limits)
+
+
+def test_a_cell_has_mean_standard_error_and_median_force() -> None:
+    names = dict.fromkeys("abc", (NEAR, "known controller"))
+    cell = made([row("a", 50.0), row("b", 60.0), row("c", 70.0)], names).cells["gm"][NEAR]
+    assert cell.latency_ms == pytest.approx(60.0)
+    assert cell.standard_error_ms == pytest.approx(10.0 / math.sqrt(3.0))
+    assert cell.range_ms == (60.0, 60.0)
+    assert cell.force_n == 600.0
+    assert (cell.contacts, cell.missed, cell.unreliable) == (3, 0, 0)
+
+
+def test_brackets_are_a_range_and_their_difference_is_no_scatter() -> None:
+    names = {"a": (NEAR, "frozen"), "b": (NEAR, "frozen"), "c": (NEAR, "stiff"), "d": (NEAR, "stiff")}
+    cell = made([row("a", 50.0), row("b", 52.0), row("c", 90.0), row("d", 92.0)], names).cells["gm"][NEAR]
+    assert cell.range_ms == (51.0, 91.0)
+    assert cell.standard_error_ms == pytest.approx(math.sqrt(2.0) / 2.0)
+    assert cell.uncertainty_ms == pytest.approx(20.0 + math.sqrt(2.0))
+
+
+def test_a_cell_misses_most_if_more_than_half_of_its_assessable_contacts_are_missed() -> None:
+    names = dict.fromkeys("abcd", (NEAR, "known"))
+    rows = [row("a", None, "missed"), row("b", None, "missed"), row("c", 50.0), row("d", None, "not_assessable")]
+    cell = made(rows, names).cells["gm"][NEAR]
+    assert cell.misses_most
+    assert (cell.missed, cell.not_assessable) == (2, 1)
+    only = made([row("a", None, "not_assessable")], names).cells["gm"][NEAR]
+    assert not only.misses_most
+    assert math.isnan(only.latency_ms)
+
+
+def test_late_alarms_are_counted_as_unreliable() -> None:
+    cell = made([row("a", 150.0), row("b", 250.0)], {"a": (NEAR, "k"), "b": (NEAR, "k")}).cells["gm"][NEAR]
+    assert cell.unreliable == 1
+
+
+def test_partly_missed_cells_tell_most_then_the_least_certain() -> None:
+    names = {"a": (NEAR, "k"), "b": (NEAR, "k"), "c": (FAR, "k"), "d": (FAR, "k")}
+    rows = [row("a", 50.0), row("b", None, "missed"), row("c", 50.0), row("d", 150.0)]
+    rows += [row(name, value, detector="pt") for name, value in zip("abcd", (50.0, 51.0, 60.0, 64.0), strict=True)]
+    telling = made(rows, names).most_telling(3)
+    assert [(item.detector, item.key) for item in telling] == [("gm", NEAR), ("gm", FAR), ("pt", FAR)]
+
+
+def test_a_detector_without_rows_has_no_panel_and_other_recordings_do_not_count() -> None:
+    found = made([row("a", 50.0), row("real", 20.0)], {"a": (NEAR, "k")})
+    assert list(found.cells) == ["gm"]
+    assert found.cells["gm"][NEAR].contacts == 1
+    assert (found.positions, found.stiffnesses) == ((0.5,), (1e4,))
+
+
+def test_the_recordings_of_a_cell_are_missed_first_then_from_slow_to_fast_then_not_assessable() -> None:
+    names = dict.fromkeys("abcde", (NEAR, "k"))
+    rows = [row("a", 50.0), row("b", None, "not_assessable"), row("c", 70.0), row("d", None, "missed"), row("e", 60.0)]
+    cell = made(rows, names).cells["gm"][NEAR]
+    assert "".join(item.recording for item in cell.recordings) == "dceab"
+    assert [item.is_missed for item in cell.recordings] == [True, False, False, False, False]
+    assert math.isnan(cell.recordings[0].force_n) and cell.recordings[1].force_n == 700.0
+
+
+def test_cells_with_misses_begin_with_the_largest_share() -> None:
+    names = {"a": (NEAR, "k"), "b": (NEAR, "k"), "c": (FAR, "k"), "d": (FAR, "k")}
+    rows = [row("a", 50.0), row("b", None, "missed"), row("c", None, "missed"), row("d", None, "not_assessable")]
+    assert [(name, key, cell.missed) for name, key, cell in made(rows, names).missed()] == [
+        ("gm", FAR, 1),
+        ("gm", NEAR, 1),
+    ]
+
+
+def test_a_cell_whose_missed_contacts_are_all_of_it_is_certain() -> None:
+    found = made([row("a", None, "missed"), row("b", None, "missed")], dict.fromkeys("ab", (NEAR, "k")))
+    assert found.most_telling() == []
+    assert found.cells["gm"][NEAR].telling is None
+
+
+@pytest.mark.parametrize(
+    ("limit", "reason"),
+    [(75.0, TellingReason.NEAR_LIMIT), (80.0, TellingReason.SCATTER), (40.0, TellingReason.SCATTER)],
+)
+def test_a_limit_within_two_errors_and_that_of_the_model_tells_much(limit: float, reason: TellingReason) -> None:
+    names = dict.fromkeys("abc", (NEAR, "k"))
+    rows = [row("a", 55.0), row("b", 60.0), row("c", 65.0)]  # 60 +- 5.8 ms, the model's error is 9 ms
+    assert math.isclose(2.0 * 5.0 / math.sqrt(3.0), 5.77, abs_tol=0.01)
+    rules = (LimitRule("gm.injected_x.p95_ms", "gm", "injected_x", "p95_ms", largest=limit - 0.5),)
+    cell = made(rows, names, rules).cells["gm"][NEAR]
+    assert cell.limit_ms == limit - 0.5
+    assert cell.telling is reason
+
+
+def test_only_upper_limits_of_latencies_of_the_detector_and_group_count() -> None:
+    names = dict.fromkeys("abc", (NEAR, "k"))
+    rows = [row("a", 55.0), row("b", 60.0), row("c", 65.0)]
+    others = (
+        LimitRule("pt", "pt", "*", "p95_ms", largest=60.0),
+        LimitRule("group", "gm", "stiff", "p95_ms", largest=60.0),
+        LimitRule("figure", "gm", "*", "missed", largest=60.0),
+        LimitRule("least", "gm", "*", "p95_ms", least=60.0),
+    )
+    assert made(rows, names, others).cells["gm"][NEAR].limit_ms is None
+    both = (LimitRule("a", "*", "*", "mean_ms", largest=90.0), LimitRule("b", "gm", "*", "max_ms", largest=80.0))
+    assert made(rows, names, both).cells["gm"][NEAR].limit_ms == 80.0
+
+
+def test_brackets_further_apart_than_the_scatter_are_the_reason() -> None:
+    names = {"a": (NEAR, "frozen"), "b": (NEAR, "frozen"), "c": (NEAR, "stiff"), "d": (NEAR, "stiff")}
+    found = made([row("a", 50.0), row("b", 52.0), row("c", 90.0), row("d", 92.0)], names)
+    assert [item.reason for item in found.most_telling()] == [TellingReason.ASSUMPTIONS]
+
+
+def test_the_standard_deviation_is_that_of_the_detected_contacts() -> None:
+    names = dict.fromkeys("abcd", (NEAR, "k"))
+    cell = made([row("a", 50.0), row("b", 60.0), row("c", 70.0), row("d", None, "missed")], names).cells["gm"][NEAR]
+    assert cell.standard_deviation_ms == pytest.approx(10.0)
+
+
+def test_speeds_that_differ_by_more_than_a_fifth_are_classes() -> None:
+    assert speed_classes({"a": [0.2], "b": [0.24], "c": [-0.3, -0.32]}) == {"a": 0.22, "b": 0.22, "c": 0.31}
+
+
+def test_speeds_that_differ_along_the_track_only_are_no_classes() -> None:
+    assert speed_classes({"a": [0.1, 0.2, 0.3], "b": [0.12, 0.21, 0.33]}) == {"a": None, "b": None}
+
+
+def test_cells_of_a_map_are_split_by_speed() -> None:
+    slow, fast = CellKey(0.5, 1e4, 0.1), CellKey(0.5, 1e4, 0.3)
+    speeds = {"a": (slow, 0.1), "b": (fast, -0.31), "c": (fast, 0.29)}
+    contacts = {name: MappedContact(key, "k", 1.2, speed) for name, (key, speed) in speeds.items()}
+    found = coverage_map([row("a", 90.0), row("b", 50.0), row("c", 52.0)], contacts, ["gm"], ("m", "m/s"))
+    assert found.speeds == (SpeedClass(0.1, 0.1, 0.1), SpeedClass(0.3, 0.29, 0.31))
+    assert found.cells["gm"][slow].latency_ms == 90.0
+    assert found.cells["gm"][fast].latency_ms == 51.0

@@ -1,0 +1,183 @@
+"""The page of a coverage map: one harmless file, readable without script, below a stated size."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import hashlib
+import html
+import json
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdtool.base.plain_text import plain
+from cdtool.commands.inject.coverage.page import coverage_html
+from tests.report.hostile import HOSTILE
+from tests.report.html.coverage_case import ONSET, coverage_case
+
+
+def data_of(text: str) -> dict[str, Any]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    assert found
+    values: dict[str, Any] = json.loads(found[1])
+    return values
+
+
+def traces_of(text: str) -> list[dict[str, Any]]:
+    return [json.loads(item) for item in re.findall(r'json" class="trace">(.*?)</script>', text, re.DOTALL)]
+
+
+def cells_of(text: str) -> dict[int, tuple[str, str]]:
+    """Return style and words of the cells of the maps by number."""
+    found = re.findall(r'<td class="([^"]*)" data-cell="(\d+)"><span class="inner">(.*?)</span></td>', text)
+    return {int(number): (style, re.sub(r"<[^>]*>", "|", words)) for style, number, words in found}
+
+
+def test_the_maps_are_tables_that_need_no_script() -> None:
+    text = coverage_html(coverage_case())
+    cells = cells_of(text)
+    words = {item["title"]: cells[number] for number, item in enumerate(data_of(text)["cells"])}
+    style, shown = words["quick: 0.5 m, 100 N/mm"]
+    assert (style, shown) == ("level-0", "21|± 2.0||210 N|")
+    assert words["slow: 0.5 m, 10 N/mm"] == ("level-9 misses-some", "1 of 2 missed|200||2000 N|")
+    assert words["slow: 1 m, 10 N/mm"] == ("misses-most", "2 of 2 missed")
+
+
+def test_misses_are_named_first() -> None:
+    text = coverage_html(coverage_case())
+    assert "<strong>Contacts are missed by slow</strong>" in text
+    assert "quick: 0 of 8 missed; slow: 3 of 8 missed" in text
+    missed = text[text.index('id="missed-table"') : text.index('id="maps"')]
+    assert re.findall(r"<t[dh][^>]*>(\d of \d|slow|quick|1\.00|0\.500)</t[dh]>", missed) == [
+        "slow",
+        "1.00",
+        "slow",
+        "0.500",
+    ]
+
+
+def test_without_a_miss_the_page_says_so() -> None:
+    case = coverage_case()
+    text = coverage_html(replace(case, map=replace(case.map, cells={"quick": case.map.cells["quick"]})))
+    assert "No assessable contact is missed" in text
+    assert 'id="missed"' not in text
+
+
+def test_a_cell_opens_its_worst_contact_that_has_a_trigger_plot() -> None:
+    text = coverage_html(coverage_case())
+    data, traces = data_of(text), traces_of(text)
+    cells = {item["title"]: item for item in data["cells"]}
+    cell = cells["slow: 0.5 m, 10 N/mm"]
+    assert [contact[:2] for contact in cell["contacts"]] == [
+        ["10000_0.5_1.csv", "missed"],
+        ["10000_0.5_0.csv", "200 ms"],
+    ]
+    assert traces[cell["traces"][0]]["recording"] == "10000_0.5_1.csv"
+    slowest = cells["quick: 0.5 m, 100 N/mm"]
+    assert slowest["contacts"][0][:2] == ["100000_0.5_1.csv", "22.0 ms"]
+    assert slowest["traces"][0] == -1 and traces[slowest["traces"][1]]["recording"] == "100000_0.5_0.csv"
+    assert data["cells"][data["first"]]["title"] == "slow: 1 m, 10 N/mm"
+
+
+def test_a_trigger_plot_begins_shortly_before_its_contact() -> None:
+    for trace in traces_of(coverage_html(coverage_case())):
+        assert trace["start"] == pytest.approx(ONSET - 0.5)
+        assert trace["end"] == 3.0
+
+
+def test_the_trigger_plots_are_as_many_as_the_page_may_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = coverage_html(coverage_case())
+    size = len(json.dumps(traces_of(whole)[0], separators=(",", ":")))
+    monkeypatch.setattr("cdtool.commands.inject.coverage.page._MOST_TRACE_TEXT", 2.5 * size)
+    text = coverage_html(coverage_case())
+    assert len(traces_of(text)) == 2 < len(traces_of(whole))
+    assert max(number for cell in data_of(text)["cells"] for number in cell["traces"]) == 1
+
+
+def test_the_list_of_tests_can_be_copied_and_has_commands_that_exist() -> None:
+    text = coverage_html(coverage_case())
+    found = re.search(r"<pre>(.*?)</pre>", text, re.DOTALL)
+    assert found
+    rows = list(csv.DictReader(html.unescape(found[1]).splitlines()))
+    assert (rows[0]["detector"], rows[0]["position_m"], rows[0]["reason"]) == ("slow", "0.5", "missed_in_part")
+    assert rows[0]["plan"] == "cdtool plan --missed-at-most 5%"
+    assert [row["reason"] for row in rows[1:3]] == ["near_limit", "near_limit"]
+    assert rows[-1]["plan"].startswith("cdtool plan --difference-ms ")
+    from tests.command import cdtool as command
+
+    for row in (rows[0], rows[-1]):
+        assert command(*row["plan"].split()[1:]).status == 0
+
+
+def test_clearly_different_speeds_have_maps_of_their_own() -> None:
+    text = coverage_html(coverage_case(speeds=(0.1, 0.3)))
+    assert re.findall(r"<h3>(\w+) <small>contact speed ([\d.]+) m/s</small></h3>", text) == [
+        ("quick", "0.1"),
+        ("quick", "0.3"),
+        ("slow", "0.1"),
+        ("slow", "0.3"),
+    ]
+    assert len(cells_of(text)) == 16
+    assert ">speed [m/s]</th>" in text
+    assert "slow: 1 m, 10 N/mm, 0.300 m/s" in {item["title"] for item in data_of(text)["cells"]}
+
+
+def test_one_class_of_speed_has_one_map_per_detector() -> None:
+    text = coverage_html(coverage_case())
+    assert text.count("<h3>quick</h3>") == 1
+    assert "speed [m/s]" not in text
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_names_from_files_are_text(kind: str) -> None:
+    case = coverage_case(lambda name: f"{HOSTILE[kind]}{name}")
+    text = coverage_html(case)
+    assert "<script>alert" not in text
+    assert all(letter.isprintable() or letter == "\n" for letter in text)
+    assert plain(f"{HOSTILE[kind]}lost.csv") in html.unescape(text)
+    assert len(traces_of(text)) == len(case.traces)
+
+
+def test_the_policy_allows_only_this_script_and_this_style() -> None:
+    text = coverage_html(coverage_case())
+    policy = html.unescape(re.search(r'Policy" content="(.*?)">', text)[1])  # type: ignore[index]
+    scripts = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+    styles = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    assert len(scripts) == len(styles) == 1
+    for kind, content in (("script", scripts[0]), ("style", styles[0])):
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}'" in policy
+    assert not re.search(r'\b(src|href)="(?!#)', text)
+    assert 'style="' not in text
+
+
+def test_the_same_map_makes_the_same_page() -> None:
+    assert coverage_html(coverage_case()) == coverage_html(coverage_case())
+
+
+def test_a_map_without_any_assessable_contact_is_shown_as_such() -> None:
+    case = coverage_case()
+    unknown = {
+        name: {
+            key: replace(
+                cell,
+                missed=0,
+                not_assessable=2,
+                latency_ms=np.nan,
+                standard_error_ms=np.nan,
+                range_ms=(np.nan, np.nan),
+                force_n=np.nan,
+                limit_ms=None,
+            )
+            for key, cell in cells.items()
+        }
+        for name, cells in case.map.cells.items()
+    }
+    text = coverage_html(replace(case, map=replace(case.map, cells=unknown), traces={}))
+    assert "No contact is assessable" in text
+    assert set(cells_of(text).values()) == {("unassessed", "2 of 2 not assessable")}
+    assert 'id="telling"' not in text

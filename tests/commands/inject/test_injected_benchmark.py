@@ -1,0 +1,324 @@
+"""[inject] from file to results: recordings, folder, provenance, refusals, brackets, bad input."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.base.errors import ConfigurationError, OutputError, RecordingError, UsageError
+from cdtool.commands.inject.injected_logs import read_injected
+from cdtool.commands.inject.with_injected import section_of
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file
+from cdtool.results.agreement import agreements
+from tests.command import cdtool as command
+from tests.commands.inject.known_drive import known_drive
+
+GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
+
+
+@pytest.fixture
+def gate(tmp_path: Path) -> Path:
+    """The sample gate with its model, whose drive is known."""
+    for name in ("machine.toml", "inject.toml"):
+        shutil.copy(GATE / name, tmp_path / name)
+    (tmp_path / "model.toml").write_text(known_drive(GATE), encoding="utf-8")
+    for name in ("stiff", "soft", "holdout", "free"):
+        (tmp_path / name).symlink_to(GATE / name)
+    return tmp_path
+
+
+def write(folder: Path, text: str, name: str = "case.toml") -> Path:
+    head = (
+        'machine = "model.toml"\ndetectors = ["gm", "pt"]\n[signature]\nforce = true\n'
+        '[learn]\nlogs = ["free/03.csv", "free/04.csv"]\n'
+    )
+    path = folder / name
+    path.write_text(f"{head}{text}", encoding="utf-8")
+    return path
+
+
+INJECT = (
+    '[inject]\nlogs = ["holdout/03.csv"]\npositions = ["0.9m"]\n[inject.obstacles.stiff]\nstiffness_n_per_mm = 500\n'
+)
+
+
+def test_injected_contacts_are_scored_and_agree_with_the_real_ones(gate: Path) -> None:
+    done = cdtool.benchmark(gate / "inject.toml")
+    rows = {(row.group, row.detector): row for row in done.evaluated.summaries}
+    assert rows["injected_stiff", "momentum"].detected == 8
+    assert rows["injected_stiff", "momentum"].median_ms == pytest.approx(rows["stiff", "momentum"].median_ms, rel=0.1)
+    stated = done.results.provenance["injected"]
+    assert stated["injected_stiff"]["compared_with"] == "stiff"
+    assert stated["injected_soft"]["contacts"] == 8
+    found = {(item.detector, item.real_group): item for item in agreements(done.evaluated)}
+    assert found["momentum", "stiff"].injected_count == 8
+    assert found["momentum", "stiff"].real_count == 4
+
+
+def test_the_agreement_is_printed_after_the_verdict(gate: Path) -> None:
+    done = command("benchmark", gate / "inject.toml", "--detectors", "pi")
+    assert done.status == 0 and done.out.startswith("no limits are set")
+    line = next(line for line in done.out.splitlines() if line.startswith("pure_inertia: injected_stiff 2"))
+    assert "real (stiff) 27.5 ms, n = 8 and 4" in line
+
+
+def test_the_recordings_are_made_once_and_again_after_a_change(gate: Path) -> None:
+    path = write(gate, INJECT)
+    cdtool.benchmark(path)
+    made = gate / "injected" / "injected_stiff"
+    first = {item.name: item.stat().st_mtime_ns for item in made.iterdir()}
+    cdtool.benchmark(path)
+    assert {item.name: item.stat().st_mtime_ns for item in made.iterdir()} == first
+    write(gate, INJECT.replace("500", "400"))
+    cdtool.benchmark(path)
+    assert {item.name: item.stat().st_mtime_ns for item in made.iterdir()} != first
+
+
+def test_the_same_seed_gives_the_same_bytes_and_the_jobs_do_not_matter(gate: Path) -> None:
+    from cdtool.execution.workers import Workers
+
+    path = write(gate, INJECT.replace('"holdout/03.csv"', '"holdout/*.csv"'))
+    one = cdtool.inject(path, gate / "one")
+    cdtool.inject(path, gate / "two", workers=Workers(2))
+    for case in one.logs.cases:
+        assert (gate / "one" / case.file).read_bytes() == (gate / "two" / case.file).read_bytes()
+    assert (gate / "one" / "injected.json").read_bytes() == (gate / "two" / "injected.json").read_bytes()
+
+
+@pytest.mark.parametrize("file_format", ["csv", "mcap", "parquet", "h5", "mf4", "tdms"])
+def test_the_folder_is_a_benchmark_of_its_own(gate: Path, file_format: str) -> None:
+    path = write(gate, INJECT)
+    done = cdtool.inject(path, gate / "out", file_format=file_format)
+    (case,) = done.logs.cases
+    assert case.file.endswith(file_format)
+    results = cdtool.benchmark(gate / "out" / "benchmark.toml").results
+    assert [row.outcome for row in results.contacts if row.detector == "momentum"] == ["detected"]
+    recording = cdtool.read(gate / "out" / case.file, gate / "out" / "machine.toml")
+    free = cdtool.read(gate / "holdout" / "03.csv", gate / "machine.toml")
+    before = recording["speed"].time < case.start
+    np.testing.assert_allclose(
+        recording["speed"].values[before], free["speed"].values[: len(before)][before], rtol=1e-12
+    )
+    assert np.max(recording["force"].values) == pytest.approx(case.peak_force, rel=0.01)
+    assert read_injected(gate / "out").cases == done.logs.cases
+
+
+def test_every_file_says_that_it_is_injected(gate: Path) -> None:
+    done = cdtool.inject(write(gate, INJECT), gate / "out")
+    text = (gate / "out" / done.logs.cases[0].file).read_text(encoding="utf-8")
+    assert "# cdtool.injected: {" in text
+    assert json.loads((gate / "out" / "injected.json").read_text(encoding="utf-8"))["injected"] is True
+    assert "simulated" in (gate / "out" / "benchmark.toml").read_text(encoding="utf-8")
+
+
+def without_table(path: Path, table: str) -> None:
+    lines, kept, skipping = path.read_text(encoding="utf-8").splitlines(), [], False
+    for line in lines:
+        if line.startswith("["):
+            skipping = line.startswith(f"[{table}]")
+        if not skipping:
+            kept.append(line)
+    path.write_text("\n".join(kept) + "\n", encoding="utf-8")
+
+
+def test_without_a_controller_there_are_two_brackets_and_no_pure_torque(gate: Path) -> None:
+    without_table(gate / "model.toml", "model.controller")
+    results = cdtool.benchmark(write(gate, INJECT)).results
+    groups = {row.group for row in results.contacts}
+    assert groups == {"injected_stiff_frozen", "injected_stiff_stiff"}
+    assert {row.detector for row in results.contacts} == {"momentum"}
+    refused = [item for item in results.skipped if item.recording == "pure_torque"]
+    assert len(refused) == 2
+    assert "not tested by injected contacts" in refused[0].reason
+
+
+def test_an_unknown_accelerometer_leaves_the_acceleration_out(gate: Path) -> None:
+    without_table(gate / "model.toml", "model.sensors")
+    path = write(gate, INJECT)
+    path.write_text(path.read_text(encoding="utf-8").replace('"gm", "pt"', '"gm", "feekf"'), encoding="utf-8")
+    results = cdtool.benchmark(path).results
+    assert {row.detector for row in results.contacts} == {"momentum"}
+    assert any("bandwidth" in item.reason for item in results.skipped if item.recording == "friction_ekf")
+
+
+def test_positions_and_stiffnesses_may_be_a_grid(gate: Path) -> None:
+    grid = '[inject]\nlogs = ["holdout/03.csv"]\npositions = { from = "0.4m", to = "1.0m", count = 4 }\n'
+    grid += "stiffnesses_n_per_mm = { from = 5, to = 500, per_decade = 1 }\n"
+    section = section_of(read_benchmark_file(write(gate, grid)))
+    assert [item.value for item in section.positions] == pytest.approx([0.4, 0.6, 0.8, 1.0])
+    assert [item.name for item in section.obstacles] == ["5_n_per_mm", "50_n_per_mm", "500_n_per_mm"]
+
+
+def test_a_log_with_a_contact_is_left_out(gate: Path) -> None:
+    path = write(gate, INJECT.replace("holdout/03.csv", "stiff/03.csv"))
+    with pytest.raises(RecordingError, match=r"a contact at 6\.\d+ s"):
+        cdtool.inject(path, gate / "out")
+    assert not (gate / "out").exists()
+
+
+def test_the_folder_learns_from_the_same_parts_of_the_logs(gate: Path) -> None:
+    path = write(gate, INJECT)
+    text = path.read_text(encoding="utf-8").replace(
+        '["free/03.csv", "free/04.csv"]', '[{ path = "free/*.csv", from = "0.5s", to = "1.2m" }]'
+    )
+    path.write_text(text, encoding="utf-8")
+    assert command("inject", path, "-o", gate / "out").status == 0
+    written = read_benchmark_file(gate / "out" / "benchmark.toml")
+    assert {str(section) for section in written.learned_sections.values()} == {"from 0.5 s to 1.2 m of travel"}
+    assert len(written.learned_sections) == len(written.learn) > 1
+    limits = [
+        [row.limit for row in cdtool.benchmark(item).results.contacts if row.detector == "momentum"]
+        for item in (path, gate / "out" / "benchmark.toml")
+    ]
+    assert limits[0] == pytest.approx(limits[1], rel=1e-6)
+
+
+def test_a_position_that_is_never_reached_is_left_out_and_reported(gate: Path) -> None:
+    done = cdtool.inject(write(gate, INJECT.replace('"0.9m"', '"0.9m", "40m"')), gate / "out")
+    assert len(done.logs.cases) == 1
+    assert "never reaches 40 m" in done.skipped[0].reason
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("stiffness_n_per_mm = 500", ""), "give one of profile"),
+        (("stiffness_n_per_mm = 500", 'profile = "en_12453"'), "en_12453_force_meter"),
+        (("stiffness_n_per_mm = 500", "stiffness_n_per_mm = 500\nzzz = 1"), "zzz: unknown key"),
+        (("stiffness_n_per_mm = 500", "force_n = [0, 5]\ndeflection_mm = [0]"), "deflection_mm"),
+        (("stiffness_n_per_mm = 500", "force_n = [0, 5, 4]\ndeflection_mm = [0, 1, 2]"), "falls"),
+        (("stiffness_n_per_mm = 500", 'stiffness_n_per_mm = 500\ncompare_with = "stiff"'), "compare_with"),
+        (('"0.9m"', '"0.9"'), "give a number with its unit"),
+        (('positions = ["0.9m"]', 'positions = { from = "1m", to = "0.5m" }'), "is not after from"),
+        (("holdout/03.csv", "none/*.csv"), "no file matches"),
+        (('positions = ["0.9m"]', 'positions = ["0.9m"]\njoint = "x"'), "joint"),
+    ],
+)
+def test_a_wrong_section_names_its_key(gate: Path, change: tuple[str, str], message: str) -> None:
+    with pytest.raises(ConfigurationError) as fault:
+        read_benchmark_file(write(gate, INJECT.replace(*change)))
+    assert message in str(fault.value)
+
+
+def test_a_machine_without_mass_is_refused(gate: Path) -> None:
+    text = (gate / "model.toml").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("load_mass")]
+    (gate / "model.toml").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="load_mass"):
+        cdtool.inject(write(gate, INJECT), gate / "out")
+
+
+def test_files_of_others_are_never_replaced(gate: Path) -> None:
+    path = write(gate, INJECT)
+    (gate / "injected").mkdir()
+    (gate / "injected" / "notes.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(OutputError, match="holds other files"):
+        cdtool.benchmark(path)
+    assert (gate / "injected" / "notes.txt").read_text(encoding="utf-8") == "mine"
+    with pytest.raises(UsageError, match="not an empty folder"):
+        cdtool.inject(path, gate / "injected")
+
+
+def test_a_file_without_the_section_is_refused(gate: Path) -> None:
+    path = write(gate, '[impacts.stiff]\nlogs = ["stiff/03.csv"]\n')
+    with pytest.raises(ConfigurationError, match=r"no section \[inject\]"):
+        cdtool.inject(path, gate / "out")
+
+
+@pytest.mark.parametrize("positions", ['["0.9m", "900mm"]', '["4s", "4000 ms"]'])
+def test_a_position_that_is_given_twice_is_refused(gate: Path, positions: str) -> None:
+    with pytest.raises(ConfigurationError, match="repeats a position"):
+        read_benchmark_file(write(gate, INJECT.replace('["0.9m"]', positions)))
+
+
+def test_what_could_not_be_injected_is_counted(gate: Path) -> None:
+    path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "5m"]'))
+    skipped = [item for item in cdtool.benchmark(path).results.skipped if "never reaches 5" in item.reason]
+    assert [item.recording for item in skipped] == ["holdout/03.csv"]
+    assert command("benchmark", path).status == 3
+
+
+def test_a_folder_of_cdtool_inject_is_used_and_stays_the_users(gate: Path) -> None:
+    path = write(gate, INJECT)
+    assert command("inject", path, "-o", gate / "injected").status == 0
+    (gate / "injected" / "mine.txt").write_text("mine", encoding="utf-8")
+    made = {item.name: item.stat().st_mtime_ns for item in (gate / "injected").rglob("*")}
+    assert command("benchmark", path).status in (0, 3)
+    assert {item.name: item.stat().st_mtime_ns for item in (gate / "injected").rglob("*")} == made
+    done = command("benchmark", write(gate, INJECT.replace("0.9m", "0.8m")))
+    assert done.status == 2
+    assert "holds contacts that cdtool inject made with other settings" in done.err
+    assert (gate / "injected" / "mine.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_file_in_the_place_of_the_folder_is_one_line(gate: Path) -> None:
+    (gate / "injected").write_text("mine", encoding="utf-8")
+    done = command("benchmark", write(gate, INJECT))
+    assert done.status == 2
+    assert "holds other files" in done.err and "Traceback" not in done.err
+
+
+def test_a_recording_that_was_deleted_is_made_again(gate: Path) -> None:
+    path = write(gate, INJECT)
+    first = cdtool.benchmark(path)
+    made = next((gate / "injected" / "injected_stiff").iterdir())
+    made.unlink()
+    again = cdtool.benchmark(path)
+    assert made.is_file() and not again.results.skipped
+    assert again.results.contacts == first.results.contacts
+
+
+def test_a_contact_too_near_the_end_of_the_log_is_left_out_not_missed(gate: Path) -> None:
+    path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "1.39m"]\nduration_s = 2.0'))
+    results = cdtool.benchmark(path).results
+    assert {row.outcome for row in results.contacts} == {"detected"}
+    reasons = [item.reason for item in results.skipped]
+    assert any("the log ends" in reason and "choose an earlier position" in reason for reason in reasons)
+
+
+def test_a_comma_in_the_name_of_a_log_is_kept(gate: Path) -> None:
+    shutil.copy(GATE / "holdout" / "03.csv", gate / "run 3, door.csv")
+    path = write(gate, INJECT.replace("holdout/03.csv", "run 3, door.csv"))
+    assert command("inject", path, "-o", gate / "out").status == 0
+    done = cdtool.benchmark(gate / "out" / "benchmark.toml")
+    assert [row.outcome for row in done.results.contacts if row.detector == "momentum"] == ["detected"]
+
+
+def test_a_reason_is_stated_once_per_obstacle_not_per_bracket(gate: Path) -> None:
+    shutil.copy(GATE / "model.toml", gate / "model.toml")  # two brackets
+    path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "0.1s"]'))
+    reasons = [item.reason for item in cdtool.benchmark(path).results.skipped]
+    assert sum("at rest" in reason for reason in reasons) == 1
+    assert any(reason.startswith("stiff at 0.1 s: ") for reason in reasons)
+
+
+def test_a_dry_run_counts_the_contacts_that_are_not_made_yet_and_writes_nothing(gate: Path) -> None:
+    path = write(gate, INJECT)
+    words = ("benchmark", path, "--store", gate / "store", "--dry-run")
+    done = command(*words)
+    assert done.status == 0, done.err
+    assert "1 contact of [inject] would be made first" in done.out
+    assert not (gate / "injected").exists()
+    cdtool.benchmark(path)
+    done = command(*words)
+    assert "would be made first" not in done.out
+    assert "injected/injected_stiff/" in done.out and "1 of 1 recording would be computed" in done.out
+
+
+def test_changed_conditions_are_scored_beside_injected_contacts_and_not_copied(gate: Path) -> None:
+    conditions = (
+        '[impacts.stiff]\nlogs = ["stiff/03.csv"]\n'
+        '[conditions.worn]\nholdout.logs = ["holdout/04.csv"]\nimpacts.stiff.logs = ["soft/03.csv"]\n'
+    )
+    path = write(gate, INJECT + conditions)
+    results = cdtool.benchmark(path).results
+    assert results.groups == ("stiff", "injected_stiff")
+    assert [item.group for item in results.conditions] == ["worn/holdout", "worn/stiff"]
+    assert {row.group for row in results.recordings} == set(results.every_group)
+    cdtool.inject(path, gate / "out")
+    assert read_benchmark_file(gate / "out" / "benchmark.toml").conditions == ()

@@ -1,0 +1,57 @@
+"""A pressure of the contact beside the load cell: it changes no result, shows no contact, and is converted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import read_as_logged
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.recordings.units import UNITS, find_unit
+from tests.synthetic.pressure_rig import Run, write_pressure_rig
+
+
+@pytest.fixture
+def rig(tmp_path) -> Path:
+    write_pressure_rig(tmp_path, [Run(), Run()])
+    return tmp_path
+
+
+def test_the_units_of_pressure_are_those_of_their_definitions():
+    known = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "mbar": 100.0, "bar": 1e5, "N/cm2": 1e4, "N/mm2": 1e6}
+    assert {name: UNITS[name].factor for name in known} == known
+    assert UNITS["psi"].factor == pytest.approx(6894.757293168361, rel=1e-15)
+    assert find_unit("N/cm²") == find_unit("N/cm^2") == UNITS["N/cm2"] and find_unit("N/mm²") == UNITS["MPa"]
+    assert {unit.si for name, unit in UNITS.items() if name in (*known, "psi")} == {"Pa"}
+    assert find_unit("mPa") is None  # not a megapascal
+
+
+def test_a_benchmark_is_the_same_with_and_without_it(rig):
+    whole = cdtool.benchmark(rig / "benchmark.toml").results
+    machine = rig / "machine.toml"
+    lines = [line for line in machine.read_text(encoding="utf-8").splitlines() if "contact_pressure" not in line]
+    machine.write_text("\n".join(lines), encoding="utf-8")
+    bare = cdtool.benchmark(rig / "benchmark.toml").results
+    assert whole.contacts == bare.contacts and whole.recordings == bare.recordings
+
+
+def test_alone_it_does_not_show_a_contact(rig):
+    machine = rig / "machine.toml"
+    lines = [line for line in machine.read_text(encoding="utf-8").splitlines() if not line.startswith("force =")]
+    machine.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(RecordingError, match="no ground truth: none of 'force', 'label', 'event' is mapped"):
+        cdtool.benchmark(rig / "benchmark.toml")
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mcap", "h5", "parquet"])
+def test_a_converted_log_has_the_same_pressure(rig, suffix):
+    log, target = rig / "edge" / "01.csv", rig / f"converted.{suffix}"
+    converted = cdtool.convert(log, target, machine=rig / "machine.toml")
+    first = read_as_logged(log, read_machine_file(rig / "machine.toml")).recording["contact_pressure"]
+    other = read_as_logged(target, read_machine_file(converted.machine_files[0])).recording["contact_pressure"]
+    assert other.unit == "Pa"
+    np.testing.assert_allclose(other.values, first.values, rtol=1e-9)

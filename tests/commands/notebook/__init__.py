@@ -1,0 +1,1 @@
+"""The commands as functions: their results as values, frames and figures."""

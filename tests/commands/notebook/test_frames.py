@@ -1,0 +1,174 @@
+"""The DataFrames of results: names, types, values, and all of it without any row."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import cdtool
+from cdtool.base.errors import UsageError
+from cdtool.results.evaluated import evaluate
+from cdtool.results.files.results_folder import tables
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, Results
+from cdtool.results.summary import FIGURES
+from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE
+
+EMPTY = cdtool.BenchmarkResult(
+    evaluate(Results(provenance={}, detectors=("pt",), groups=("stiff",), contacts=(), false_alarms=(), exposure=()))
+)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return cdtool.benchmark(GATE / "benchmark.toml", detectors=["momentum", "pure_torque"])
+
+
+@pytest.fixture(scope="module")
+def found():
+    return cdtool.detect(LOG, MACHINE, detector="momentum", limit=[400.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("contacts", ContactResult), ("false_alarms", FalseAlarmResult), ("exposure", ExposureResult)]
+)
+def test_a_frame_has_the_fields_of_the_results_file_with_and_without_rows(result, name, kind):
+    full, empty = getattr(result, name), getattr(EMPTY, name)
+    names = [item.name for item in dataclasses.fields(kind)]
+    assert full.columns.tolist() == empty.columns.tolist() == names
+    assert len(full) == len(getattr(result.results, name)) and len(empty) == 0
+    assert [str(kind) for kind in full.dtypes] == [str(kind) for kind in empty.dtypes]
+
+
+def test_every_table_of_the_results_has_a_frame(result):
+    for name in tables():
+        assert len(result.frame(name)) == len(getattr(result.results, name)), name
+        assert len(EMPTY.frame(name).columns) > 1, name
+    with pytest.raises(UsageError, match="no table 'contact'"):
+        result.frame("contact")
+
+
+def test_the_columns_are_typed_and_hold_the_values_of_the_rows(result):
+    frame, rows = result.contacts, result.results.contacts
+    kinds = {name: str(frame[name].dtype) for name in ("recording", "detector", "outcome", "latency_ms", "contact")}
+    assert kinds == {
+        "recording": "string", "detector": "category", "outcome": "category", "latency_ms": "float64",
+        "contact": "int64",
+    }  # fmt: skip
+    assert frame.clipped.dtype == bool
+    for name in ("recording", "detector", "latency_ms", "outcome", "side", "reason"):
+        shown = [None if pd.isna(value) else value for value in frame[name]]
+        assert shown == [getattr(row, name) for row in rows], name
+
+
+def test_detectors_and_groups_are_in_the_order_of_the_benchmark_file(result):
+    assert result.contacts.detector.cat.categories.tolist() == list(result.results.detectors)
+    assert result.contacts.group.cat.categories.tolist() == ["stiff", "soft", "holdout"]
+    medians = result.contacts.groupby(["group", "detector"], observed=True).latency_ms.median()
+    assert medians.index.tolist()[0] == ("stiff", result.results.detectors[0])
+
+
+def test_a_frame_is_made_once(result):
+    assert result.contacts is result.contacts
+    assert result.frame("contacts") is not result.contacts
+
+
+def test_the_summary_has_the_metrics_of_the_limits(result):
+    summary = result.summary()
+    assert set(summary.columns) == set(FIGURES) and summary.index.names == ["group", "detector"]
+    assert (summary.dtypes == np.float64).all()
+    for item in result.evaluated.summaries:
+        row = summary.loc[(item.group, item.detector)]
+        assert (row.median_ms, row.contacts) == pytest.approx((item.median.value, item.contacts), nan_ok=True)
+    assert math.isnan(summary.loc[("holdout", "momentum"), "missed"])
+    empty = EMPTY.summary()
+    assert list(empty.columns) == list(summary.columns) and (empty.dtypes == np.float64).all()
+
+
+def test_a_recording_becomes_a_frame_with_the_names_of_convert(tmp_path):
+    recording = cdtool.read(LOG, MACHINE)
+    frame = recording.to_frame()
+    cdtool.convert(LOG, tmp_path / "log.csv", machine=MACHINE)
+    converted = pd.read_csv(tmp_path / "log.csv", comment="#")
+    # The file has the columns of the log, on the drive's side; the frame the channels on the load side.
+    names = [{column.partition(" [")[0] for column in columns} for columns in (converted.columns, frame.columns)]
+    assert names[0] - {"time"} <= names[1]
+    assert frame.index.name == "time_s" and len(frame) == len(recording["speed"])
+    assert np.array_equal(frame["speed [m/s]"], recording["speed"].values[:, 0], equal_nan=True)
+    assert recording.to_frame(["force"]).columns.tolist() == ["force [N]"]
+    with pytest.raises(cdtool.CdtoolError, match="no channel 'forse'"):
+        recording.to_frame(["forse"])
+
+
+def test_channels_with_clocks_of_their_own_are_not_interpolated():
+    speed = cdtool.Series(np.array([0.0, 0.2]), np.array([[1.0, 2.0], [3.0, 4.0]]), "rad/s")
+    force = cdtool.Series(np.array([0.0, 0.1]), np.array([5.0, 6.0]), "N")
+    frame = cdtool.Recording("two", "", ("arm", "forearm"), {"speed": speed, "force": force}).to_frame()
+    assert frame.columns.tolist() == ["speed arm [rad/s]", "speed forearm [rad/s]", "force [N]"]
+    assert frame.index.tolist() == [0.0, 0.1, 0.2]
+    assert frame.isna().to_numpy().tolist() == [[False] * 3, [True, True, False], [False, False, True]]
+
+
+def test_the_alarms_of_a_log_name_their_joint_and_contact(found):
+    (alarm,) = found.detections[0].verdict.alarms
+    assert alarm.joint == "gate" and found.alarms.joint.tolist() == ["gate"]
+    assert found.alarms.time_s[0] == alarm.time
+    assert found.alarms.contact_onset_s[0] == found.contacts.onset_s[0] == found.detected.contacts[0].start
+    assert found.contacts.latency_ms[0] == pytest.approx(1e3 * (alarm.time - found.contacts.onset_s[0]))
+
+
+def test_the_signal_becomes_a_frame_with_its_limits(found):
+    frame = found.to_frame()
+    assert frame.columns.tolist() == ["gate statistic", "gate lower", "gate upper", "gate status"]
+    valid = frame[frame["gate status"] == "VALID"]
+    outside = valid[valid["gate statistic"] > valid["gate upper"]]
+    assert 0.0 <= found.alarms.time_s[0] - outside.index[0] < 0.05
+
+
+def test_a_log_without_alarm_or_contact_has_empty_frames_with_all_columns(found):
+    quiet = cdtool.detect(GATE / "holdout" / "03.csv", MACHINE, detector="momentum", limit=[1e6])
+    assert quiet.outcome == "no alarm" and len(quiet.alarms) == len(quiet.contacts) == 0
+    for name in ("alarms", "contacts"):
+        full, empty = getattr(found, name), getattr(quiet, name)
+        assert full.dtypes.astype(str).to_dict() == empty.dtypes.astype(str).to_dict()
+
+
+def test_detect_takes_one_log_or_many_and_lists_what_cannot_be_read(tmp_path):
+    learned = cdtool.learn_signature(FREE, MACHINE, "gm")
+    broken = tmp_path / "broken.csv"
+    broken.write_text("no log\n", encoding="utf-8")
+    logs = [LOG, broken, GATE / "holdout" / "03.csv"]
+    found = cdtool.detect(logs, MACHINE, signature=learned)
+    assert [log.outcome for log in found] == ["alarm", "no alarm"]
+    assert found.skipped.recording.tolist() == [str(broken)]
+    one = cdtool.detect(LOG, MACHINE, signature=learned)
+    pd.testing.assert_frame_equal(one.contacts, found[0].contacts)
+    assert found.summary().verdict.tolist() == ["alarm", "no alarm"]
+    assert found[:1].alarms.equals(one.alarms) and len(found.contacts) == 1
+    with pytest.raises(cdtool.CdtoolError, match=r"none of 1 log can be used, the first: .*broken"):
+        cdtool.detect([broken], MACHINE, signature=learned)
+    with pytest.raises(cdtool.CdtoolError, match="unknown detector"):
+        cdtool.detect(logs, MACHINE, detector="momentun", limit=[1.0])
+
+
+def test_results_are_read_back_from_their_file(result, tmp_path):
+    assert [path.name for path in result.save(tmp_path / "results.json")] == ["results.json"]
+    again = cdtool.read_results(tmp_path / "results.json")
+    pd.testing.assert_frame_equal(again.contacts, result.contacts)
+    pd.testing.assert_frame_equal(again.summary(), result.summary())
+    with pytest.raises(UsageError):
+        result.save(GATE / "benchmark.toml", force=True)
+
+
+def test_every_frame_of_a_log_cut_into_strokes_names_the_log(tmp_path):
+    groups = {"learn": "free/*.csv", "holdout": "*/03.csv", "impacts.stiff": "stiff/04.csv"}
+    tables = "".join(f'[{name}]\nlogs = ["{GATE}/{logs}"]\n' for name, logs in groups.items())
+    study = tmp_path / "benchmark.toml"
+    text = f'machine = "{MACHINE}"\noperations = "motion"\n[signature]\nforce = true\nsafety_factor = 0.3\n{tables}'
+    study.write_text(text.replace("free/*.csv", "free/[01][04-9].csv"))
+    found = cdtool.benchmark(study, detectors=["momentum"])
+    named = {name: found.frame(name).recording for name in ("contacts", "false_alarms", "recordings", "skipped")}
+    assert all(len(names) and names.str.endswith(".csv").all() for names in named.values()), named

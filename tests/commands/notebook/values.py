@@ -1,0 +1,63 @@
+"""The values that the functions of the Python API return for the sample gate, and everything in them. No tests."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import cdtool
+
+ROOT = Path(__file__).parents[3]
+GATE = ROOT / "sample_logs" / "gate"
+MACHINE = GATE / "machine.toml"
+LOG = GATE / "stiff" / "03.csv"
+FREE = sorted((GATE / "free").iterdir())
+
+
+def returned_values(folder: Path) -> dict[str, Any]:
+    """What each function returns; `folder` is for files."""
+    learned = cdtool.learn_signature(FREE, MACHINE, "feekf")
+    learned.save(folder / "gate.json")
+    result = cdtool.benchmark(GATE / "benchmark.toml", detectors=["momentum", "friction_ekf"])
+    return {
+        "read": cdtool.read(LOG, MACHINE),
+        "read_machine_file": cdtool.read_machine_file(MACHINE),
+        "info": cdtool.info(LOG, machine=MACHINE),
+        "learn_signature": learned,
+        "check_signature": cdtool.check_signature(folder / "gate.json", FREE, MACHINE),
+        "detect": cdtool.detect(LOG, MACHINE, signature=learned),
+        "detect of many": cdtool.detect([LOG, GATE / "holdout" / "03.csv"], MACHINE, signature=learned),
+        "detect_runs": cdtool.detect_runs(LOG, MACHINE, signature=learned),
+        "explain": cdtool.explain(LOG, MACHINE, signature=learned),
+        "benchmark": result,
+        "score": cdtool.score(ROOT / "docs" / "examples" / "triggers.csv", GATE / "benchmark.toml"),
+        "compare": cdtool.compare(result.results, result.results),
+        "plan": cdtool.plan(missed_at_most="5%"),
+        "init": cdtool.init(LOG, folder / "draft.toml"),
+        "study_sensors": cdtool.study_sensors(MACHINE),
+    }
+
+
+def values_in(value: Any, seen: dict[int, Any]) -> Iterator[Any]:
+    """Every dataclass instance in a value, in its fields and in what they contain, each once, and the value itself."""
+    if id(value) in seen:
+        return
+    seen[id(value)] = value
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        yield value
+        for item in dataclasses.fields(value):
+            yield from values_in(getattr(value, item.name), seen)
+    elif isinstance(value, Mapping):
+        for item in value.values():
+            yield from values_in(item, seen)
+    elif isinstance(value, Sequence) and not isinstance(value, str):
+        for item in value[:200]:
+            yield from values_in(item, seen)
+
+
+def is_plain_row(value: Any) -> bool:
+    """Whether a value has only texts and numbers: a row of a table, which is shown with all its fields."""
+    held = [getattr(value, item.name) for item in dataclasses.fields(value)]
+    return all(item is None or isinstance(item, str | int | float | Path) for item in held)

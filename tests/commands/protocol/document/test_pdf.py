@@ -1,0 +1,193 @@
+"""The protocol as PDF/A: tags, fonts, identification, page numbers, the hash on every page, no orphaned heading."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from cdtool.base.errors import UsageError
+from cdtool.commands.protocol.assessment.protocol import Protocol
+from cdtool.commands.protocol.assessment.reasons import Reason, Verdict
+from cdtool.commands.protocol.document.blocks import Grid, Heading, Items
+from cdtool.commands.protocol.document.document import protocol_document
+from cdtool.commands.protocol.document.pdf import to_pdf
+from cdtool.commands.protocol.document.words import words_of
+from tests.commands.protocol.document.conftest import LONG
+from tests.report.hostile import HOSTILE
+
+CASES = ["pass", "fail", "incomplete", "pressure_en", "pressure_de"]
+
+
+@pytest.fixture(scope="module")
+def pypdf() -> Any:
+    pytest.importorskip("typst", reason="needs the extra pdf")
+    return pytest.importorskip("pypdf")
+
+
+def many(protocol: Protocol, times: int) -> Protocol:
+    """Return a protocol with many points: its tables and curves run over several pages."""
+    (point,) = protocol.points
+    points = [replace(point, point=replace(point.point, name=f"edge {number}")) for number in range(times)]
+    return replace(protocol, plan=replace(protocol.plan, points=tuple(p.point for p in points)), points=tuple(points))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_is_a_tagged_pdf_a_with_its_language_and_title(name, documents, pypdf):
+    document = documents[name]
+    root = pypdf.PdfReader(io.BytesIO(to_pdf(document))).trailer["/Root"]
+    assert root["/MarkInfo"]["/Marked"] and "/StructTreeRoot" in root
+    assert root["/Lang"] == document.language
+    xmp = root["/Metadata"].get_data().decode()
+    assert re.search(r"pdfaid:part\D+2\b", xmp) and re.search(r"pdfaid:conformance\W+A\b", xmp)
+    assert document.title in xmp
+
+
+def structure(node: Any) -> list[str]:
+    """Return the kinds of all tags below a node of the structure tree."""
+    node = node.get_object() if hasattr(node, "get_object") else node
+    if not hasattr(node, "get"):
+        return []
+    kids = node.get("/K", [])
+    kids = kids if isinstance(kids, list) else [kids]
+    return [str(node.get("/S", "")), *(kind for kid in kids for kind in structure(kid))]
+
+
+def test_headings_tables_lists_and_figures_are_tagged_as_such(documents, pypdf):
+    document = documents["incomplete"]
+    root = pypdf.PdfReader(io.BytesIO(to_pdf(document))).trailer["/Root"]
+    kinds = structure(root["/StructTreeRoot"])
+    assert kinds.count("/H1") == 1
+    assert kinds.count("/H2") == sum(isinstance(item, Heading) and item.level == 1 for item in document.blocks)
+    assert kinds.count("/Figure") == 1 and {"/L", "/LI", "/Table", "/TR", "/TH", "/TD"} <= set(kinds)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_font_is_embedded(name, documents, pypdf):
+    reader = pypdf.PdfReader(io.BytesIO(to_pdf(documents[name])))
+    fonts = [font for page in reader.pages for font in _fonts(page["/Resources"])]
+    assert len(fonts) > 3
+    for font in fonts:
+        inner = font["/DescendantFonts"][0].get_object() if "/DescendantFonts" in font else font
+        descriptor = inner["/FontDescriptor"]
+        assert {"/FontFile", "/FontFile2", "/FontFile3"} & set(descriptor), font["/BaseFont"]
+
+
+def _fonts(resources: Any) -> list[Any]:
+    """Return the fonts of a page and of the drawings on it."""
+    resources = resources.get_object()
+    found = [font.get_object() for font in resources.get("/Font", {}).values()]
+    for drawing in resources.get("/XObject", {}).values():
+        if "/Resources" in drawing.get_object():
+            found += _fonts(drawing.get_object()["/Resources"])
+    return found
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_page_has_the_hash_of_the_data_and_its_number(name, documents, protocols, pypdf):
+    document = documents[name]
+    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages]
+    for number, text in enumerate(pages, 1):
+        assert protocols[name].data_sha256 in re.sub(r"\s", "", text)
+        assert document.page.format(page=number, pages=len(pages)) in text
+
+
+def squeezed(text: str) -> str:
+    """Return a text without white space, soft hyphens and places to break."""
+    return re.sub(r"[\s\u00ad\u200b-]", "", text)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_text_holds_every_cell_of_the_document(name, documents, pypdf):
+    document = documents[name]
+    reader = pypdf.PdfReader(io.BytesIO(to_pdf(document)))
+    text = squeezed("".join(page.extract_text() for page in reader.pages))
+    cells = [cell for block in document.blocks if isinstance(block, Grid) for row in block.rows for cell in row]
+    assert len(cells) > 60
+    assert [cell for cell in cells if squeezed(cell) not in text] == []
+
+
+def test_names_and_numbers_can_be_searched_and_copied_unless_a_name_is_longer_than_its_column(documents, pypdf):
+    texts = []
+    for name in ("pass", "incomplete"):
+        pages = pypdf.PdfReader(io.BytesIO(to_pdf(documents[name]))).pages
+        texts.append(" ".join(" ".join(page.extract_text() for page in pages).split()))
+    assert "\u200b" not in texts[0]
+    assert "profile en_12453_reducing_gap were not" in texts[0] and "3 edge/03.csv 0.2 451 235.1" in texts[0]
+    assert LONG in squeezed(texts[1]) and LONG not in texts[1]
+
+
+@pytest.mark.parametrize("times", [1, 2, 4])
+def test_no_heading_is_the_last_text_of_a_page(times, protocols, pypdf):
+    document = protocol_document(many(protocols["fail"], times))
+    headings = {squeezed(item.text) for item in document.blocks if isinstance(item, Heading)}
+    for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages:
+        lines = [squeezed(line) for line in page.extract_text().splitlines() if line.strip()]
+        footer = next(n for n, line in enumerate(lines) if line.startswith("Daten(SHA256)"))
+        body = [line for line in lines[:footer] if line]
+        assert body[-1] not in headings, body
+
+
+@pytest.mark.parametrize("name", ["fail", "incomplete"])
+def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, protocols, pypdf):
+    long = "Nebenschließkante {number}, 300 mm über dem Boden, bei geöffnetem Flügel, von der Straße aus gesehen"
+    made = many(protocols[name], 25)
+    points = tuple(
+        replace(point, point=replace(point.point, name=long.format(number=number)), repetitions=())
+        for number, point in enumerate(made.points)
+    )
+    reasons = tuple(
+        Reason(item.kind, {**item.values, "point": point.point.name}, item.cause)
+        for point in points
+        for item in point.reasons
+    )
+    plan = replace(made.plan, language="en", points=tuple(item.point for item in points))
+    document = protocol_document(replace(made, plan=plan, points=points, verdict=Verdict(reasons)))
+    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages]
+    first = " ".join(pages[0].split())
+    assert first.index("Nebenschließkante 0") < first.index("To be observed")
+    more, page = re.search(r"and (\d+) more, see all reasons on page (\d+)", first).groups()
+    assert "All reasons" in pages[int(page) - 1] and int(page) == 2
+    listed = next(item.items for item in document.blocks if isinstance(item, Items))
+    assert len(listed) + int(more) == len(reasons) and len(listed) >= 3
+    everything = squeezed("".join(pages))
+    assert all(squeezed(words_of("en").reason(item)) in everything for item in reasons)
+
+
+def test_a_few_reasons_are_listed_once(documents):
+    headings = [item.text for item in documents["incomplete"].blocks if isinstance(item, Heading)]
+    assert "All reasons" not in headings and "What is incomplete" in headings
+
+
+def test_hostile_names_are_text_and_the_same_document_gives_the_same_bytes(protocols, pypdf):
+    hostile = "".join(HOSTILE.values()) + "#panic() $x$ *b* `c` \\"
+    plan = replace(protocols["pass"].plan, machine=replace(protocols["pass"].plan.machine, maker=hostile))
+    document = protocol_document(replace(protocols["pass"], plan=plan))
+    made = to_pdf(document)
+    assert made == to_pdf(document)
+    assert "#panic()" in "".join(page.extract_text() for page in pypdf.PdfReader(io.BytesIO(made)).pages)
+
+
+def test_a_long_name_of_a_point_breaks_in_its_heading(protocols, pypdf):
+    (point,) = protocols["pass"].points
+    long = replace(point, point=replace(point.point, name="Nebenschließkante" * 12))
+    made = to_pdf(protocol_document(replace(protocols["pass"], points=(long,))))
+    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(made)).pages]
+    # 176 mm hold about 100 characters.
+    assert max(len(line) for text in pages for line in text.splitlines() if "Nebenschließkante" in line) < 150
+
+
+def test_the_only_date_in_it_is_the_day_of_the_test(documents, pypdf):
+    info = pypdf.PdfReader(io.BytesIO(to_pdf(documents["pass"]))).metadata
+    assert str(info["/CreationDate"]).startswith("D:20260331")
+    undated = pypdf.PdfReader(io.BytesIO(to_pdf(replace(documents["pass"], day=None)))).metadata
+    assert str(undated["/CreationDate"]).startswith("D:19700101")  # PDF/A requires one
+
+
+def test_without_the_library_one_line_says_what_to_install(documents, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "typst", None)
+    with pytest.raises(UsageError, match=r"needs typst.*pip install '\.\[pdf\]'"):
+        to_pdf(documents["pass"])

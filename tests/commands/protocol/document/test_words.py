@@ -1,0 +1,108 @@
+"""Both languages say the same: the same keys, the same placeholders, numbers and dates as usual there."""
+
+from __future__ import annotations
+
+import datetime as dt
+import string
+import typing
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Verdict
+from cdtool.commands.protocol.document.words import LANGUAGES, words_of
+from cdtool.truth.force.limits import read_force_limits
+from cdtool.truth.force.verdict import CauseKind, StepCause
+
+
+def placeholders(text: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(text) if name is not None}
+
+
+def texts(language: str) -> dict[str, str]:
+    tables = words_of(language).texts
+    return {
+        f"{table}.{key}": text for table, keys in tables.items() if isinstance(keys, dict) for key, text in keys.items()
+    }
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_language_has_the_same_keys_and_the_same_placeholders(language):
+    english, other = texts("en"), texts(language)
+    assert list(other) == list(english)
+    assert {key: placeholders(text) for key, text in other.items()} == {
+        key: placeholders(text) for key, text in english.items()
+    }
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_reason_and_every_cause_has_a_sentence(language):
+    known = texts(language)
+    assert {f"reason.{kind.value}" for kind in ReasonKind} == {key for key in known if key.startswith("reason.")}
+    assert {f"cause.{kind}" for kind in typing.get_args(CauseKind)} == {
+        key for key in known if key.startswith("cause.")
+    }
+    causes, of_pressure = (words_of(language).texts[table] for table in ("cause", "pressure_cause"))
+    assert {key: placeholders(text) for key, text in causes.items()} == {
+        key: placeholders(text) for key, text in of_pressure.items()
+    }
+
+
+def test_the_causes_have_the_placeholders_of_their_numbers():
+    from cdtool.truth.force import verdict
+
+    for kind, sentence in verdict._SENTENCES.items():
+        assert placeholders(texts("en")[f"cause.{kind}"]) == placeholders(sentence)
+
+
+def test_numbers_and_dates_are_as_usual_in_the_language():
+    english, german = words_of("en"), words_of("de")
+    assert (english.number(1234.56), german.number(12.345)) == ("1235", "12,35")
+    assert (english.number(123456.0), german.number(-0.5), german.number(None)) == ("123456", "−0,5", "–")
+    day = dt.date(2026, 3, 1)
+    assert (english.value(day), german.value(day)) == ("1 March 2026", "01.03.2026")
+
+
+def test_a_cause_is_part_of_the_sentence_of_its_reason():
+    values = {"point": "edge", "repetition": 2, "recording": "a.csv", "step": "static"}
+    reason = Reason(ReasonKind.NOT_ASSESSABLE, values, StepCause("samples_missing", {"missing_ms": 12.5}))
+    wanted = "edge, Wiederholung 2 (a.csv), statisch: Werte der Kraftmessdose fehlen für 12,5 ms"
+    assert words_of("de").reason(reason) == wanted
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
+    names = {step.name for profile in read_force_limits().values() for step in profile.steps}
+    assert names == set(words_of(language).texts["step"])
+    assert words_of(language).name("step", "my step") == "my step"
+    areas = {item.area for profile in read_force_limits().values() for item in profile.pressures}
+    assert areas == set(words_of(language).texts["area"])
+
+
+def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():
+    reasons = tuple(Reason(ReasonKind.NO_VALUE, {"key": key, "file": "p.toml"}) for key in ("a", "b"))
+    assert words_of("en").reasons(Verdict(reasons), "incomplete") == ["Missing in p.toml: a, b"]
+
+
+def test_no_value_of_a_reason_is_rounded_across_its_limit():
+    words = words_of("de")
+    exceeds = {"point": "edge", "step": "dynamic", "limit": 400.0, "count": 3, "averaged": "mean"}
+    assert "400,04 N, Grenze 400 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**exceeds, "force": 400.04}))
+    assert "Spitzenwerten 412,3 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**exceeds, "force": 412.345}))
+    about = {"point": "edge", "repetition": 1, "recording": "a.csv", "profile": "p", "step": "static"}
+    short = Reason(ReasonKind.RECORD_TOO_SHORT, {**about, "end": 4.99996, "needed": 5.0})
+    assert "endet 4,99996 s nach dem Kontakt, p fordert 5 s" in words.reason(short)
+    beyond = Reason(ReasonKind.BEYOND_RANGE, {**about, "reading": 5000.4, "range": 5000.0})
+    assert "5000,4 N" in words.reason(beyond)
+    cause = StepCause("may_exceed", {"missing_ms": 3.0, "most": 150.004, "limit": 150.0})
+    assert "150,004 N" in words.reason(Reason(ReasonKind.NOT_ASSESSABLE, about, cause))
+    assert "150.004 N" in cause.sentence()
+
+
+@given(st.floats(-2000.0, 2000.0), st.sampled_from([25.0, 150.0, 400.0, 1234.5, 399.98]))
+def test_a_value_beside_its_limit_is_on_the_same_side_as_it_is_shown(value, limit):
+    words = words_of("en")
+    shown, shown_limit = (float(text.replace("−", "-")) for text in (words.beside(value, limit), words.limit(limit)))
+    assert shown_limit == limit and (shown > limit) == (value > limit)
+    assert shown == pytest.approx(value, rel=1e-3)

@@ -1,0 +1,252 @@
+"""From a rig's recordings to a protocol to sign, by the steps that the commands themselves name."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from cdtool.commands.protocol.document.names import protocol_names
+from tests.command import Outcome, cdtool
+from tests.synthetic.force_rig import half_sine, write_protocol, write_rig
+
+FORCES = (half_sine(300.0), half_sine(320.0), half_sine(340.0))
+FILLED_IN = {
+    "type": '"sliding door"',
+    "maker": '"A"',
+    "serial_number": '"1"',
+    "installation": '"hall"',
+    "software_version": '"1.0"',
+    "tester": '"B"',
+    "date": "2026-03-31",
+    "place": '"C"',
+    "temperature_c": "20",
+    "model": '"Rig"',
+    "calibrated_on": "2026-01-15",
+    "calibration_valid_until": "2027-01-14",
+    "range_n": "2000",
+    "accuracy_class": '"1"',
+    "filter": '"none"',
+    "position": '"closing edge"',
+    "region": '"gap of 300 mm"',
+    "obstacle_stiffness_n_per_mm": "500",
+    "contact_area_mm2": "5027",
+    "speed_m_per_s": "0.2",
+    "profile": '"en_12453_reducing_gap"',
+}
+
+
+def commands(outcome: Outcome) -> list[list[str]]:
+    """Return the commands that an output names as next steps."""
+    lines = [line.strip() for line in outcome.out.splitlines()]
+    return [shlex.split(line)[1:] for line in lines if line.startswith("cdtool ")]
+
+
+def fill_in(path: Path) -> None:
+    """Fill in a draft, as a person would."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    for number, line in enumerate(lines):
+        if "# FILL IN" in line:
+            lines[number] = f"{line.split(' = ')[0]} = {FILLED_IN[line.split(' = ')[0]]}"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def test_from_a_rig_s_logs_to_a_protocol_in_four_commands_each_named_by_the_one_before(tmp_path, monkeypatch):
+    write_rig(tmp_path, FORCES)
+    monkeypatch.chdir(tmp_path)
+    first = cdtool("init", *sorted(Path("edge").glob("*.csv")), "-m", "machine.toml", "-o", "study")
+    steps = {words[0]: words for words in commands(first)}
+    drafted = cdtool(*steps["protocol"])
+    assert drafted.status == 0, drafted.err
+    (check,) = commands(drafted)
+    incomplete = cdtool(*check)
+    assert incomplete.status == 4 and "Missing in protocol.toml" in incomplete.out
+    fill_in(tmp_path / "study" / "protocol.toml")
+    complete = cdtool(*check)
+    assert complete.status == 0, complete.out
+    (benchmark,) = commands(complete)
+    assert benchmark[0] == "benchmark" and benchmark[-1] == "protocol.pdf"
+    made = cdtool(*benchmark[:-1], "protocol.html")
+    assert made.status == 0 and "protocol: pass" in made.out, made.out + made.err
+    assert "print and sign" in made.out and "PASS" in Path("protocol.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def force_rig(tmp_path, monkeypatch) -> list[Path]:
+    """Return recordings with only a force, as a German rig writes them, in the current folder."""
+    write_rig(tmp_path, FORCES)
+    monkeypatch.chdir(tmp_path)
+    for path in Path("edge").iterdir():
+        rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+        text = "".join(f"{row[0]};{row[3]}\n" for row in rows[1:]).replace(".", ",")
+        path.write_text(f"Zeit [s];Kraft [N]\n{text}", encoding="utf-8")
+    return sorted(Path("edge").iterdir())
+
+
+def test_a_rig_that_has_only_a_force_needs_five_commands_each_named_by_the_one_before(force_rig, tmp_path):
+    first = cdtool("init", *force_rig, "-o", "study")
+    info, draft = commands(first)
+    assert (info[0], draft[:2]) == ("info", ["protocol", "init"])  # no benchmark: there is nothing to score
+    (check,) = commands(cdtool(*draft))
+    incomplete = cdtool(*check)
+    assert (incomplete.status, commands(incomplete)[0][:2]) == (4, ["protocol", "write"])
+    fill_in(tmp_path / "study" / "protocol.toml")
+    (write,) = commands(cdtool(*check))
+    assert write[:2] == ["protocol", "write"]
+    made = cdtool(*write[:-1], "protocol.html")
+    assert made.status == 0 and "protocol: pass" in made.out, made.out + made.err
+    nothing = cdtool("protocol", "write", "study/protocol.toml")
+    assert nothing.status == 2 and "-o protocol.pdf" in nothing.err
+
+
+def test_a_benchmark_without_detectors_takes_those_of_the_option_and_else_names_the_protocol(rig, tmp_path):
+    path = rig / "without.toml"
+    path.write_text((rig / "benchmark.toml").read_text(encoding="utf-8").replace('["gm"]', "[]"), encoding="utf-8")
+    refused = cdtool("benchmark", path)
+    assert refused.status == 2 and f"cdtool protocol init {path}" in refused.err.replace("\n", " ")
+    scored = cdtool("benchmark", path, "--detectors", "gm", "-o", tmp_path / "results.json")
+    assert scored.status == 0, scored.err
+    assert json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))["detectors"] == ["momentum"]
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("rig")
+    write_rig(folder, FORCES)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("flaws", "status", "word"),
+    [({}, 0, "pass"), ({"valid_until": "2026-01-20"}, 4, "incomplete"), ({"repetitions": 4}, 4, "incomplete")],
+)
+def test_the_exit_status_is_that_of_the_verdict(flaws, status, word, rig, tmp_path):
+    path = write_protocol(rig, **flaws)
+    made = cdtool("benchmark", rig / "benchmark.toml", "-p", path, "-o", tmp_path / "Prüfprotokoll.html")
+    assert (made.status, f"protocol: {word}" in made.out) == (status, True), made.out + made.err
+
+
+def test_a_failed_protocol_is_the_first_sentence_everywhere_and_exits_with_1(tmp_path):
+    write_rig(tmp_path, [half_sine(peak) for peak in (700.0, 710.0, 720.0)])
+    benchmark = tmp_path / "benchmark.toml"
+    limits = '\n[limits]\n"*.missed" = { max = 3 }\n"*.false_alarms" = { max = 9 }\n'
+    benchmark.write_text(benchmark.read_text(encoding="utf-8") + limits, encoding="utf-8")
+    targets = [tmp_path / name for name in ("protocol.html", "report.html", "report.md", "junit.xml", "results.json")]
+    options = [word for path in targets for word in ("-o", path)]
+    made = cdtool("benchmark", benchmark, "-p", write_protocol(tmp_path), *options)
+    fail = "est protocol: fail: 1 of 1 measuring points do not pass"
+    assert made.status == 1 and made.out.startswith(f"t{fail}; all 2 limits are met")
+    document, html, markdown, junit, results = (path.read_text(encoding="utf-8") for path in targets)
+    assert fail.partition("fail: ")[2] in document
+    assert f'<p class="verdict bad"><strong>T{fail}; all 2' in html
+    assert (
+        markdown.startswith(f"# Collision detection: t{fail}; all 2") and f'"failure" message="t{fail}; all 2' in junit
+    )
+    assert json.loads(results)["conclusion"]["headline"].startswith(f"t{fail}; all 2")
+    again = cdtool("report", targets[-1])
+    assert (again.status, again.out.splitlines()[0]) == (1, made.out.splitlines()[0])
+
+
+def test_a_protocol_and_other_reports_are_written_together_and_only_their_own_files_replaced(rig, tmp_path):
+    path = write_protocol(rig)
+    targets = [word for name in ("gate-protocol.html", "report.html", "r.json") for word in ("-o", tmp_path / name)]
+    for _ in range(2):
+        assert cdtool("benchmark", rig / "benchmark.toml", "-p", path, *targets).status == 0
+    assert "<title>Test protocol" in (tmp_path / "gate-protocol.html").read_text(encoding="utf-8")
+    assert "<title>Collision detection" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    (tmp_path / "gate-protocol.html").write_text("written by hand", encoding="utf-8")
+    refused = cdtool("benchmark", rig / "benchmark.toml", "-p", path, *targets)
+    assert refused.status == 2 and "contains no test protocol of cdtool" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("file", "removed", "named"),
+    [
+        ("benchmark.toml", r"threshold = .*\n", "learn: is missing"),
+        ("machine.toml", r"force = .*\n", "Missing in machine.toml: channels.force"),
+    ],
+)
+def test_check_is_not_complete_where_the_next_command_fails(rig, tmp_path, file, removed, named):
+    rig = shutil.copytree(rig, tmp_path / "rig")
+    path = write_protocol(rig)
+    assert cdtool("protocol", "check", path).status == 0
+    text = (rig / file).read_text(encoding="utf-8")
+    (rig / file).write_text(re.sub(removed, "", text), encoding="utf-8")
+    checked = cdtool("protocol", "check", path)
+    assert checked.status == 4
+    assert named in " ".join(checked.out.split())
+
+
+@pytest.mark.parametrize(
+    ("names", "protocols"),
+    [
+        (["prot.pdf"], ["prot.pdf"]),
+        (["gate 7.HTML", "report.html", "results.json"], ["gate 7.HTML"]),
+        (["latency.pdf", "prot.html"], ["prot.html"]),
+        (["protocol.pdf", "gate.html"], ["protocol.pdf"]),
+        (["report.html", "latency.pdf"], []),
+    ],
+)
+def test_with_p_every_pdf_or_html_is_the_protocol_unless_one_has_its_name(names, protocols):
+    documents, others = protocol_names([Path(name) for name in names], is_wanted=True)
+    assert [path.name for path in documents] == protocols
+    assert [path.name for path in others] == [name for name in names if name not in protocols]
+    assert protocol_names([Path("prot.pdf")], is_wanted=False)[0] == []
+
+
+def test_with_p_the_protocol_may_have_any_name(rig, tmp_path):
+    made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "prot.html")
+    assert (made.status, "written: " in made.out) == (0, True)
+    assert "<title>Test protocol" in (tmp_path / "prot.html").read_text(encoding="utf-8")
+
+
+def test_a_protocol_without_its_file_and_a_file_without_a_protocol_name_the_next_step(rig, tmp_path):
+    benchmark = rig / "benchmark.toml"
+    without = cdtool("benchmark", benchmark, "-o", tmp_path / "protocol.html")
+    assert without.status == 2 and "cdtool protocol init" in without.err
+    unused = cdtool("benchmark", benchmark, "-p", write_protocol(rig), "-o", tmp_path / "report.html")
+    assert unused.status == 2 and "-o protocol.pdf" in unused.err
+    other = tmp_path / "other.toml"
+    other.write_text("[protocols]\n", encoding="utf-8")
+    for wrong in ("[protocols]\n", ""):
+        other.write_text(wrong, encoding="utf-8")
+        refused = cdtool("protocol", "check", other)
+        assert refused.status == 2 and "other.toml" in refused.err and len(refused.err.splitlines()) == 1
+
+
+def test_without_typst_a_pdf_is_refused_before_the_benchmark_runs(rig, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "typst", None)
+    made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "protocol.pdf")
+    assert made.status == 2 and made.out == ""
+    assert "pip install '.[pdf]'" in made.err and len(made.err.splitlines()) == 1
+
+
+def test_a_pdf_has_every_number_of_the_results_that_the_protocol_shows(rig, tmp_path):
+    pytest.importorskip("typst", reason="needs the extra pdf")
+    pypdf = pytest.importorskip("pypdf")
+    benchmark = rig / "with_force.toml"
+    text = (rig / "benchmark.toml").read_text(encoding="utf-8")
+    benchmark.write_text(text + '[force]\nprofile = "en_12453_reducing_gap"\n', encoding="utf-8")
+    path = rig / "with_force_protocol.toml"
+    written = write_protocol(rig).read_text(encoding="utf-8")
+    path.write_text(written.replace('"benchmark.toml"', '"with_force.toml"'), encoding="utf-8")
+    targets = ("-o", tmp_path / "protocol.pdf", "-o", tmp_path / "results.json")
+    assert cdtool("benchmark", benchmark, "-p", path, *targets).status == 0
+    shown = "".join(page.extract_text() for page in pypdf.PdfReader(tmp_path / "protocol.pdf").pages)
+    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    numbers = [step["peak_n"] for row in results["forces"] for step in row["steps"]]
+    numbers += [row["latency_ms"] for row in results["contacts"]]
+    words = re.findall(r"[\d.]+", shown)
+    assert len(numbers) == 12
+    assert [value for value in numbers if f"{value:.4g}" not in words] == []
+    assert all(row["sha256"] in shown for row in results["recordings"])
+
+
+def test_check_as_json_lists_kinds_and_keys(rig):
+    checked = json.loads(cdtool("protocol", "check", write_protocol(rig, valid_until="2026-01-20"), "--json").out)
+    assert checked["complete"] is False and checked["recordings"] == {"edge": 3}
+    assert [item["kind"] for item in checked["incomplete"]] == ["calibration_expired"]

@@ -1,0 +1,175 @@
+"""A benchmark in several processes: everything that goes to a worker and back, and the same bytes for any number."""
+
+import pickle
+import sys
+import threading
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+
+import pytest
+
+import cdtool
+from cdtool.commands.judging import runs
+from cdtool.commands.scoring import gathering, learned_thresholds
+from cdtool.execution.workers import Workers, in_order
+from cdtool.results.files.results_file import to_json
+from cdtool.results.traces.file import encode_traces
+from cdtool.thresholds import THRESHOLDS
+
+SAMPLES = Path(__file__).parents[3] / "sample_logs" / "gate"
+FILE = """machine = "machine.toml"
+threshold = "{threshold}"
+
+[signature]
+force = true
+[learn]
+logs = ["free/*.csv"]
+[holdout]
+logs = ["holdout/*.csv"]
+[impacts.stiff]
+logs = ["stiff/*.csv", "damaged/*.csv"]
+[onset]
+above_n = 20.0
+back_to_n = 8.0
+"""
+
+
+@pytest.fixture(scope="module")
+def gate(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("gate")
+    cdtool.simulate_gate(folder, {"free": 5, "holdout": 3, "stiff": 4}, seed=16)
+    damaged = folder / "damaged"
+    damaged.mkdir()
+    (damaged / "1.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
+    text = (folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
+    (damaged / "2.csv").write_text("\n".join(text[:2000] + text[2400:]) + "\n", encoding="utf-8")
+    return folder
+
+
+def run(folder: Path, threshold: str, jobs: int = 1) -> bytes:
+    file = folder / f"{threshold}.toml"
+    file.write_text(FILE.format(threshold=threshold), encoding="utf-8")
+    detectors = ["all"] if threshold == "signature" else ["momentum", "friction_ekf"]
+    done = cdtool.benchmark(file, detectors=detectors, jobs=jobs)
+    assert done.traces and done.results.skipped
+    return to_json(done.results).encode() + encode_traces(done.traces)
+
+
+@pytest.fixture(scope="module")
+def by_one(gate) -> Callable[[str], bytes]:
+    """by_one(threshold): what one process computes; each threshold is computed once."""
+    return cache(partial(run, gate))
+
+
+@pytest.mark.parametrize("threshold", THRESHOLDS.names())
+def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, by_one, threshold, monkeypatch):
+    alone = by_one(threshold)
+    sent = []
+
+    def by_pickles(work, items, *_, **__):
+        work = pickle.loads(pickle.dumps(work))
+        for item in items:
+            result = pickle.dumps(work(pickle.loads(pickle.dumps(item))))
+            sent.append(len(result))
+            yield pickle.loads(result)
+
+    monkeypatch.setattr(gathering, "in_order", by_pickles)
+    monkeypatch.setattr(runs, "in_order", by_pickles)
+    assert run(gate, threshold) == alone
+    assert len(sent) == 14
+
+
+def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
+    """Of 60 logs, pieces have up to 3 in two processes."""
+    for name in ("free", "holdout", "machine.toml"):
+        (tmp_path / name).symlink_to(gate / name)
+    (tmp_path / "damaged").symlink_to(gate / "damaged")
+    (tmp_path / "stiff").mkdir()
+    for log in sorted((gate / "stiff").glob("*.csv")):
+        head, first, rest = log.read_text(encoding="utf-8").split("\n", 2)
+        for copy in range(15):
+            text = f"{head}\n{first[:-1]}{copy}\n{rest}"
+            (tmp_path / "stiff" / f"{log.stem}_{copy}.csv").write_text(text, encoding="utf-8")
+    file = tmp_path / "benchmark.toml"
+    file.write_text(FILE.format(threshold="signature"), encoding="utf-8")
+    made = set()
+    for jobs in (1, 2):
+        shown = []
+        done = cdtool.benchmark(
+            file,
+            detectors=["momentum"],
+            jobs=jobs,
+            progress=lambda number, total, shown=shown: shown.append((number, total)),
+        )
+        made.add(to_json(done.results).encode() + encode_traces(done.traces))
+        assert shown == [(number, 65) for number in range(1, 66)]
+    assert len(made) == 1
+
+
+@pytest.mark.parametrize(("others", "jobs"), [(0, 3), (1, 2)], ids=["forked", "spawned"])
+def test_results_and_traces_are_the_same_bytes_for_any_number_of_jobs(gate, by_one, others, jobs):
+    alone = by_one("signature")
+    stop = threading.Event()
+    threads = [threading.Thread(target=stop.wait) for _ in range(others)]
+    for thread in threads:
+        thread.start()
+    try:
+        assert run(gate, "signature", jobs) == alone
+    finally:
+        stop.set()
+
+
+def bits(log: Path) -> bytes:
+    recording = cdtool.read(log, log.parents[1] / "machine.toml")
+    series = [recording[channel] for channel in sorted(recording.channels)]
+    return b"".join(array.tobytes() for each in series for array in (each.time, each.values))
+
+
+@pytest.mark.parametrize("file_format", ["csv", "mcap"])
+def test_workers_that_read_at_the_same_time_read_the_same_bits(tmp_path, file_format):
+    if file_format == "csv":
+        cdtool.simulate_gate(tmp_path, {"holdout": 2, "stiff": 2}, seed=17)
+    folder = tmp_path if file_format == "csv" else SAMPLES  # MCAP files take seconds to write
+    logs = 9 * sorted(folder.glob(f"*/*.{file_format}"))[:4]
+    alone = [bits(log) for log in logs]
+    assert len(set(alone)) == 4
+    for _ in range(3):
+        differing = [
+            log for log, one, many in zip(logs, alone, in_order(bits, logs, 36, Workers(4)), strict=True) if one != many
+        ]
+        assert not differing
+
+
+@pytest.fixture(scope="module")
+def free_runs(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("budget")
+    cdtool.simulate_gate(folder, {"free": 12, "holdout": 1, "stiff": 1}, seed=16)
+    (folder / "budget.toml").write_text(
+        FILE.format(threshold="signature").replace(', "damaged/*.csv"', ""), encoding="utf-8"
+    )
+    return folder / "budget.toml"
+
+
+@pytest.mark.parametrize("beside", [0, 1])
+def test_detectors_learn_for_a_budget_in_processes_that_share_memory(free_runs, beside, monkeypatch):
+    jobs_of_learning = []
+
+    def noting(work, items, total, workers, **options):
+        jobs_of_learning.append(workers.jobs)
+        return in_order(work, items, total, workers, **options)
+
+    monkeypatch.setattr(learned_thresholds, "in_order", noting)
+    stop = threading.Event()
+    threads = [threading.Thread(target=stop.wait) for _ in range(beside)]
+    for thread in threads:
+        thread.start()
+    is_alone = threading.active_count() == 1  # other tests in this process may have left threads, as those of fsspec
+    names = ["momentum", "pure_torque", "pure_inertia", "velocity"]
+    try:
+        made = [cdtool.benchmark(free_runs, detectors=names, false_alarm_budget="1/4op", jobs=jobs) for jobs in (1, 2)]
+    finally:
+        stop.set()
+    one, two = (to_json(done.results) for done in made)
+    assert one == two and len(made[0].results.calibration) > 1
+    assert jobs_of_learning == [1, 2 if sys.platform == "linux" and is_alone else 1]

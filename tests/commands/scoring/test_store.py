@@ -1,0 +1,466 @@
+"""A benchmark with a store: the same bytes as without it, and nothing computed twice."""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import cdtool
+from cdtool.base.errors import RecordingError
+from cdtool.commands.scoring import pieces
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file, with_detectors
+from cdtool.commands.scoring.dry_run import dry_run
+from cdtool.commands.scoring.learned import Learned, Teaching
+from cdtool.execution.store.store import Store
+from cdtool.execution.store.upkeep import collect_garbage, store_status
+from cdtool.execution.store.use import StoreUse
+from cdtool.execution.workers import Workers
+from cdtool.results.files.results_file import to_json
+from cdtool.results.traces.file import encode_traces
+from cdtool.thresholds import THRESHOLDS
+
+FILE = """machine = "machine.toml"
+detectors = ["momentum", "friction_ekf"]
+threshold = "{threshold}"
+{operations}
+[signature]
+force = true
+[learn]
+logs = ["free/*.csv"{learn}]
+{until}
+[holdout]
+logs = ["holdout/*.csv"]
+[impacts.stiff]
+logs = ["stiff/*.csv"]
+[onset]
+above_n = 20.0
+back_to_n = 8.0
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("gate")
+    cdtool.simulate_gate(folder, {"free": 4, "holdout": 2, "stiff": 4}, seed=18)
+    return folder
+
+
+@pytest.fixture
+def gate(made, tmp_path) -> Path:
+    folder = tmp_path / "gate"
+    shutil.copytree(made, folder)
+    write(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def first_store(made, tmp_path_factory) -> Path:
+    """The store of a first run, of a folder like `gate`."""
+    folder = tmp_path_factory.mktemp("first")
+    shutil.copytree(made, folder / "gate")
+    write(folder / "gate")
+    assert run(folder / "gate", folder / "s")[1] == 6
+    return folder / "s"
+
+
+@pytest.fixture
+def filled(first_store, tmp_path) -> Path:
+    """A store that contains a first run; its files have other paths, so their content is compared."""
+    return shutil.copytree(first_store, tmp_path / "s")
+
+
+def write(folder: Path, threshold: str = "signature", learn: str = "", until: str = "", operations: str = "") -> Path:
+    text = FILE.format(threshold=threshold, learn=learn, until=until, operations=operations)
+    (folder / "b.toml").write_text(text, encoding="utf-8")
+    return folder / "b.toml"
+
+
+def bytes_of(done: cdtool.commands.scoring.benchmark.Benchmark) -> bytes:
+    return to_json(done.results).encode() + encode_traces(done.traces)
+
+
+def run(folder: Path, store: Path | None, **settings) -> tuple[bytes, int | None]:
+    """Return results and traces as bytes, and the number of recordings that were computed."""
+    jobs = settings.pop("jobs", 1)
+    use = None if store is None else StoreUse(store, **settings)
+    done = cdtool.benchmark(folder / "b.toml", store=use, jobs=jobs)
+    if store is not None and done.stored is not None and not done.stored.computed:
+        # The same from the outcomes of the logs as from the results of the run, if they were there.
+        shutil.rmtree(store / "finished", ignore_errors=True)
+        again = cdtool.benchmark(folder / "b.toml", store=use, jobs=jobs)
+        assert bytes_of(again) == bytes_of(done) and again.stored == done.stored
+    return bytes_of(done), done.stored.computed if done.stored else None
+
+
+WITHOUT_STORE: dict[bytes, bytes] = {}
+"""Results without a store, by the content of the folder: many tests need those of equal folders."""
+
+
+def alone(folder: Path) -> bytes:
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob("*.*")):
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(folder)} {len(content)}\n".encode() + content)
+    if digest.digest() not in WITHOUT_STORE:
+        WITHOUT_STORE[digest.digest()] = run(folder, None)[0]
+    return WITHOUT_STORE[digest.digest()]
+
+
+def planned(folder: Path, store: Path, **settings) -> dict[str, tuple[str, ...]]:
+    """Return the detectors that would run, by recording."""
+    found = dry_run(folder / "b.toml", store=StoreUse(store, **settings))
+    return {item.recording: item.detectors for item in found.logs}
+
+
+@pytest.mark.parametrize("threshold", THRESHOLDS.names())
+def test_a_second_run_computes_nothing_and_writes_the_same_bytes(gate, threshold, tmp_path):
+    write(gate, threshold)
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s") == (expected, 6)
+    assert run(gate, tmp_path / "s") == (expected, 0)
+    assert run(gate, tmp_path / "s", trust_times=True, jobs=2) == (expected, 0)
+
+
+def test_several_processes_fill_the_store_with_the_same(gate, tmp_path):
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s", jobs=2) == (expected, 6)
+    assert run(gate, tmp_path / "s") == (expected, 0)
+
+
+def test_of_one_recording_more_only_that_is_computed(gate, tmp_path):
+    new = gate / "stiff" / "04.csv"
+    kept = new.read_bytes()
+    new.unlink()
+    run(gate, tmp_path / "s")
+    new.write_bytes(kept)
+    assert planned(gate, tmp_path / "s") == {"stiff/04.csv": ("momentum", "friction_ekf")}
+    assert run(gate, tmp_path / "s") == (alone(gate), 1)
+
+
+def test_with_another_gain_only_the_rows_of_that_detector_are_computed(gate, filled):
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    assert set(planned(gate, filled).values()) == {("momentum",)}
+    assert run(gate, filled) == (alone(gate), 6)
+    assert run(gate, filled) == (alone(gate), 0)
+
+
+def test_a_detector_more_leaves_the_rows_of_the_others(gate, filled):
+    text = (gate / "b.toml").read_text(encoding="utf-8")
+    (gate / "b.toml").write_text(text.replace('"friction_ekf"]', '"friction_ekf", "pure_torque"]'), encoding="utf-8")
+    assert set(planned(gate, filled).values()) == {("pure_torque",)}
+    assert run(gate, filled) == (alone(gate), 6)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("above_n = 20.0", "above_n = 30.0"),
+        ("[onset]", "[activation]\nhysteresis = 0.2\n[onset]"),
+        ("stiff/", "./stiff/"),
+    ],
+)
+def test_another_setting_computes_all_again_another_spelling_of_a_path_nothing(gate, filled, before, after):
+    text = (gate / "b.toml").read_text(encoding="utf-8")
+    (gate / "b.toml").write_text(text.replace(before, after), encoding="utf-8")
+    assert run(gate, filled) == (alone(gate), 0 if "/" in before else 6)
+
+
+def test_another_impact_free_run_computes_all_again(gate, filled):
+    text = (gate / "free" / "01.csv").read_text(encoding="utf-8")
+    (gate / "free" / "11.csv").write_text(text.replace("-0.0083", "-0.0084", 1), encoding="utf-8")
+    assert run(gate, filled) == (alone(gate), 6)
+
+
+def test_content_is_compared_unless_times_are_trusted(gate, tmp_path):
+    run(gate, tmp_path / "s")
+    log = gate / "stiff" / "01.csv"
+    state, text = log.stat(), log.read_bytes()
+    log.write_bytes(text[:-2] + (b"1" if text[-2:-1] != b"1" else b"2") + text[-1:])
+    os.utime(log, ns=(state.st_atime_ns, state.st_mtime_ns))
+    assert planned(gate, tmp_path / "s", trust_times=True) == {}
+    assert list(planned(gate, tmp_path / "s")) == ["stiff/01.csv"]
+
+
+def test_a_file_with_another_time_is_hashed_once(gate, tmp_path, monkeypatch):
+    run(gate, tmp_path / "s")
+    for log in gate.rglob("*.csv"):
+        os.utime(log, ns=(1, 1))
+    assert run(gate, tmp_path / "s", trust_times=True)[1] == 0
+    monkeypatch.setattr(
+        "cdtool.commands.scoring.store.known_sources.read_sources", lambda _: pytest.fail("hashed again")
+    )
+    assert run(gate, tmp_path / "s", trust_times=True)[1] == 0
+
+
+def test_a_reading_error_is_stored_until_it_is_to_be_retried(gate, tmp_path):
+    (gate / "stiff" / "02.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s") == (expected, 6)
+    assert run(gate, tmp_path / "s") == (expected, 0)
+    assert planned(gate, tmp_path / "s", retry_failed=True) == {"stiff/02.csv": ("momentum", "friction_ekf")}
+    assert run(gate, tmp_path / "s", retry_failed=True) == (expected, 1)
+
+
+@pytest.mark.parametrize("operations", ["", 'operations = "clock-reset"'])
+def test_a_log_that_cannot_be_read_stays_one_with_another_detector(gate, tmp_path, operations):
+    (gate / "stiff" / "02.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
+    write(gate, operations=operations)
+    run(gate, tmp_path / "s")
+    text = (gate / "b.toml").read_text(encoding="utf-8")
+    (gate / "b.toml").write_text(text.replace('"friction_ekf"]', '"friction_ekf", "pure_torque"]'), encoding="utf-8")
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s") == (expected, 6)
+    assert run(gate, tmp_path / "s") == (expected, 0)
+
+
+def test_a_log_that_ends_its_worker_is_left_out_also_if_other_detectors_are_stored(gate, filled, monkeypatch):
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    call = pieces.PieceScoring.__call__
+
+    def lost(self, piece):
+        if piece.path.name == "03.csv" and piece.detectors:
+            return pieces.lost(self.setup, piece, "its worker process was killed")
+        return call(self, piece)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(pieces.PieceScoring, "__call__", lost)
+        done = cdtool.benchmark(gate / "b.toml", store=StoreUse(filled))
+    left_out = [(item.recording, item.reason) for item in done.results.skipped]
+    assert left_out == [("stiff/03.csv", "its worker process was killed")]
+    assert run(gate, filled) == (alone(gate), 1)
+
+
+def test_an_error_of_the_system_is_not_stored(gate, tmp_path, monkeypatch):
+    def fail(path: Path, *_: object) -> None:
+        raise RecordingError(f"{path}: cannot be read: the disk is gone") from OSError(5, "Input/output error")
+
+    expected = alone(gate)
+    with monkeypatch.context() as patched:
+        patched.setattr("cdtool.commands.judging.runs.read_recording", fail)
+        with pytest.raises(RecordingError, match="the disk is gone"):
+            run(gate, tmp_path / "s")
+    assert run(gate, tmp_path / "s") == (expected, 6)
+
+
+@pytest.mark.parametrize("with_store", [False, True])
+def test_a_log_that_changes_while_it_is_read_is_left_out_with_that_reason(gate, tmp_path, monkeypatch, with_store):
+    log = gate / "stiff" / "03.csv"
+    before = log.read_bytes()
+    state = pieces.state_of
+
+    def changing(files):
+        found = state(files)
+        if files == [log]:
+            log.write_bytes(before + b"\n")
+        return found
+
+    monkeypatch.setattr(pieces, "state_of", changing)
+    use = StoreUse(tmp_path / "s") if with_store else None
+    done = cdtool.benchmark(gate / "b.toml", store=use)
+    assert [(item.recording, item.reason) for item in done.results.skipped] == [
+        ("stiff/03.csv", "changed while it was read")
+    ]
+    monkeypatch.undo()
+    log.write_bytes(before)
+    assert run(gate, tmp_path / "s") == (alone(gate), 1 if with_store else 6)
+
+
+def test_a_log_that_changes_before_another_detector_runs_is_computed_whole(gate, filled, monkeypatch):
+    """The outcomes that are stored are those of the old content."""
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    log = gate / "stiff" / "03.csv"
+    text = log.read_bytes()
+    score = pieces.PieceScoring.__call__
+
+    def after_a_change(self, piece):
+        if piece.path == log:
+            log.write_bytes(text.replace(b"-0.00093", b"-0.00094", 1) + b"\n")
+        return score(self, piece)
+
+    monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
+    found = run(gate, filled)
+    monkeypatch.undo()
+    assert found == (alone(gate), 6)
+
+
+def test_a_trace_of_a_log_that_has_changed_since_is_left_out(gate, filled, monkeypatch):
+    """The rows are stored; the trace is made again, since another gain changes it, when the log has another content."""
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    log = gate / "stiff" / "03.csv"
+    text, call = log.read_bytes(), pieces.PieceScoring.__call__
+
+    def after_a_change(self, piece):
+        if piece.path == log and piece.operations:
+            log.write_bytes(text.replace(b"-0.00093", b"-0.00094", 1) + b"\n")
+        return call(self, piece)
+
+    monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
+    done = cdtool.benchmark(gate / "b.toml", store=StoreUse(filled))
+    assert log.read_bytes() != text
+    assert "stiff/03.csv" not in {item.recording for item in done.traces}
+    log.write_bytes(text)
+    monkeypatch.undo()
+    assert run(gate, filled) == (alone(gate), 0)
+
+
+def test_logs_that_are_learned_from_and_scored_depend_on_all_others(gate, tmp_path):
+    write(gate, learn=', "stiff/*.csv"', until='until = "onset"')
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s") == (expected, 6)
+    assert run(gate, tmp_path / "s") == (expected, 0)
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    assert set(planned(gate, tmp_path / "s").values()) == {("momentum",)}
+    assert run(gate, tmp_path / "s") == (alone(gate), 6)
+    shutil.copy(gate / "free" / "01.csv", gate / "free" / "other.csv")
+    text = (gate / "free" / "other.csv").read_text(encoding="utf-8")
+    (gate / "free" / "other.csv").write_text(text.replace("-0.0083", "-0.0084", 1), encoding="utf-8")
+    assert run(gate, tmp_path / "s") == (alone(gate), 6)
+
+
+def test_runs_in_one_file(gate, tmp_path):
+    """The reset of the clock cuts the file into its runs."""
+    for group in ("free", "holdout", "stiff"):
+        texts = [log.read_text(encoding="utf-8").split("\n", 1) for log in sorted((gate / group).glob("*.csv"))]
+        for log in (gate / group).glob("*.csv"):
+            log.unlink()
+        (gate / group / "all.csv").write_text(texts[0][0] + "\n" + "".join(text for _, text in texts), encoding="utf-8")
+    write(gate, operations='operations = "clock-reset"')
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s") == (expected, 2)
+    assert run(gate, tmp_path / "s") == (expected, 0)
+
+
+def test_a_damaged_or_missing_part_is_computed_again(gate, tmp_path):
+    expected, _ = run(gate, tmp_path / "s")
+    (part,) = (tmp_path / "s" / "parts").iterdir()
+    content = bytearray(part.read_bytes())
+    content[len(content) // 3] ^= 0xFF
+    part.write_bytes(content)
+    assert run(gate, tmp_path / "s") == (expected, 6)
+    for part in (tmp_path / "s" / "parts").iterdir():
+        part.unlink()
+    assert run(gate, tmp_path / "s") == (expected, 6)
+
+
+def test_a_part_that_vanishes_after_the_store_was_opened_is_computed_again(gate, tmp_path, monkeypatch):
+    expected, _ = run(gate, tmp_path / "s")
+    with StoreUse(tmp_path / "s").opened() as store:
+        monkeypatch.setattr(StoreUse, "opened", lambda *_: nullcontext(store))
+        for part in (tmp_path / "s" / "parts").iterdir():
+            part.unlink()
+        assert run(gate, tmp_path / "s") == (expected, 6)
+
+
+def test_keys_are_the_same_in_another_process(gate, filled):
+    code = (
+        "from pathlib import Path; from cdtool.commands.scoring.dry_run import dry_run;"
+        "from cdtool.execution.store.use import StoreUse;"
+        "print(len(dry_run('b.toml', store=StoreUse(Path('../s'))).logs))"
+    )
+    for seed in ("1", "2"):
+        # The paths in the results are relative to the benchmark file, whatever the folder it is called from.
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            check=True,
+            capture_output=True,
+            text=True,
+            cwd=gate,
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(cdtool.__file__).parents[1])},
+        )
+        assert done.stdout == "0\n"
+
+
+def test_a_fleet_that_was_moved_is_known(gate, tmp_path):
+    expected, _ = run(gate, tmp_path / "s")
+    moved = tmp_path / "elsewhere"
+    gate.rename(moved)
+    assert run(moved, tmp_path / "s") == (expected, 0)
+
+
+def killed_run(gate):
+    """Kill a benchmark with a store after four of its logs."""
+    code = (
+        "import os; from pathlib import Path; import cdtool; from cdtool.execution.store.use import StoreUse\n"
+        "def progress(done, total):\n"
+        "    if done == 4: os.kill(os.getpid(), 9)\n"
+        "cdtool.benchmark('b.toml', store=StoreUse(Path('../s')), progress=progress)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(cdtool.__file__).parents[1])}
+    done = subprocess.run([sys.executable, "-c", code], check=False, cwd=gate, env=environment)
+    assert done.returncode == -9
+
+
+def test_status_and_dry_run_count_what_the_journal_of_a_killed_run_holds(gate, tmp_path):
+    killed_run(gate)
+    content = {path: path.read_bytes() for path in (tmp_path / "s").rglob("*") if path.is_file()}
+    status = store_status(tmp_path / "s")
+    assert (status.recordings, status.failed, status.damaged) == (4, 0, ())
+    assert status.unused == sum(status.entries.values()) > 4
+    planned = dry_run(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    assert (len(planned.logs), planned.total) == (2, 6)
+    assert {path: path.read_bytes() for path in (tmp_path / "s").rglob("*") if path.is_file()} == content
+
+
+def test_journals_of_a_killed_run_are_taken_over(gate, tmp_path):
+    killed_run(gate)
+    assert list((tmp_path / "s").glob("*.journal"))
+    assert run(gate, tmp_path / "s") == (alone(gate), 2)
+    assert not list((tmp_path / "s").glob("*.journal"))
+
+
+@pytest.mark.parametrize("threshold", THRESHOLDS.names())
+def test_what_was_learned_is_restored_without_loss(made, threshold, tmp_path):
+    for name in ("free", "holdout", "stiff", "machine.toml"):
+        (tmp_path / name).symlink_to(made / name)
+    setup = with_detectors(read_benchmark_file(write(tmp_path, threshold)), ["momentum", "friction_ekf"])
+    learned = Teaching(setup, Workers()).learned
+    restored = Learned.of_text(learned.to_text(setup.rule), setup.rule)
+    assert replace(restored, seconds=learned.seconds).to_text(setup.rule) == learned.to_text(setup.rule)
+    assert restored.about == learned.about
+
+
+def test_a_folder_that_is_not_a_store_is_refused(gate):
+    with pytest.raises(cdtool.base.errors.ConfigurationError, match="neither a store nor an empty folder"):
+        run(gate, gate)
+    assert not (gate / "parts").exists()
+
+
+def test_a_dry_run_writes_nothing(gate, tmp_path):
+    found = dry_run(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    assert (len(found.logs), found.total, found.seconds) == (6, 6, None)
+    assert not (tmp_path / "s").exists()
+    run(gate, tmp_path / "s")
+    (gate / "stiff" / "04.csv").write_text("t\n1\n", encoding="utf-8")
+    before = sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "s").rglob("*"))
+    found = dry_run(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    assert [(item.recording, item.bytes) for item in found.logs] == [("stiff/04.csv", 4)]
+    assert found.seconds
+    assert sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "s").rglob("*")) == before
+
+
+def test_the_store_states_which_entries_a_run_has_used(gate, tmp_path):
+    run(gate, tmp_path / "s")
+    store = Store(tmp_path / "s", writes=False)
+    found = store_status(tmp_path / "s")
+    assert (found.recordings, found.failed, found.unused, len(found.runs)) == (6, 0, 0, 1)
+    assert found.entries["detector"] == 12
+    assert store.parts
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    run(gate, tmp_path / "s")
+    assert collect_garbage(tmp_path / "s", keep_runs=1).removed == 0  # it is too young
+    done = collect_garbage(tmp_path / "s", keep_runs=1, older_than_days=0.0)
+    assert done.removed >= 7  # the momentum observer's rows of six recordings, and what was learned
+    assert store_status(tmp_path / "s").unused == 0
+    assert run(gate, tmp_path / "s") == (alone(gate), 0)

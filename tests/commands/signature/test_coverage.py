@@ -1,0 +1,128 @@
+"""Coverage: runs checked against all others, the probability of the next alarm, and sections without a limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.alarms.pipeline import judge
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.commands.signature.coverage import Coverage, LeftOut, check_coverage, gaps_of
+from cdtool.detectors.detection import Status
+from cdtool.recordings.motion import MotionClass
+from cdtool.results.curves.sweep import critical_factor
+from cdtool.statistics.prediction import prediction_of
+from cdtool.thresholds.signature import Signature
+from tests.commands.signature.seasons import ACTIVATION, learned, season
+
+RULE = Signature(sides="one")
+RUNS = season(14)
+
+
+def coverage(**changed: object) -> Coverage:
+    runs = tuple(LeftOut(f"run{i}", 2.0, alarm=False) for i in range(14))
+    made = Coverage(MotionClass(1, 0.2), 5.5, 1e-3, runs, (), 1e-2, 30, 6.21, ())
+    return replace(made, **changed)
+
+
+@pytest.mark.parametrize("alignment", ["time", "position", "time_then_position"])
+def test_removing_a_run_equals_learning_from_the_others(alignment):
+    rule = replace(RULE, alignment=alignment)
+    bare = [(item.recording, found) for item, found in RUNS]
+    whole = rule.fit(bare)
+    for index in (0, 7, 13):
+        without, refitted = whole.without_run(*bare[index]), rule.fit(bare[:index] + bare[index + 1 :])
+        for one, other in ((without.by_time, refitted.by_time), (without.by_position, refitted.by_position)):
+            np.testing.assert_allclose(one.count, other.count)
+            np.testing.assert_allclose(one.mean, other.mean, atol=1e-9)
+            np.testing.assert_allclose(one.squares, other.squares, atol=1e-7)
+
+
+def test_each_run_has_the_critical_factor_that_a_signature_of_the_others_gives_it():
+    found = check_coverage(RUNS, RULE, ACTIVATION)
+    assert [run.name for run in found.runs] == [item.name for item, _ in RUNS]
+    for index in (2, 9):
+        fitted = learned(RUNS[:index] + RUNS[index + 1 :])
+        expected = critical_factor(judge(*_judged(index, fitted)), ACTIVATION)
+        assert found.runs[index].critical_factor == pytest.approx(expected, rel=1e-9)
+    prediction = prediction_of([run.critical_factor for run in found.runs])
+    assert found.chance == prediction.chance_above(5.5)
+    assert prediction.chance_above(found.factor_needed) == pytest.approx(1e-3, rel=0.01)
+
+
+def _judged(index: int, fitted):
+    operation, signal = RUNS[index]
+    return operation, "", signal, (fitted,), ACTIVATION
+
+
+def test_a_run_unlike_the_others_alarms_when_it_is_left_out_though_not_when_it_was_learned():
+    odd = season(14, lambda number, travel: 4.0 * (number == 5) * (np.abs(travel - 0.4) < 0.03))
+    whole = learned(odd, safety_factor=3.0)
+    assert judge(odd[5][0], "", odd[5][1], (whole,), ACTIVATION).verdict.outcome == "no alarm"
+    found = check_coverage(odd, replace(RULE, safety_factor=3.0), ACTIVATION)
+    assert [run.name for run in found.runs if run.alarm] == ["run5"]
+    assert found.alarms == 1 and not found.enough
+
+
+def test_runs_that_differ_as_a_whole_need_more_of_them_than_runs_that_do_not():
+    alike, apart = (check_coverage(season(14, together=share), RULE, ACTIVATION) for share in (0.1, 2.0))
+    assert alike.enough and alike.more_runs == 0 and alike.verdict.startswith("enough runs: ")
+    assert apart.chance > 10.0 * alike.chance and apart.factor_needed > alike.factor_needed
+
+
+def test_the_verdict_says_how_many_runs_or_which_factor():
+    assert coverage().verdict.startswith("needs 16 more runs, or raise the safety factor to at least 6.3: the chance")
+    assert "operation is 1 in 100; at most 1 in 1000 is allowed" in coverage().verdict
+    assert coverage(runs_needed=15).verdict.startswith("needs 1 more run, ")
+    hopeless = coverage(runs_needed=None, chance=0.4)
+    assert hopeless.verdict.startswith("more runs like these would not suffice: ")
+    assert "operation is 40 %" in hopeless.verdict
+    assert coverage(chance=1e-9).verdict.endswith("1 in 1000 is allowed")
+    assert "less than 1 in a million" in coverage(chance=1e-9).verdict
+    assert "14 assessable runs: too few" in coverage(chance=math.nan).verdict
+
+
+def test_a_section_without_a_limit_is_reported_with_location_and_share_of_runs():
+    blind = season(14)
+    for _, signal in blind[:5]:
+        signal.status[2400:2600] = Status.GAP
+    gap, *others = check_coverage(blind, RULE, ACTIVATION).gaps
+    travel = blind[0][0].recording["position"].values[:, 0]
+    assert gap.axis == "travel" and gap.share == pytest.approx(9 / 14)
+    # The first sample after it counts for the last two grid points before it.
+    assert gap.start == pytest.approx(travel[2400] - travel[402], abs=0.003)
+    assert gap.end == pytest.approx(travel[2600] - travel[402] - 2 * 0.002, abs=0.003)
+    assert "valid in at most 64 % of the runs; 80 % are required" in gap.described
+    assert not others
+
+
+def test_while_accelerating_a_part_without_a_limit_is_a_time():
+    blind = season(12)
+    for _, signal in blind:
+        signal.status[600:700] = Status.START_UP
+    (gap,) = check_coverage(blind, RULE, ACTIVATION).gaps
+    assert (gap.axis, gap.share) == ("time", 0.0)
+    assert (gap.start, gap.end) == (pytest.approx(0.2, abs=0.02), pytest.approx(0.3 - 2 * 0.01, abs=0.015))
+    assert "s after the motion began" in gap.described
+    # Without the runs, the end of the time-based part is unknown: both curves are checked.
+    assert {item.axis for item in gaps_of(learned(blind))} == {"time", "travel"}
+
+
+def test_an_unassessable_run_is_named_and_not_counted():
+    blind = season(14)
+    blind[3][1].status[:] = Status.NOT_APPLICABLE
+    found = check_coverage(blind, RULE, ACTIVATION)
+    assert found.not_assessable == ("run3",) and len(found.runs) == 13
+
+
+def test_too_few_runs_and_an_invalid_target_are_refused():
+    with pytest.raises(SignatureError, match="2 runs to check against the others"):
+        check_coverage(RUNS[:2], replace(RULE, force=True), ACTIVATION)
+    with pytest.raises(SignatureError, match="9 impact-free runs"):
+        check_coverage(RUNS[:9], RULE, ACTIVATION)
+    for target in (0.0, 1.0, float("nan")):
+        with pytest.raises(UsageError, match="target is"):
+            check_coverage(RUNS, RULE, ACTIVATION, target)

@@ -1,0 +1,152 @@
+"""Arm recordings on disk: what is read back is what was simulated, and the folder stands on its own."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.base.errors import UsageError
+from cdtool.commands.simulate.arm_model import ArmRun, Impact, simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
+from cdtool.commands.simulate.arm_recordings import as_recording, write_arm_recordings
+from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.recordings.recording import Recording
+from tests.command import cdtool as command
+
+ARM = ArmParameters()
+COUNTS = {"free": 1, "holdout": 1, "stiff": 3, "soft": 1}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Trial 1 with three stiff impacts: two as MCAP, the third as CSV."""
+    made = tmp_path_factory.mktemp("arm") / "logs"
+    assert write_arm_recordings(made, COUNTS, seed=6, trial=1, file_format="mixed") == 6
+    return made
+
+
+@cache
+def simulated(trial: Trial, group: int, impact: Impact, number: int) -> ArmRun:
+    return simulate_arm_run(ARM, np.random.default_rng([6, trial, group, number]), trial, impact)
+
+
+def on_load(run: ArmRun, machine_file: MachineFile) -> Recording:
+    referred: Recording = machine_file.machine.referred_to_load(as_recording(run, "run"))
+    return referred
+
+
+@pytest.mark.parametrize(("name", "number"), [("02.mcap", 2), ("03.csv", 3)])
+def test_a_log_read_back_is_the_simulated_run_but_for_rounding(folder: Path, name: str, number: int) -> None:
+    machine_file = read_machine_file(folder / "machine.toml")
+    expected = on_load(simulated(1, 2, "stiff", number), machine_file)
+    read = cdtool.read(folder / "stiff" / name, folder / "machine.toml")
+    assert read.joints == ("arm", "forearm")
+    assert set(read.channels) == set(expected.channels)
+    # Far below the noise of the sensor concerned, and below one count of the encoders.
+    rounding = {
+        "torque": 4e-3,
+        "speed": 1e-4,
+        "position": 5e-6,
+        "acceleration": 0.08,
+        "reference_speed": 1e-4,
+        "reference_position": 3e-5,
+        "force": 6e-3,
+    }
+    for channel, limit in rounding.items():
+        assert read[channel].unit == expected[channel].unit
+        np.testing.assert_allclose(read[channel].time, expected[channel].time, atol=1e-9)
+        np.testing.assert_allclose(read[channel].values, expected[channel].values, atol=limit)
+
+
+def test_the_links_true_motion_is_found_again_on_the_load_side(folder: Path) -> None:
+    run = simulated(1, 0, "none", 1)
+    read = cdtool.read(folder / "free" / "01.mcap", folder / "machine.toml")
+    # Motor minus link is the drive's wind-up, some 10 mrad; the sensors' low-passes lag behind.
+    np.testing.assert_allclose(read["position"].values, run.joint_position, atol=0.02)
+    cruise = run.time > 0.7
+    np.testing.assert_allclose(
+        read["speed"].values[cruise].mean(axis=0), run.joint_speed[cruise].mean(axis=0), atol=2e-3
+    )
+    for joint in (0, 1):
+        truth, felt = run.joint_acceleration[:-3, joint], read["acceleration"].values[3:, joint]
+        assert np.corrcoef(truth, felt)[0, 1] > 0.8
+        assert np.polyfit(truth, felt, 1)[0] == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_machine_file_describes_the_simulated_arm(folder: Path) -> None:
+    machine = read_machine_file(folder / "machine.toml").machine
+    inertia = np.array([ARM.arm_inertia, ARM.forearm_inertia]) + np.array(ARM.reflected_inertia)
+    np.testing.assert_allclose(machine.nominal_inertia, inertia, rtol=1e-12)
+    np.testing.assert_allclose(machine.gravity_torque, ARM.gravity_torque, rtol=1e-12)
+    assert machine.coupling == pytest.approx(ARM.coupling_inertia, rel=1e-12)
+    joint_side = np.array(machine.viscous_friction) / np.array(machine.transmission_ratio) ** 2
+    np.testing.assert_allclose(joint_side, ARM.viscous_friction, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("trial", "watched"), [(1, "arm"), (2, "forearm")])
+def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: Trial, watched: str) -> None:
+    write_arm_recordings(tmp_path / "logs", {"free": 2, "soft": 1}, seed=6, trial=trial)
+    values = tomllib.loads((tmp_path / "logs" / "benchmark.toml").read_text())
+    assert values["joints"] == [watched]
+    assert values["learn"]["logs"] == ["free/*.csv"]
+    assert list(values["impacts"]) == ["soft"]
+    assert values["signature"] == {"force": True, "position_step": 2e-3, "position_window": 22e-3, "sides": "one"}
+    assert values["activation"] == {"debounce": 7}
+    assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "hold_s": 0.003}
+
+
+def test_true_contacts_are_listed_beside_the_logs(folder: Path) -> None:
+    with (folder / "contacts.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["recording"] for row in rows] == ["stiff/01.mcap", "stiff/02.mcap", "stiff/03.csv", "soft/01.mcap"]
+    run = simulated(1, 2, "stiff", 3)
+    assert run.contact_start is not None
+    assert float(rows[2]["true_contact_s"]) == pytest.approx(run.contact_start, abs=1e-6)
+
+
+def test_logs_stay_small(folder: Path) -> None:
+    samples = ARM.impact_duration[0] / ARM.sample_period
+    assert (folder / "stiff" / "03.csv").stat().st_size < 80 * samples
+    assert (folder / "stiff" / "01.mcap").stat().st_size < 130 * samples
+
+
+def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path, tmp_path: Path) -> None:
+    counts = ("--free", 0, "--holdout", 0, "--stiff", 4, "--soft", 0)
+    done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--format", "mixed", "-o", tmp_path / "b")
+    assert done.status == 0, done.err
+    for name in ("stiff/01.mcap", "stiff/02.mcap", "stiff/03.csv", "machine.toml"):
+        assert (tmp_path / "b" / name).read_bytes() == (folder / name).read_bytes()
+    other = command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "c")
+    assert other.status == 0, other.err
+    assert (tmp_path / "c" / "stiff" / "03.csv").read_bytes() != (folder / "stiff" / "03.csv").read_bytes()
+
+
+def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> None:
+    assert cdtool.simulate_arm(tmp_path / "python", {"stiff": 1}, seed=6, trial=2) == 1
+    counts = ("--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0)
+    assert command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "line").status == 0
+    names = sorted(path.relative_to(tmp_path / "line") for path in (tmp_path / "line").rglob("*.*"))
+    assert len(names) == 3
+    for name in names:
+        assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "line" / name).read_bytes()
+
+
+def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no recording is requested"):
+        write_arm_recordings(tmp_path / "none", {}, seed=1)
+    with pytest.raises(UsageError, match="not an empty folder"):
+        write_arm_recordings(folder, COUNTS, seed=1)
+    with pytest.raises(UsageError, match="encoder_counts is 0"):
+        write_arm_recordings(tmp_path / "ideal", COUNTS, seed=1, parameters=replace(ARM, encoder_counts=0))
+    with pytest.raises(UsageError, match="unknown trial 3"):
+        write_arm_recordings(tmp_path / "third", COUNTS, seed=1, trial=3)  # type: ignore[arg-type]
+    assert command("simulate", "arm", "--trial", 3, "-o", tmp_path / "third").status == 2
+    assert command("simulate", "arm", "--format", "cvs", "-o", tmp_path / "third").status == 2
+    assert not any(tmp_path.iterdir())

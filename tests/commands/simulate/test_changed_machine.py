@@ -1,0 +1,131 @@
+"""A simulated machine that has changed: what changes, by how much, and what stays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.base.errors import UsageError
+from cdtool.commands.simulate.arm_model import simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters
+from cdtool.commands.simulate.changed_machine import FLUX_PER_KELVIN, ChangedMachine
+from cdtool.commands.simulate.gate_model import GateParameters, GateRun, simulate_gate_run
+from cdtool.formats.machine_file import read_machine_file
+from tests.command import cdtool as command
+
+ONE_RUN = ("--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0)
+GATE, ARM = GateParameters(), ArmParameters()
+# Without what differs from run to run, so that levels can be compared with closed forms.
+QUIET = replace(
+    GATE,
+    friction_waviness=0.0,
+    friction_scatter=0.0,
+    disturbance_force=0.0,
+    cogging_force=0.0,
+    torque_noise=0.0,
+    panel_acceleration=0.0,
+    accelerometer_noise=0.0,
+)
+
+
+def gate_run(changed: ChangedMachine, impact: str = "none", new: GateParameters = QUIET) -> GateRun:
+    run = simulate_gate_run(changed.gate(new), np.random.default_rng(1), impact)  # type: ignore[arg-type]
+    return changed.logged_gate(run, 0.5)
+
+
+def settled(run: GateRun) -> slice:
+    return slice(int(0.7 * len(run.time)), int(0.95 * len(run.time)))
+
+
+def test_no_change_leaves_every_number_as_it_is():
+    assert ChangedMachine().gate(GATE) == GATE
+    assert ChangedMachine().arm(ARM) == ARM
+
+
+def test_friction_changes_the_force_at_constant_speed_by_its_part():
+    levels = {factor: gate_run(ChangedMachine(friction=factor)).motor_force for factor in (1.0, 1.2)}
+    friction = GATE.coulomb_friction + GATE.viscous_friction * GATE.nominal_speed
+    at = settled(gate_run(ChangedMachine()))
+    assert np.mean(levels[1.2][at] - levels[1.0][at]) == pytest.approx(0.2 * friction, rel=0.02)
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.2])
+def test_another_speed_keeps_travel_and_the_time_after_the_contact(factor):
+    as_before, changed = gate_run(ChangedMachine()), gate_run(ChangedMachine(speed=factor))
+    assert np.mean(changed.leaf_speed[settled(changed)]) == pytest.approx(factor * GATE.nominal_speed, rel=0.01)
+    assert changed.leaf_position[-1] == pytest.approx(as_before.leaf_position[-1], abs=0.01)
+    struck, other = gate_run(ChangedMachine(), "stiff"), gate_run(ChangedMachine(speed=factor), "stiff")
+    assert struck.contact_start is not None and other.contact_start is not None
+    assert other.time[-1] - other.contact_start == pytest.approx(struck.time[-1] - struck.contact_start, abs=0.1)
+
+
+def test_mass_changes_the_force_while_accelerating():
+    light, heavy = gate_run(ChangedMachine()), gate_run(ChangedMachine(mass=1.1))
+    # Momentum of the leaf at the end of the start, from the integral of the force.
+    ramp = slice(0, 4000)
+    impulse = np.sum(heavy.motor_force[ramp] - light.motor_force[ramp]) * GATE.sample_period
+    assert impulse == pytest.approx(0.1 * GATE.leaf_mass * GATE.nominal_speed, rel=0.1)
+
+
+def test_sensors_and_heat_change_what_is_logged_and_not_the_motion():
+    before = gate_run(ChangedMachine())
+    offset = gate_run(ChangedMachine(current_offset=0.3, acceleration_offset=0.2))
+    warm = gate_run(ChangedMachine(warming=10.0))
+    for run in (offset, warm):
+        assert np.array_equal(run.leaf_position, before.leaf_position)
+    assert offset.motor_torque - before.motor_torque == pytest.approx(0.15, rel=1e-9)
+    assert np.mean(offset.acceleration - before.acceleration) == pytest.approx(0.2, abs=2e-3)
+    assert warm.motor_torque == pytest.approx(before.motor_torque / (1.0 + 10.0 * FLUX_PER_KELVIN), rel=1e-9)
+    assert np.array_equal(offset.reference_torque, before.reference_torque)
+    assert np.max(np.abs(warm.reference_torque)) > np.max(np.abs(before.reference_torque))
+
+
+@pytest.mark.parametrize("trial", [1, 2])
+def test_an_arm_at_another_speed_still_touches_in_time(trial):
+    spans = []
+    for factor in (0.8, 1.0, 1.2):
+        run = simulate_arm_run(ChangedMachine(speed=factor).arm(ARM), np.random.default_rng(2), trial, "stiff")
+        assert run.contact_start is not None
+        spans.append(float(run.time[-1]) - run.contact_start)
+        free = simulate_arm_run(ChangedMachine(speed=factor).arm(ARM), np.random.default_rng(2), trial, "none")
+        assert free.joint_position[-1, 0] == pytest.approx(1.24 if trial == 1 else 1.49, abs=0.03)
+    assert max(spans) - min(spans) < 0.03
+
+
+def test_an_arm_has_other_friction_mass_and_offsets():
+    changed = ChangedMachine(friction=0.8, mass=1.1, current_offset=0.2, acceleration_offset=0.1)
+    arm = changed.arm(ARM)
+    assert arm.coulomb_friction == pytest.approx((2.0, 1.32)) and arm.viscous_friction == pytest.approx(0.32)
+    assert arm.link_mass == pytest.approx((1.43, 1.76)) and arm.imu_bias == pytest.approx(0.12)
+    run = simulate_arm_run(arm, np.random.default_rng(3), 1, "none")
+    assert changed.logged_arm(run, 0.05).motor_torque - run.motor_torque == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"friction": 0.0}, "friction is 0"),
+        ({"speed": -1.0}, "speed is -1"),
+        ({"mass": math.nan}, "mass is nan"),
+        ({"warming": 400.0}, "warming is 400 K"),
+    ],
+)
+def test_a_change_that_no_machine_can_have_is_refused(values, words):
+    with pytest.raises(UsageError, match=words):
+        ChangedMachine(**values)
+
+
+def test_the_machine_file_is_that_of_the_unchanged_machine(tmp_path):
+    done = command("simulate", "gate", *ONE_RUN, "--mass", 1.5, "-o", tmp_path / "g")
+    assert done.status == 0
+    assert read_machine_file(tmp_path / "g" / "machine.toml").machine.load_inertia[0] == pytest.approx(620.0)
+    heavier = cdtool.read(tmp_path / "g" / "free" / "01.csv", tmp_path / "g" / "machine.toml")
+    cdtool.simulate_gate(tmp_path / "h", {"free": 1}, seed=1)
+    as_before = cdtool.read(tmp_path / "h" / "free" / "01.csv", tmp_path / "h" / "machine.toml")
+    assert not np.array_equal(heavier["torque"].values, as_before["torque"].values)
+    refused = command("simulate", "arm", "--friction", 0, "-o", tmp_path / "a")
+    assert refused.status == 2 and "friction is 0" in refused.err and not (tmp_path / "a").exists()

@@ -1,0 +1,356 @@
+"""The simulated gate: its mechanics against closed forms and balances, its sensors against their definitions."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from dataclasses import fields, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import UsageError
+from cdtool.commands.simulate import gate_kernel
+from cdtool.commands.simulate.gate_model import (
+    Array,
+    GateParameters,
+    GateRun,
+    Impact,
+    integrate_gate,
+    simulate_gate_run,
+)
+from cdtool.machines.axis_model.sensor_filters import first_order_low_pass
+from tests.commands.simulate.resolver import resolver_speed
+
+GATE = GateParameters()
+QUIET = replace(
+    GATE,
+    resolver_counts=0,
+    cogging_force=0.0,
+    disturbance_force=0.0,
+    torque_noise=0.0,
+    panel_acceleration=0.0,
+    accelerometer_noise=0.0,
+    load_cell_noise=0.0,
+)
+"""Without noise, quantiser and cogging: what remains converges with the step."""
+PASSIVE = replace(QUIET, speed_gain=0.0, integral_gain=0.0)
+LOSSLESS = replace(
+    PASSIVE,
+    take_up_damping=0.0,
+    drive_damping=0.0,
+    post_damping=0.0,
+    load_cell_damping=0.0,
+    bumper_damping=0.0,
+    motor_friction=0.0,
+    coulomb_friction=0.0,
+    static_friction=0.0,
+    viscous_friction=0.0,
+)
+
+
+@cache
+def run_of(impact: Impact, seed: int = 1) -> GateRun:
+    return simulate_gate_run(GATE, np.random.default_rng(seed), impact)
+
+
+def coast(parameters: GateParameters, impact: Impact, substeps: int = 20) -> dict[str, Array]:
+    """One second without motor from nominal speed, the obstacle 20 mm ahead."""
+    samples = 1000
+    start = np.array([0.0, 0.2, 0.0, 0.2, 0.0, 0.2, 0.0])
+    still = np.zeros(samples)
+    truth, first_contact = integrate_gate(parameters, start, still, still, (1.0, 0.0, 0.02), impact, substeps)
+    assert first_contact == pytest.approx(0.1, abs=0.01)
+    return truth
+
+
+def energy(parameters: GateParameters, truth: dict[str, Array]) -> Array:
+    """Kinetic energy and that of every spring [J], written down independently of the kernel's forces."""
+    p = parameters
+    kinetic = 0.5 * (
+        p.motor_mass * truth["motor_speed"] ** 2
+        + p.leaf_main_mass * truth["leaf_speed"] ** 2
+        + p.post_mass * truth["post_speed"] ** 2
+    )
+    wind_up = truth["motor_position"] - truth["leaf_position"]
+    soft = np.clip(wind_up, 0.0, p.take_up_travel)
+    beyond = np.clip(wind_up - p.take_up_travel, 0.0, None)
+    back = np.clip(-p.backlash - wind_up, 0.0, None)
+    drive = 0.5 * p.take_up_stiffness * soft**2 + p.take_up_stiffness * p.take_up_travel * beyond
+    drive += 0.5 * p.drive_stiffness * (beyond**2 + back**2)
+    post = 0.5 * p.post_stiffness * (truth["leaf_position"] - truth["post_position"]) ** 2
+    compression = truth["bumper_compression"]
+    cell_travel = np.clip(truth["post_position"] - 0.02, 0.0, None) - compression
+    cell = 0.5 * p.load_cell_stiffness * cell_travel**2
+    grid = np.linspace(0.0, 0.1, 200_001)
+    slopes = np.select(
+        [grid < p.bumper_buckling_travel, grid < p.bumper_bottom_travel],
+        [p.bumper_stiffness, p.bumper_buckled_stiffness],
+        p.bumper_bottom_stiffness,
+    )
+    spacing = grid[1]
+    force = np.cumsum(slopes) * spacing
+    bumper = np.interp(compression, grid, np.cumsum(force) * spacing)
+    return np.asarray(kinetic + drive + post + cell + bumper)
+
+
+# Mechanics
+
+
+@pytest.mark.parametrize("impact", ["stiff", "soft"])
+def test_a_lossless_gate_keeps_its_energy_through_the_impact(impact: Impact) -> None:
+    truth = coast(LOSSLESS, impact)
+    balance = energy(LOSSLESS, truth)
+    assert truth["contact_force"].max() > 1000.0
+    assert truth["leaf_speed"].min() < -0.05  # it bounced
+    np.testing.assert_allclose(balance, balance[0], rtol=2e-4)
+
+
+@pytest.mark.parametrize("impact", ["stiff", "soft"])
+def test_a_gate_without_motor_only_loses_energy(impact: Impact) -> None:
+    truth = coast(PASSIVE, impact)
+    balance = energy(PASSIVE, truth)
+    assert truth["contact_force"].max() > 100.0
+    assert balance[-1] < 0.5 * balance[0]
+    assert np.diff(balance).max() <= 0.0
+
+
+def test_the_drive_transmits_nothing_inside_its_backlash() -> None:
+    loose = replace(LOSSLESS, drive_damping=GATE.drive_damping)
+    start = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0])
+    still = np.zeros(4)
+    truth, _ = integrate_gate(loose, start, still, still, (1.0, 0.0, 9.0), "none", 100)
+    lead = truth["leaf_position"] - truth["motor_position"]
+    assert lead[1] < loose.backlash < lead[2]
+    assert truth["motor_speed"][1] == 0.0
+    assert truth["motor_speed"][2] > 1e-3
+
+
+def test_a_rigid_gate_without_motor_meets_the_closed_form_of_a_spring_impact() -> None:
+    # v sqrt(K m): with the drive slack behind the obstacle's push the leaf alone hits first, so free the motor.
+    alone = replace(LOSSLESS, motor_inertia=1e-12, take_up_stiffness=1e-3, backlash=1.0, post_stiffness=1e9)
+    alone = replace(alone, drive_stiffness=1e-3)
+    truth = coast(alone, "stiff", substeps=100)
+    mass, stiffness, speed = GATE.leaf_mass, GATE.load_cell_stiffness, 0.2
+    rate = np.sqrt(stiffness / mass)
+    force = truth["contact_force"]
+    pressed = np.flatnonzero(force > 0.0)
+    assert force.max() == pytest.approx(speed * np.sqrt(stiffness * mass), rel=2e-3)
+    assert (pressed[-1] - pressed[0]) * 1e-3 == pytest.approx(np.pi / rate, abs=2e-3)
+    assert truth["leaf_position"].max() - 0.02 == pytest.approx(speed / rate, rel=3e-3)
+    assert force[pressed[0] + 20] == pytest.approx(speed * np.sqrt(stiffness * mass) * np.sin(rate * 0.0205), rel=0.03)
+
+
+def test_the_closed_form_of_the_rigid_impact_has_its_reference_figures() -> None:
+    mass, stiffness, speed = 620.0, 5e5, 0.2
+    rate = np.sqrt(stiffness / mass)
+    assert speed * np.sqrt(stiffness * mass) == pytest.approx(3521.4, abs=0.1)
+    assert speed * rate == pytest.approx(5.680, abs=1e-3)
+    assert speed / rate == pytest.approx(7.043e-3, abs=1e-6)
+    assert np.pi / rate == pytest.approx(110.63e-3, abs=1e-5)
+    assert 0.5 * mass * speed**2 == pytest.approx(12.40, abs=1e-2)
+    force = speed * np.sqrt(stiffness * mass) * np.sin(rate * 21e-3)
+    assert force == pytest.approx(1978.0, abs=1.0)
+    assert force / mass == pytest.approx(3.19, abs=1e-2)
+
+
+def test_the_bumper_and_the_load_cell_in_series_carry_the_same_force() -> None:
+    truth = coast(replace(PASSIVE, bumper_bottom_travel=15e-3), "soft")
+    compression = truth["bumper_compression"]
+    assert compression.max() > 15e-3  # all three branches are visited
+    p = PASSIVE
+    buckling = p.bumper_stiffness * p.bumper_buckling_travel
+    bottom = buckling + p.bumper_buckled_stiffness * (15e-3 - p.bumper_buckling_travel)
+    branch = np.select(
+        [compression < p.bumper_buckling_travel, compression < 15e-3],
+        [
+            p.bumper_stiffness * compression,
+            buckling + p.bumper_buckled_stiffness * (compression - p.bumper_buckling_travel),
+        ],
+        bottom + p.bumper_bottom_stiffness * (compression - 15e-3),
+    )
+    np.testing.assert_allclose(
+        truth["contact_force"], branch * (1.0 + p.bumper_damping * truth["post_speed"]), atol=1e-6
+    )
+
+
+def test_the_integration_is_of_fourth_order_where_the_laws_are_smooth() -> None:
+    # One stiffness, no sign limit in reach, no friction: what is left is linear, with the current loop inside.
+    smooth = replace(
+        LOSSLESS,
+        speed_gain=GATE.speed_gain,
+        take_up_travel=1.0,
+        take_up_stiffness=1.2e6,
+        force_slew_limit=1e9,
+        force_limit=1e9,
+    )
+    load = 600.0
+    start = np.array([load / 1.2e6, 0.2, 0.0, 0.2, 0.0, 0.2, load])
+    reference = 0.2 + load / GATE.speed_gain + 0.005 * np.sin(np.linspace(0.0, 6.0, 300))
+    ends = []
+    for substeps in (2, 4, 8):
+        truth, _ = integrate_gate(smooth, start, reference, np.full(300, -load), (1.0, 0.0, 9.0), "none", substeps)
+        assert (truth["motor_position"] - truth["leaf_position"]).min() > 0.0
+        ends.append(truth["motor_force"])
+    order = np.log2(np.abs(ends[0] - ends[1]).max() / np.abs(ends[1] - ends[2]).max())
+    assert order == pytest.approx(4.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("impact", "tolerance"), [("stiff", 1e-3), ("soft", 2e-3)])
+@pytest.mark.parametrize("parameters", [QUIET, GATE], ids=["quiet", "noisy"])
+def test_halving_the_step_changes_neither_peak_force_nor_contact_instant(
+    impact: Impact, tolerance: float, parameters: GateParameters
+) -> None:
+    runs = [simulate_gate_run(parameters, np.random.default_rng(4), impact, steps) for steps in (5, 10)]
+    coarse, fine = runs
+    assert coarse.contact_force.max() == pytest.approx(fine.contact_force.max(), rel=tolerance)
+    assert coarse.contact_start is not None
+    assert coarse.contact_start == pytest.approx(fine.contact_start, abs=1e-3)
+    # A single step a millisecond is visibly different: the comparison above is not of a thing with itself.
+    single = simulate_gate_run(parameters, np.random.default_rng(4), impact, 1)
+    assert single.contact_force.max() != fine.contact_force.max()
+
+
+@pytest.mark.parametrize(("impact", "low", "high"), [("stiff", 3610.0, 3680.0), ("soft", 2400.0, 2480.0)])
+def test_mean_peak_forces_are_those_of_the_design(impact: Impact, low: float, high: float) -> None:
+    peaks = [run_of(impact, seed).contact_force.max() for seed in range(12)]
+    assert low < np.mean(peaks) < high
+
+
+def test_the_bumper_bottoms_out_about_357_ms_after_touch() -> None:
+    delays = []
+    for seed in range(5):
+        run = run_of("soft", seed)
+        assert run.contact_start is not None
+        bottomed = run.time[np.argmax(run.bumper_compression > GATE.bumper_bottom_travel)]
+        delays.append(bottomed - run.contact_start)
+    assert np.mean(delays) == pytest.approx(0.357, abs=0.005)
+
+
+# Drive and speed loop
+
+
+def test_a_free_stroke_reaches_nominal_speed_and_covers_more_than_the_obstacle() -> None:
+    run = run_of("none")
+    assert run.contact_start is None
+    assert not run.contact_force.any()
+    assert run.leaf_position[-1] > 1.4
+    assert run.leaf_speed[run.time < 0.3].max() < 1e-3
+    cruise = run.leaf_position > 0.7
+    assert run.leaf_speed[cruise].mean() == pytest.approx(0.2, rel=0.01)
+
+
+def test_the_cruising_motor_force_is_the_sum_of_the_frictions() -> None:
+    forces = []
+    for seed in range(8):
+        run = run_of("none", seed)
+        forces.append(run.motor_torque[run.leaf_position > 0.5].mean() / GATE.transmission_ratio)
+    expected = GATE.coulomb_friction + GATE.viscous_friction * 0.2 + GATE.motor_friction
+    assert np.mean(forces) == pytest.approx(expected, rel=0.05)
+
+
+def test_the_torque_reference_obeys_its_slew_limit_and_is_on_it_after_a_stiff_impact() -> None:
+    run = run_of("stiff")
+    assert run.contact_start is not None
+    slew = np.diff(run.reference_torque) / GATE.transmission_ratio / GATE.sample_period
+    assert np.abs(slew).max() <= GATE.force_slew_limit * (1.0 + 1e-9)
+    contact = round(run.contact_start / GATE.sample_period)
+    after = slew[contact + 50 : contact + 250]
+    assert np.mean(after > 0.999 * GATE.force_slew_limit) > 0.8
+
+
+def test_the_torque_reference_stays_within_its_limit() -> None:
+    limited = replace(GATE, force_limit=300.0)
+    run = simulate_gate_run(limited, np.random.default_rng(2), "stiff")
+    force = run.reference_torque / GATE.transmission_ratio
+    assert force.max() == pytest.approx(300.0)
+    assert run_of("stiff", 2).reference_torque.max() > run.reference_torque.max()
+
+
+# Randomness
+
+
+def test_the_same_seed_gives_the_same_run_and_another_seed_another() -> None:
+    first, again = (simulate_gate_run(GATE, np.random.default_rng(7), "soft") for _ in range(2))
+    for field in fields(GateRun):
+        np.testing.assert_array_equal(getattr(first, field.name), getattr(again, field.name))
+    assert not np.array_equal(first.motor_torque, run_of("soft", 8).motor_torque)
+
+
+@pytest.mark.parametrize("impact", ["stiff", "soft"])
+def test_a_run_equals_the_free_run_of_its_seed_until_the_contact(impact: Impact) -> None:
+    free, run = run_of("none", 3), run_of(impact, 3)
+    assert run.contact_start is not None
+    before = int(run.contact_start / GATE.sample_period)
+    assert before > 5000
+    for name in ("motor_torque", "motor_speed", "acceleration", "load_cell", "reference_torque"):
+        np.testing.assert_array_equal(getattr(run, name)[:before], getattr(free, name)[:before])
+        assert not np.array_equal(getattr(run, name)[before:], getattr(free, name)[before : run.time.size])
+
+
+def test_contacts_scatter_about_the_obstacle_and_the_log_goes_on_after_them() -> None:
+    positions = []
+    for seed in range(12):
+        run = run_of("stiff", seed)
+        assert run.contact_start is not None
+        positions.append(np.interp(run.contact_start, run.time, run.leaf_position))
+        assert 0.8 < run.time[-1] - run.contact_start < 1.6
+    assert np.mean(positions) == pytest.approx(1.0, abs=0.025)
+    assert 0.005 < np.std(positions) < 0.04
+
+
+# Measured channels
+
+
+def test_the_logged_speed_is_what_the_resolver_model_makes_of_the_true_position() -> None:
+    samples = 500
+    start = np.array([0.0, 0.2, 0.0, 0.2, 0.0, 0.2, 0.0])
+    truth, _ = integrate_gate(GATE, start, np.full(samples, 0.2), np.zeros(samples), (1.0, 0.0, 9.0), "none", 5)
+    speed = resolver_speed(truth["motor_position"], GATE.resolver_step, GATE.speed_filter_frequency, GATE.sample_period)
+    np.testing.assert_allclose(truth["measured_speed"], speed, atol=1e-12)
+    counts = truth["measured_position"] / GATE.resolver_step
+    np.testing.assert_allclose(counts, np.rint(counts), atol=1e-6)
+    assert np.all(truth["measured_position"] <= truth["motor_position"])
+
+
+def test_the_noise_of_each_channel_has_its_stated_size() -> None:
+    run = run_of("none")
+    cruise = run.leaf_position > 0.5
+    still = (run.time > 0.1) & (run.time < 0.3)
+    assert np.std(run.load_cell) == pytest.approx(3.0, rel=0.05)
+    keep = np.exp(-GATE.sample_period / GATE.torque_filter_time)
+    torque_noise = 60.0 * np.sqrt((1.0 - keep) / (1.0 + keep))
+    torque = run.motor_torque / GATE.transmission_ratio
+    lagged = first_order_low_pass(run.motor_force, GATE.torque_filter_time, GATE.sample_period)
+    assert np.std(torque - lagged) == pytest.approx(torque_noise, rel=0.1)
+    # 0.16 m/s2 at 18 Hz through the sensor's 25 Hz low-pass, which leaves 0.80 of it there; none at standstill.
+    assert np.std(run.acceleration[cruise]) == pytest.approx(0.128, rel=0.15)
+    assert np.std(run.acceleration[still]) < 0.03
+    assert run.acceleration[still].mean() == pytest.approx(GATE.accelerometer_bias, abs=0.01)
+    steps = run.acceleration / GATE.accelerometer_resolution
+    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
+
+
+# Interface
+
+
+def test_the_kernel_unpacks_the_parameters_in_their_declared_order() -> None:
+    tree = ast.parse(inspect.getsource(gate_kernel))
+    unpacked = [
+        tuple(element.id for element in node.targets[0].elts if isinstance(element, ast.Name))
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign)
+        and isinstance(node.targets[0], ast.Tuple)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "parameters"
+    ]
+    assert unpacked == [gate_kernel.PARAMETER_ORDER]
+
+
+def test_an_unknown_impact_or_step_count_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(UsageError, match="unknown impact 'hard'"):
+        simulate_gate_run(GATE, rng, "hard")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="substeps is 0"):
+        simulate_gate_run(GATE, rng, "none", 0)

@@ -1,0 +1,137 @@
+"""The search of rules and gains, on measurements that are known: what is chosen, and by which recordings."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdtool.commands.tune.search.candidate import Candidate, Measured
+from cdtool.commands.tune.search.grid import debounces_to_try, rules_to_try
+from cdtool.commands.tune.search.objective import Goal, Objective
+from cdtool.commands.tune.search.search import search
+from cdtool.commands.tune.search.tuned import pareto_of, sensitivities_of, steps_of
+from cdtool.detectors.momentum import Momentum
+from cdtool.thresholds.cusum import Cusum
+from cdtool.thresholds.glr import Glr
+from cdtool.thresholds.limit import Limit
+from tests.commands.tune.search.recordings import measured, tuning_recordings
+
+RECORDINGS = tuning_recordings()
+OBJECTIVE = Objective(Goal.LATENCY, RECORDINGS)
+DEFAULT = Candidate.of(Momentum(), Limit())
+GRID = [Candidate(DEFAULT.gains, rule) for rule in (Glr(order=4), Glr(order=12), Cusum())]
+
+
+def run(latency_of, recordings=RECORDINGS):
+    asked: list[Candidate] = []
+
+    def measure(candidates):
+        asked.extend(candidates)
+        return [latency_of(item) for item in candidates]
+
+    objective = Objective(Goal.LATENCY, recordings)
+    return search(DEFAULT, 0, GRID, ("bandwidth",), objective, measure), asked
+
+
+def by_rule(values, bandwidth=10.0):
+    """Return latencies by rule, least at a bandwidth."""
+
+    def latency_of(candidate):
+        rule = candidate.rule
+        name = f"{rule.name}{rule.order}" if rule.name == "glr" else rule.name
+        stiff, soft = values[name]
+        factor = 1.0 + 0.09 * abs(math.log2(dict(candidate.gains)["bandwidth"] / bandwidth))
+        return measured(RECORDINGS, factor * np.repeat([stiff, soft], 10))
+
+    return latency_of
+
+
+VALUES = {"limit": (0.03, 0.07), "glr4": (0.02, 0.06), "glr12": (0.012, 0.055), "cusum": (0.011, 0.2)}
+
+
+def test_the_best_acceptable_rule_is_chosen_and_its_gain_tuned():
+    found, _ = run(by_rule(VALUES, bandwidth=20.0))
+    assert found.best.candidate.rule == Glr(order=12)
+    assert dict(found.best.candidate.gains)["bandwidth"] == 20.0
+    # cusum would be faster for stiff contacts, but makes soft ones much worse than by default.
+    assert [item.best.candidate for item in found.subsets] == [found.best.candidate] * 6
+
+
+def test_nothing_is_measured_twice():
+    _, asked = run(by_rule(VALUES, bandwidth=20.0))
+    assert len({item.key for item in asked}) == len(asked)
+
+
+def test_a_fold_that_likes_another_rule_does_not_choose_for_itself():
+    """In fold 0, limit is the fastest by far; without fold 0 it is not, and with it, it is."""
+
+    def latency_of(candidate):
+        values = np.full(20, 0.03)
+        if candidate.rule.name == "limit":
+            values = np.where(RECORDINGS.fold_of == 0, 1e-4, 0.035)
+        return measured(RECORDINGS, values)
+
+    found, _ = run(latency_of)
+    assert found.best.candidate.rule.name == "limit"
+    assert found.subsets[1].best.candidate.rule.name != "limit"
+
+
+def test_a_candidate_that_cannot_be_used_is_left_out():
+    def latency_of(candidate):
+        if candidate.rule.name == "glr":
+            return Measured.unusable("too few samples")
+        return by_rule(VALUES)(candidate)
+
+    found, _ = run(latency_of)
+    assert found.best.candidate.rule.name == "limit"
+
+
+def test_a_default_that_cannot_be_used_sets_no_bound():
+    def latency_of(candidate):
+        return Measured.unusable("no") if candidate.rule.name == "limit" else by_rule(VALUES)(candidate)
+
+    found, _ = run(latency_of)
+    assert found.best.candidate.rule == Glr(order=12) and steps_of(found, found.best) == ()
+
+
+def test_without_nested_subsets_there_is_one_search():
+    recordings = tuning_recordings(is_nested=False)
+    found, _ = run(lambda _: measured(recordings, np.full(20, 0.02)), recordings)
+    assert len(found.subsets) == 1
+
+
+def test_contributions_multiply_to_the_whole_saving():
+    found, _ = run(by_rule(VALUES, bandwidth=20.0))
+    left = math.prod(1.0 - step.saved for step in steps_of(found, found.best))
+    assert math.isclose(left, math.exp(found.best.score - found.subsets[0].default.score))
+
+
+def test_the_sensitivity_shows_the_flat_part_and_the_edge():
+    found, _ = run(by_rule(VALUES, bandwidth=20.0))
+    by_name = {item.name: item for item in sensitivities_of(found, found.best, [9], ("bandwidth",))}
+    bandwidth = by_name["bandwidth"]
+    assert bandwidth.chosen == 20.0 and bandwidth.flat_from < 20.0 < bandwidth.flat_to < 40.0
+    assert not bandwidth.is_at_edge and not by_name["debounce"].is_at_edge
+    far, _ = run(by_rule(VALUES, bandwidth=1e6))
+    by_name = {item.name: item for item in sensitivities_of(far, far.best, [9], ("bandwidth",))}
+    assert by_name["bandwidth"].is_at_edge
+
+
+def test_the_pareto_front_has_what_nothing_beats_in_every_group():
+    found, _ = run(by_rule(VALUES))
+    points = pareto_of(OBJECTIVE, found, ["9 ms"])
+    assert [point.candidate.rule.name for point in points] == ["cusum", "glr"]
+    assert np.allclose(points[1].costs, (12.0, 55.0))
+
+
+def test_rules_are_tried_with_their_settings_where_their_channels_exist():
+    rules = rules_to_try([Cusum(), Glr(order=7), Limit()], ["torque", "speed", "position"])
+    assert len([rule for rule in rules if rule.name == "cusum"]) == 8  # the default is one of the grid
+    assert [rule.order for rule in rules if rule.name == "glr"] == [7, 4, 12]
+    assert rules_to_try([Cusum(), Limit()], ["torque"]) == [Limit()]
+
+
+def test_debounces_are_never_shorter_than_asked_for():
+    assert debounces_to_try(1e-3) == (3, 5, 9) and debounces_to_try(1e-2) == (1, 3, 5, 9)
+    assert debounces_to_try(1e-3, 0.0) == (1, 3, 5, 9) and debounces_to_try(1e-4) == (30,)

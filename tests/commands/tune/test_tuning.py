@@ -1,0 +1,398 @@
+"""`cdtool tune` on a few simulated recordings: choices, honest results, files that can be used, and refusals."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import ANY
+
+import pytest
+
+import cdtool as api
+from cdtool import simulate_gate
+from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.base.files.bounded_loading import parse_toml
+from cdtool.commands.judging.log_groups import Split
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.commands.tune import tuning as module
+from cdtool.commands.tune.command import _show
+from cdtool.commands.tune.files import open_folder, write_tuning
+from cdtool.commands.tune.page import tuning_html
+from cdtool.commands.tune.recordings_to_tune import read_recordings
+from cdtool.commands.tune.result import TuningResult
+from cdtool.commands.tune.tuned_files import tuning_summary
+from cdtool.commands.tune.tuning import TuningOptions, tune_detectors
+from cdtool.execution.workers import Workers
+from cdtool.formats.signature_store import read_signature
+from cdtool.recordings.log_section import LogSection, Mark
+from cdtool.thresholds.limit import Limit
+from tests.command import cdtool as command
+
+BUDGET = "1/20op"
+OPTIONS = TuningOptions(BUDGET, detectors=("momentum",), thresholds=("signature", "glr"))
+QUICK = TuningOptions("1/5op", detectors=("momentum",), thresholds=("limit",))
+ARGUMENTS = ("--detectors", "gm", "--thresholds", "signature,glr", "--false-alarm-budget", "1/20op")
+
+
+def tune(file, options, **more):
+    return tune_detectors(file, replace(options, **more))
+
+
+@pytest.fixture(scope="module")
+def gate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tuned") / "gate"
+    simulate_gate(folder, {"free": 25, "stiff": 4, "soft": 4, "holdout": 2}, seed=31)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def quick(gate: Path) -> BenchmarkFile:
+    """Few runs and a threshold that is learned and assessed in no time."""
+    setup = read_benchmark_file(gate / "benchmark.toml")
+    return replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+
+
+@pytest.fixture(scope="module")
+def journals(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("journals")
+
+
+@pytest.fixture(scope="module")
+def done(gate: Path, journals: Path):
+    return tune(gate / "benchmark.toml", OPTIONS, journals=journals)
+
+
+@pytest.fixture(scope="module")
+def written(done, gate: Path, journals: Path, tmp_path_factory: pytest.TempPathFactory):
+    """The command, which goes on with the search of `done`."""
+    folder = tmp_path_factory.mktemp("out") / "tuned"
+    shutil.copytree(journals, folder / "search")
+    outcome = command("tune", gate / "benchmark.toml", *ARGUMENTS, "-o", folder)
+    assert outcome.status == 0, outcome.err
+    return folder, outcome
+
+
+def test_the_choice_is_faster_than_the_default_on_recordings_that_chose_nothing(done):
+    (tuned,) = done.detectors
+    assert done.is_nested and tuned.nested and tuned.default_nested
+    assert tuned.choice.rule.name == "glr"
+    for group in ("stiff", "soft"):
+        assert tuned.nested.groups[group].mean_ms < 0.9 * tuned.default_nested.groups[group].mean_ms
+    assert tuned.nested.groups["stiff"].contacts == 4 and tuned.nested.free == 25
+    assert len(tuned.chosen_in_folds) == 5 and sum("glr" in words for words in tuned.chosen_in_folds) >= 3
+
+
+def test_the_summary_for_a_notebook_has_these_results(done):
+    (tuned,) = done.detectors
+    summary = done.summary().set_index("group")
+    assert summary.index.tolist() == ["stiff", "soft"] and summary.nested.all()
+    assert summary.mean_ms.tolist() == [tuned.nested.groups[group].mean_ms for group in summary.index]
+    assert summary.default_mean_ms["soft"] == tuned.default_nested.groups["soft"].mean_ms
+    assert summary.alarming.tolist() == [tuned.nested.alarming] * 2
+    assert "on recordings not used for the choice" in done._repr_html_() and len(repr(done)) < 200
+
+
+VERDICTS = {
+    "within": ({"alarming": 4}, True, "good", "momentum with glr at 1/5op: stiff "),
+    "above": ({"alarming": 5}, True, "unknown", "more false alarms than the budget: 5 of 20 runs alarm where 1/5op "),
+    "apparent": ({"alarming": 0}, False, "unknown", "apparent, on the recordings used for the choice: momentum with"),
+}
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_every_surface_opens_with_the_worst_fact_of_a_tuning(name, done, capsys):
+    counts, nested, tone, words = VERDICTS[name]
+    best = replace(done.detectors[0].nested, free=20, **counts)
+    tuned = replace(done.detectors[0], nested=best if nested else None, apparent=best)
+    made = replace(done, options=replace(done.options, false_alarm_budget="1/5op"), detectors=(tuned,))
+    assert made.verdict[0] == tone and made.verdict[1].startswith(words)
+    _show(made, quiet=True)
+    assert " ".join(capsys.readouterr().out.split()).startswith(made.verdict[1])
+    assert f'<p class="verdict {tone}"><strong>{made.verdict[1]}</strong>' in tuning_html(made)
+    assert tuning_summary(made)["verdict"] == made.verdict[1]
+    assert repr(TuningResult(made)) == f"TuningResult(1 detector: {made.verdict[1]})"
+    assert f"<caption>Tuned: {made.verdict[1]}</caption>" in TuningResult(made)._repr_html_()
+
+
+def test_too_few_contacts_have_a_range_and_no_interval(done):
+    results = done.detectors[0].honest.groups["stiff"]
+    assert "10" in results.interval_ms.reason
+    assert results.range_ms[0] <= results.mean_ms <= results.range_ms[1]
+    share = done.detectors[0].honest.alarm_share
+    assert share.low <= done.detectors[0].honest.alarming / 25 <= share.high < 0.5
+
+
+def test_the_result_depends_on_neither_the_number_of_workers_nor_on_an_interruption(quick, tmp_path):
+    first = tune(quick, QUICK, journals=tmp_path)
+    expected = json.dumps(tuning_summary(first), default=str)
+    two = tune(quick, QUICK, workers=Workers(2))
+    assert json.dumps(tuning_summary(two), default=str) == expected
+    journal = tmp_path / "momentum.jsonl"
+    text = journal.read_text(encoding="utf-8")
+    journal.write_text(text[: int(0.6 * len(text))], encoding="utf-8")
+    again = tune(quick, QUICK, journals=tmp_path)
+    assert json.dumps(tuning_summary(again), default=str) == expected
+    assert sorted(journal.read_text(encoding="utf-8").splitlines()) == sorted(text.splitlines())
+
+
+def test_a_search_that_is_complete_is_not_measured_again(quick, tmp_path, monkeypatch):
+    tune(quick, QUICK, journals=tmp_path)
+    measured = []
+    usual = module.Measuring._measured
+    monkeypatch.setattr(module.Measuring, "_measured", lambda own, item: measured.append(item) or usual(own, item))
+    tune(quick, QUICK, journals=tmp_path)
+    assert measured == []
+    tune(quick, replace(QUICK, false_alarm_budget="1/6op"), journals=tmp_path)
+    assert measured
+
+
+def test_another_seed_deals_the_recordings_otherwise(quick):
+    one, other = (tune(quick, replace(QUICK, seed=seed)) for seed in (0, 1))
+    assert one.detectors[0].default_nested != other.detectors[0].default_nested
+
+
+@pytest.mark.parametrize("goal", ["p95", "force"])
+def test_other_objectives(quick, goal):
+    made = tune(quick, replace(QUICK, objective=goal))
+    tuned = made.detectors[0]
+    assert tuned.honest.score <= tuned.default_nested.score + 0.1
+    assert tuned.nested.groups["stiff"].force_n > 100.0
+
+
+def test_the_files_can_be_used(written, gate):
+    folder = written[0]
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        "machine.toml",
+        "benchmark.toml",
+        "signature_momentum.json",
+        "tuning.html",
+        "tuning.json",
+        "search",
+    }
+    made = api.benchmark(folder / "benchmark.toml").results
+    summary = json.loads((folder / "tuning.json").read_text(encoding="utf-8"))
+    chosen = summary["detectors"][0]["chosen"]
+    assert made.provenance["gains"]["momentum"] == chosen["gains"]
+    assert made.provenance["threshold"] == chosen["threshold"]["rule"] == "glr"
+    assert made.provenance["debounce_samples"] == chosen["debounce"] == 3
+    signature = read_signature(folder / "signature_momentum.json")
+    factor = signature.current[0].safety_factor
+    assert made.provenance["threshold_rule"]["safety_factor"] == factor
+    # The factor of the search has five folds, that of learning ten.
+    assert chosen["safety_factor"] == pytest.approx(factor, rel=0.15)
+    log = gate / "stiff" / "01.csv"
+    found = command("detect", log, "-m", folder / "machine.toml", "-s", folder / "signature_momentum.json")
+    assert found.status == 0 and "alarm" in found.out
+
+
+def test_files_state_what_was_chosen_and_why(written):
+    folder, outcome = written
+    text = (folder / "benchmark.toml").read_text(encoding="utf-8")
+    assert text.startswith("# Tuned by cdtool tune from benchmark.toml for momentum at 1/20op.")
+    assert "# These results are from recordings not used for the choice." in text
+    assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12, "safety_factor": ANY}
+    machine = (folder / "machine.toml").read_text(encoding="utf-8")
+    assert "tuned at 1/20op; was 10.0" in machine and "mounted backward" in machine
+    assert "nested results" in outcome.out and "neither chose the settings" in outcome.out
+
+
+def test_the_report_has_figures_and_no_script(written):
+    page = (written[0] / "tuning.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 2 and "<script" not in page
+    for words in ("Nested results", "tuned, nested", "How flat the optimum is", "What each choice saved", "evidence"):
+        assert words in page
+
+
+def test_it_may_run_again_into_its_folder_but_replaces_no_other_file(written, tmp_path):
+    folder = tmp_path / "tuned"
+    shutil.copytree(written[0], folder)
+    assert open_folder(folder, ()) == folder / "search"
+    (folder / "machine.toml").write_text("[machine]\n", encoding="utf-8")
+    with pytest.raises(UsageError, match="already exists and contains no file of cdtool tune"):
+        open_folder(folder, ())
+    assert open_folder(folder, (), force=True).is_dir()
+    with pytest.raises(UsageError, match="exists and is not a folder"):
+        open_folder(folder / "tuning.html", ())
+
+
+def test_its_own_input_is_never_overwritten(gate):
+    arguments = ("--false-alarm-budget", "1/20op", "-o", gate, "--force")
+    done = command("tune", gate / "benchmark.toml", *arguments)
+    assert done.status == 2 and "is read by this command" in done.err
+
+
+def test_too_few_runs_are_refused_with_the_numbers_needed(tmp_path):
+    simulate_gate(tmp_path / "gate", {"free": 14, "stiff": 1}, seed=32)
+    done = command("tune", tmp_path / "gate" / "benchmark.toml", "--false-alarm-budget", "1/20op", "-o", tmp_path / "t")
+    assert done.status == 2
+    assert "19 are needed to set the limit, 25 to check it, 59 to be 95 % sure of it" in done.err
+
+
+def test_between_the_two_numbers_figures_are_apparent(gate):
+    setup = read_benchmark_file(gate / "benchmark.toml")
+    few = replace(setup, learn=setup.learn[:20], threshold="limit", rule=Limit())
+    made = tune(few, replace(QUICK, false_alarm_budget=BUDGET))
+    assert not made.is_nested and made.detectors[0].nested is None
+    assert made.detectors[0].chosen_in_folds == ()
+
+
+def test_without_contacts_there_is_nothing_to_tune_on(gate):
+    setup = read_benchmark_file(gate / "benchmark.toml")
+    with pytest.raises(UsageError, match="no contact to tune on"):
+        tune(replace(setup, impacts={}), OPTIONS)
+
+
+def test_changed_conditions_are_not_tuned_on(quick):
+    winter = replace(quick.impacts["stiff"], condition="winter", counterpart="stiff")
+    made = tune(replace(quick, impacts={**quick.impacts, "winter/stiff": winter}), QUICK)
+    assert set(made.groups) == {"stiff", "soft"}
+    (note,) = [item for item in made.findings if item.kind == "conditions_not_tuned_on"]
+    assert note.severity == "note" and note.reason.startswith("1 changed condition: not used for tuning")
+
+
+def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
+    model = "[model.drive]\nstiffness = 8e4\n[model.controller]\nperiod = 0.001\nspeed_gain = 4300\n"
+    machine = (gate / "machine.toml").read_text(encoding="utf-8")
+    (gate / "model.toml").write_text(machine + model, encoding="utf-8")
+    text = (gate / "benchmark.toml").read_text(encoding="utf-8").replace('"machine.toml"', '"model.toml"')
+    inject = '[inject]\nlogs = ["free/01.csv", "free/02.csv"]\npositions = ["0.5m"]\nfolder = "injected_here"\n'
+    inject += "[inject.obstacles.hard]\nstiffness_n_per_mm = 500\n"
+    (gate / "both.toml").write_text(text + inject, encoding="utf-8")
+    both = read_benchmark_file(gate / "both.toml")
+    both = replace(both, learn=both.learn[:12], threshold="limit", rule=Limit())
+    with pytest.raises(UsageError, match=r"has real contacts \(stiff, soft\) and injected ones"):
+        tune(both, QUICK)
+    made = tune(both, replace(QUICK, impacts="injected"))
+    assert set(made.groups) == {"injected_hard"}
+    injected = replace(both, impacts={}).with_made(Workers(1))
+    read = read_recordings(injected, QUICK.budget, 0, Workers(1)).recordings
+    fold_of = {run.operation.recording.source: run.fold for run in read.free}
+    assert [log.fold for log in read.struck] == [fold_of[log.made_from] for log in read.struck]
+    real = tune(both, replace(QUICK, impacts="real"))
+    assert set(real.groups) == {"stiff", "soft"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--objective", "speed"), "objective is 'speed'"),
+        (("--thresholds", "glx"), "unknown threshold 'glx'"),
+        (("--impacts", "all"), "impacts is 'all'"),
+        (("--impacts", "injected"), "has no section [inject]"),
+        (("--false-alarm-budget", "often"), "false-alarm budget is 'often'"),
+        (("--detectors", "gx"), "gx"),
+    ],
+)
+def test_wrong_options_are_one_line(gate, tmp_path, arguments, words):
+    done = command("tune", gate / "benchmark.toml", "--false-alarm-budget", "1/20op", "-o", tmp_path / "t", *arguments)
+    assert done.status == 2 and words in done.err and done.err.count("\n") == 1
+
+
+def few_of(quick, group, count):
+    """The quick benchmark with so many logs in a group."""
+    kept = {**quick.impacts, group: replace(quick.impacts[group], logs=quick.impacts[group].logs[:count])}
+    return replace(quick, impacts=kept)
+
+
+def test_a_group_with_one_contact_has_no_nested_results_and_the_reason_is_stated(quick):
+    made = tune(few_of(quick, "stiff", 1), QUICK)
+    assert not made.is_nested
+    assert made.detectors[0].why_not_nested == "the contacts of stiff are in one part: at least 2 logs are needed"
+
+
+def test_two_days_leave_nothing_to_learn_from(quick, tmp_path):
+    for number, path in enumerate(quick.learn):
+        (tmp_path / f"2026-11-{3 + number % 2:02d}").mkdir(exist_ok=True)
+        shutil.copy(path, tmp_path / f"2026-11-{3 + number % 2:02d}" / path.name)
+    days = tuple(sorted(tmp_path.glob("2026*/*.csv")))
+    impacts = {}
+    for group in ("stiff", "soft"):
+        folder = tmp_path / "2026-11-03" / group
+        folder.mkdir()
+        for path in quick.impacts[group].logs:
+            shutil.copy(path, folder / path.name)
+        impacts[group] = replace(quick.impacts[group], logs=tuple(sorted(folder.iterdir())))
+    split = replace(quick, learn=days, impacts=impacts, split=Split.DAY)
+    made = tune(split, QUICK)
+    assert not made.is_nested and "in 2 parts that stay together" in made.detectors[0].why_not_nested
+
+
+def test_another_part_of_the_logs_is_measured_again(quick, tmp_path):
+    first = tune(quick, QUICK, journals=tmp_path)
+    section = LogSection(Mark(2.0, "s"))
+    parts = dict.fromkeys(quick.learn, section)
+    second = tune(replace(quick, learned_sections=parts), QUICK, journals=tmp_path)
+    assert second.detectors[0].factor != first.detectors[0].factor
+
+
+def test_a_budget_per_hour_has_no_more_alarming_runs_than_runs(quick):
+    made = tune(quick, replace(QUICK, false_alarm_budget="2000/h"))
+    assert made.detectors[0].apparent.alarming <= made.detectors[0].apparent.free == 12
+
+
+def test_limits_by_hand_are_refused(quick):
+    with pytest.raises(ConfigurationError, match="set by hand together with a false-alarm budget"):
+        tune(replace(quick, rule=Limit(limits=(400.0,))), QUICK)
+
+
+def test_the_force_is_not_minimised_where_none_is_known(quick, tmp_path):
+    text = "recording,start_s,end_s\n" + "".join(
+        f"{group}/{path.name},6.0,6.2\n" for group in ("stiff", "soft") for path in quick.impacts[group].logs
+    )
+    (quick.path.parent / "labels.csv").write_text(text, encoding="utf-8")
+    machine = "\n".join(
+        line
+        for line in quick.machine_file.path.read_text(encoding="utf-8").splitlines()
+        if not line.startswith("force")
+    )
+    (quick.path.parent / "no_cell.toml").write_text(machine, encoding="utf-8")
+    written = quick.path.read_text(encoding="utf-8").replace('"machine.toml"', '"no_cell.toml"')
+    written = written.replace("[onset]", '[onset]\nlabels = "labels.csv"')
+    (quick.path.parent / "labelled.toml").write_text(written, encoding="utf-8")
+    setup = read_benchmark_file(quick.path.parent / "labelled.toml")
+    setup = replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    with pytest.raises(UsageError, match="no log has the force of its contact"):
+        tune(setup, QUICK, objective="force")
+    made = tune(setup, QUICK)
+    folder = tmp_path / "a [b] c" / "out"
+    open_folder(folder, ())
+    write_tuning(made, folder)
+    again = read_benchmark_file(folder / "benchmark.toml")
+    assert again.labels is not None and len(again.labels.contacts) == 8
+
+
+def test_a_benchmark_below_a_folder_whose_name_looks_like_a_pattern(gate, tmp_path):
+    odd = tmp_path / "a [b] c"
+    shutil.copytree(gate, odd)
+    setup = read_benchmark_file(odd / "benchmark.toml")
+    setup = replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    made = tune(setup, QUICK)
+    open_folder(tmp_path / "out", ())
+    write_tuning(made, tmp_path / "out")
+    again = read_benchmark_file(tmp_path / "out" / "benchmark.toml")
+    assert {path.resolve() for path in again.learn} == {path.resolve() for path in odd.glob("free/*.csv")}
+
+
+def test_files_of_others_in_the_folder_are_not_replaced(tmp_path):
+    (tmp_path / "signature_momentum.json").write_text('{"my": 1}', encoding="utf-8")
+    with pytest.raises(UsageError, match="contains no signature"):
+        open_folder(tmp_path, (), ["momentum"])
+    mine = tmp_path / "benchmark_momentum.toml"
+    mine.write_text("machine = 'x'", encoding="utf-8")
+    with pytest.raises(UsageError, match="is read by this command"):
+        open_folder(tmp_path, (mine,), ["momentum"], force=True)
+
+
+def test_a_detector_that_cannot_be_tuned_is_reported(quick, gate, tmp_path):
+    machine = "\n".join(
+        line for line in quick.machine_file.path.read_text(encoding="utf-8").splitlines() if "acc_x" not in line
+    )
+    (gate / "no_acceleration.toml").write_text(machine, encoding="utf-8")
+    text = (gate / "benchmark.toml").read_text(encoding="utf-8").replace('"machine.toml"', '"no_acceleration.toml"')
+    (gate / "no_acceleration_benchmark.toml").write_text(text, encoding="utf-8")
+    arguments = ("--detectors", "gm,feekf", "--thresholds", "limit", "--false-alarm-budget", "1/2op")
+    done = command("tune", gate / "no_acceleration_benchmark.toml", *arguments, "-o", tmp_path / "t")
+    assert done.status == 3 and "friction_ekf: not tuned:" in done.err

@@ -1,0 +1,53 @@
+"""The result of a tuning: one line, a DataFrame, the figures of its report, and its files."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from dataclasses import replace
+
+import pytest
+
+import cdtool
+from tests.commands.notebook.values import GATE
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    return cdtool.tune(GATE / "benchmark.toml", "1/2op", detectors=["momentum"], thresholds=["limit"])
+
+
+def test_it_is_one_line_and_a_frame_with_a_row_per_detector_and_group(tuned):
+    assert repr(tuned).startswith("TuningResult(1 detector: ") and "momentum with limit at 1/2op: stiff " in repr(tuned)
+    assert tuned.summary().group.tolist() == ["stiff", "soft"] and tuned.best.detector == "momentum"
+    assert "<caption>Tuned: " in tuned._repr_html_()
+    assert tuned.skipped.columns.tolist() == ["recording", "reason"] and dict(tuned.unusable) == {}
+
+
+def test_it_is_equal_to_its_copies(tuned):
+    assert pickle.loads(pickle.dumps(tuned)) == tuned == copy.deepcopy(tuned)
+    assert tuned != replace(tuned, tuning=replace(tuned.tuning, skipped=("one",)))
+
+
+def test_its_figures_are_drawn_as_in_the_report(tuned):
+    front, around = tuned.plot.front(), tuned.plot.sensitivity("gm")
+    assert "stiff" in front.axes[0].get_xlabel() and "soft" in front.axes[0].get_ylabel()
+    assert {"tried", "chosen"} <= set(front.axes[0].get_legend_handles_labels()[1])
+    assert any("debounce" in axes.get_xlabel() for axes in around.axes)
+    with pytest.raises(cdtool.CdtoolError, match="'momentun' was not tuned"):
+        tuned.plot.front("momentun")
+
+
+def test_it_is_saved_as_the_command_writes_it_and_the_result_can_be_used(tuned, tmp_path):
+    written = tuned.save(tmp_path / "tuned")
+    names = {path.name for path in written}
+    assert {"machine.toml", "benchmark.toml", "tuning.html", "tuning.json", "signature_momentum.json"} <= names
+    assert {path.name for path in (tmp_path / "tuned").iterdir()} == names
+    found = cdtool.detect(
+        GATE / "stiff" / "03.csv",
+        tmp_path / "tuned" / "machine.toml",
+        signature=tmp_path / "tuned" / "signature_momentum.json",
+    )
+    assert found.outcome == "alarm"
+    with pytest.raises(cdtool.CdtoolError, match="the name of a file"):
+        tuned.save(tmp_path / "front.png")

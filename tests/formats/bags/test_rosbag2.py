@@ -1,0 +1,393 @@
+"""ROS 2 bags in SQLite: with and without definitions, compressed, not closed, in parts, damaged and hostile."""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+
+import cdtool
+from cdtool.base.errors import RecordingError
+from cdtool.formats.bags.rosbag2 import Rosbag2
+from cdtool.formats.channels.reading import read_as_logged, read_recording, survey
+from cdtool.formats.machine_file import read_machine_file
+from cdtool.formats.messages.schemas import DEFINITIONS
+from cdtool.formats.source import TopicDetails
+from tests.command import cdtool as command
+
+START = 1_700_000_000_000_000_000
+MACHINE = """[machine]
+type = "rotary_axis"
+coordinates = "load"
+
+[channels.mcap]
+speed = { topic = "/speed", field = "data" }
+force = { topic = "/cell", field = "data" }
+"""
+# The tables of ROS 2 Foxy; from Iron on, message_definitions and further columns.
+FOXY = """
+CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT NOT NULL);
+CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
+    data BLOB NOT NULL);
+CREATE INDEX timestamp_idx ON messages (timestamp ASC);
+"""
+IRON = (
+    FOXY.replace(
+        "format TEXT NOT NULL)", "format TEXT NOT NULL, offered_qos_profiles TEXT, type_description_hash TEXT)"
+    )
+    + """
+CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,
+    encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);
+"""
+)
+FLOAT = "std_msgs/msg/Float64"
+
+
+def number(value: float) -> bytes:
+    """A std_msgs/Float64 in CDR."""
+    return b"\x00\x01\x00\x00" + struct.pack("<d", value)
+
+
+def rows(first: float = 0.0, count: int = 100) -> list[tuple[int, int, bytes]]:
+    """Topic, time and message: speeds at 100 Hz, forces at 50 Hz."""
+    found = []
+    for k in range(count):
+        time = first + k / 100
+        found.append((1, START + round(time * 1e9), number(np.sin(time))))
+        if k % 2 == 0:
+            found.append((7, START + round(time * 1e9) + 1000, number(time)))
+    return found
+
+
+def write_bag(path: Path, messages=None, kinds=(FLOAT, FLOAT), schema: str = FOXY, definitions=()) -> Path:
+    with closing(sqlite3.connect(path)) as base, base:
+        base.executescript(schema)
+        topics = [(1, "/speed", kinds[0], "cdr"), (7, "/cell", kinds[1], "cdr")]
+        base.executemany("INSERT INTO topics(id, name, type, serialization_format) VALUES(?, ?, ?, ?)", topics)
+        base.executemany(
+            "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", rows() if messages is None else messages
+        )
+        base.executemany(
+            "INSERT INTO message_definitions(topic_type, encoding, encoded_message_definition, type_description_hash) "
+            "VALUES(?, ?, ?, '')",
+            definitions,
+        ) if definitions else None
+    return path
+
+
+@pytest.fixture
+def machine(tmp_path):
+    path = tmp_path / "machine.toml"
+    path.write_text(MACHINE)
+    return read_machine_file(path)
+
+
+def check(recording, count: int = 100, first: float = 0.0) -> None:
+    """The values and times that `rows` wrote."""
+    time = first + np.arange(count) / 100
+    np.testing.assert_allclose(recording["speed"].values[:, 0], np.sin(time), atol=1e-12)
+    np.testing.assert_allclose(recording["speed"].time, time, atol=1e-9)
+    np.testing.assert_allclose(recording["force"].time, time[::2] + 1e-6, atol=1e-9)
+    np.testing.assert_allclose(recording["force"].values[:, 0], time[::2], atol=1e-12)
+
+
+def kinds_of(findings) -> list[str]:
+    return [item.kind for item in findings if not item.channel.endswith("time")]
+
+
+def test_a_bag_without_definitions_is_read_with_the_standard_ones_and_says_so(tmp_path, machine):
+    path = write_bag(tmp_path / "log.db3")
+    recording = read_recording(path, machine)
+    check(recording)
+    assert recording.origin == START / 1e9
+    (said,) = [item for item in recording.findings if item.kind == "standard_definitions"]
+    assert said.severity == "note" and "standard ones of std_msgs/msg/Float64" in str(said)
+
+
+def test_a_bag_is_surveyed_with_its_topics(tmp_path):
+    source = survey(write_bag(tmp_path / "log.db3"))
+    assert source.topics == {"/speed": TopicDetails(FLOAT, 100), "/cell": TopicDetails(FLOAT, 50)}
+    assert source.format == "rosbag2" and list(source.columns) == ["/speed data", "/cell data"]
+
+
+def test_the_definitions_of_a_bag_come_before_the_standard_ones(tmp_path, machine):
+    text = "float32 spare\nfloat64 data\n"
+    longer = [(topic, time, b"\x00\x01\x00\x00" + bytes(8) + raw[4:]) for topic, time, raw in rows()]
+    path = write_bag(tmp_path / "log.db3", longer, schema=IRON, definitions=[(FLOAT, "ros2msg", text)])
+    recording = read_recording(path, machine)
+    check(recording)
+    assert "standard_definitions" not in kinds_of(recording.findings)
+
+
+def test_a_type_without_a_definition_is_named_with_the_next_step(tmp_path, machine):
+    path = write_bag(tmp_path / "log.db3", kinds=("my_msgs/msg/Speed", FLOAT))
+    with pytest.raises(
+        RecordingError, match=r"/speed can be decoded: .*'my_msgs/msg/Speed' \(`ros2 bag convert` to MCAP"
+    ):
+        read_recording(path, machine)
+    source = survey(path)
+    assert list(source.columns) == ["/cell data"]
+    assert "undecodable_messages" in kinds_of(source.findings)
+
+
+def test_a_standard_type_that_cdtool_does_not_write_is_known_by_rosbags(tmp_path):
+    pytest.importorskip("rosbags")
+    path = write_bag(
+        tmp_path / "log.db3",
+        [(1, START, b"\x00\x01\x00\x00" + struct.pack("<f", 1.5))] * 3,
+        ("std_msgs/msg/Float32", FLOAT),
+    )
+    assert survey(path).columns["/speed data"].values.tolist() == [1.5, 1.5, 1.5]
+
+
+@pytest.mark.parametrize("end", ["zstd", "zst"])
+def test_a_bag_compressed_as_a_file_or_message_by_message_is_read(tmp_path, machine, end):
+    plain = write_bag(tmp_path / "log.db3")
+    packed = tmp_path / f"packed.db3.{end}"
+    packed.write_bytes(zstandard.compress(plain.read_bytes()))
+    check(read_recording(packed, machine))
+    compressed = [(topic, time, zstandard.compress(raw)) for topic, time, raw in rows()]
+    check(read_recording(write_bag(tmp_path / "by_message.db3", compressed), machine))
+
+
+def test_a_bag_that_was_not_closed_is_read_with_its_journal_and_left_as_it_is(tmp_path, machine):
+    folder = tmp_path / "written"
+    folder.mkdir()
+    base = sqlite3.connect(folder / "log.db3")
+    try:
+        base.execute("PRAGMA journal_mode = WAL")
+        base.execute("PRAGMA wal_autocheckpoint = 0")
+        base.executescript(FOXY)
+        base.execute("INSERT INTO topics VALUES(1, '/speed', ?, 'cdr'), (7, '/cell', ?, 'cdr')", (FLOAT, FLOAT))
+        base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", rows())
+        base.commit()
+        copied = tmp_path / "copied"
+        copied.mkdir()
+        for name in ("log.db3", "log.db3-wal"):
+            (copied / name).write_bytes((folder / name).read_bytes())
+    finally:
+        base.close()
+    before = {path.name: path.read_bytes() for path in copied.iterdir()}
+    recording = read_recording(copied / "log.db3", machine)
+    check(recording)
+    assert "bag_not_closed" in kinds_of(recording.findings)
+    assert {path.name: path.read_bytes() for path in copied.iterdir()} == before
+
+
+def test_reading_neither_changes_the_bag_nor_makes_files_beside_it_even_if_it_is_locked(tmp_path, machine):
+    folder = tmp_path / "a folder #1?"
+    folder.mkdir()
+    path = write_bag(folder / "log.db3")
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("PRAGMA journal_mode = WAL")
+        base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(1, 0, x'00')")
+        base.rollback()
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with closing(sqlite3.connect(path, isolation_level=None)) as base:
+        base.execute("PRAGMA journal_mode = DELETE")
+        base.execute("BEGIN EXCLUSIVE")
+        check(read_recording(path, machine))
+        base.execute("ROLLBACK")
+    assert {path.name for path in folder.iterdir()} == set(before)
+
+
+def bag_folder(folder: Path, parts: int = 3, compress: bool = False) -> Path:
+    folder.mkdir()
+    names = []
+    for part in range(parts):
+        path = write_bag(folder / f"bag_{part}.db3", rows(part * 1.0))
+        if compress:
+            packed = path.with_name(f"{path.name}.zstd")
+            packed.write_bytes(zstandard.compress(path.read_bytes()))
+            path.unlink()
+            path = packed
+        names.append(f"    - {path.name}\n")
+    (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:\n{''.join(names)}")
+    return folder
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_the_parts_of_a_folder_are_one_log_in_order(tmp_path, machine, compress):
+    folder = bag_folder(tmp_path / "bag", 11, compress)
+    check(read_recording(folder, machine), 1100)
+    assert len(survey(folder).columns["/speed data"].values) == 1100
+    missing = next(folder.glob("bag_4.*"))
+    missing.unlink()
+    lost = [item for item in read_as_logged(folder, machine).recording.findings if item.severity == "loss"]
+    assert [item.kind for item in lost] == ["part_missing"] and missing.name in str(lost[0])
+
+
+def test_a_folder_is_a_log_of_a_benchmark_where_its_metadata_says_so(tmp_path):
+    from cdtool.commands.judging.runs import find_logs
+
+    first, second = bag_folder(tmp_path / "bag_1", 1), bag_folder(tmp_path / "bag_2", 2)
+    (tmp_path / "bag_3").mkdir()
+    assert find_logs(["bag_*"], tmp_path, "logs") == [first, second]
+    assert find_logs(["bag_1"], tmp_path, "logs") == [first]
+    with pytest.raises(cdtool.base.errors.ConfigurationError, match="no file matches 'bag_3'"):
+        find_logs(["bag_3"], tmp_path, "logs")
+
+
+@pytest.mark.parametrize("version", [8, 9])
+@pytest.mark.parametrize("mode", ["NONE", "MESSAGE", "FILE"])
+def test_what_rosbags_writes_is_read_to_the_bit(tmp_path, version, mode):
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    state, header = store.types["sensor_msgs/msg/JointState"], store.types["std_msgs/msg/Header"]
+    time = store.types["builtin_interfaces/msg/Time"]
+    values = np.random.default_rng(6).normal(size=(60, 3, 2))
+    writer = Writer(tmp_path / "bag", version=version)
+    if mode != "NONE":
+        writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
+        for k, row in enumerate(values):
+            content = state(header(time(1_700_000_000, k * 10**7), ""), ["shoulder", "elbow"], *row)
+            writer.write(connection, START + k * 10**7, store.serialize_cdr(content, state.__msgtype__))
+    source = survey(tmp_path / "bag")
+    assert source.columns["/joint_states velocity[:]"].values.tobytes() == values[:, 1].tobytes()
+    file = next(path for path in (tmp_path / "bag").iterdir() if ".db3" in path.name)
+    assert Rosbag2().element_names(file, "/joint_states") == ("shoulder", "elbow")
+    assert not [item for item in source.findings if item.severity == "loss"]
+
+
+@pytest.mark.parametrize("index", [True, False])
+def test_a_damaged_bag_is_one_line_or_a_counted_loss(tmp_path, index):
+    path = write_bag(tmp_path / "log.db3", schema=FOXY if index else FOXY.partition("CREATE INDEX")[0])
+    whole = path.read_bytes()
+    random = np.random.default_rng(3)
+    cases = [whole[:cut] for cut in (17, 100, 4096, len(whole) // 2, len(whole) - 1)]
+    for _ in range(60):
+        wrong = bytearray(whole)
+        for at in random.integers(16, len(whole), int(random.integers(1, 8))):
+            wrong[int(at)] = int(random.integers(256))
+        cases.append(bytes(wrong))
+    for content in cases:
+        path.write_bytes(content)
+        try:
+            source = survey(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault) and len(str(fault)) < 600
+        else:
+            counts = [len(column.values) for column in source.columns.values()]
+            if counts != [100, 50] and index:
+                assert any(item.severity in ("loss", "warning") for item in source.findings), counts
+
+
+def test_a_truncated_bag_keeps_what_is_before_the_cut(tmp_path):
+    path = write_bag(tmp_path / "log.db3", rows(0.0, 4000))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    source = survey(path)
+    assert 500 < len(source.columns["/speed data"].values) < 4000
+    assert "bag_damaged" in kinds_of(source.findings)
+
+
+@pytest.mark.parametrize(
+    ("row", "count"),
+    [
+        ((1, "later", number(1.0)), 1),
+        ((1, START, None), 1),
+        ((1, START, "text"), 1),
+        ((99, START, number(1.0)), 1),
+        ((1, -5, number(1.0)), 1),
+        ((1, START, b"\x28\xb5\x2f\xfd broken"), 1),
+    ],
+)
+def test_rows_that_are_no_messages_are_counted(tmp_path, row, count):
+    schema = FOXY.replace("data BLOB NOT NULL", "data BLOB").replace("timestamp INTEGER NOT NULL", "timestamp INTEGER")
+    path = write_bag(tmp_path / "log.db3", [*rows(), row], schema=schema)
+    source = survey(path)
+    assert len(source.columns["/speed data"].values) == 100
+    assert [item.numbers["count"] for item in source.findings if item.kind == "damaged_rows"] == [count]
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        "DROP TABLE messages; CREATE VIEW messages AS SELECT 1 AS topic_id, 0 AS timestamp, zeroblob(10000) AS data",
+        "DROP TABLE messages; CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i FROM n) "
+        "SELECT 1 AS topic_id, i AS timestamp, x'00' AS data FROM n",
+        "DROP TABLE topics; CREATE TABLE topic(a); CREATE TABLE messagesx(a)",
+    ],
+    ids=["view", "endless view", "no topics"],
+)
+def test_a_view_in_place_of_a_table_is_refused_in_one_line_without_being_evaluated(tmp_path, script):
+    path = write_bag(tmp_path / "log.db3")
+    with closing(sqlite3.connect(path)) as base:
+        base.executescript(script)
+    with pytest.raises(RecordingError) as fault:
+        survey(path)
+    assert "\n" not in str(fault.value) and str(path) in str(fault.value)
+
+
+def test_decompression_bombs_are_refused(tmp_path):
+    zeros = zstandard.compress(bytes(2**29))
+    bomb = write_bag(tmp_path / "messages.db3", [(1, START + k, zeros) for k in range(3)])
+    assert [item.numbers["count"] for item in survey(bomb).findings if item.kind == "damaged_rows"] == [3]
+    plain = write_bag(tmp_path / "log.db3").read_bytes()
+    packed = tmp_path / "packed.db3.zstd"
+    packed.write_bytes(zstandard.compress(plain) + zeros)
+    with pytest.raises(RecordingError, match="times its size: refused"):
+        survey(packed)
+
+
+def test_other_databases_and_other_compressed_files_are_refused(tmp_path):
+    other = tmp_path / "other.db3"
+    with closing(sqlite3.connect(other)) as base, base:
+        base.execute("CREATE TABLE x (a)")
+    with pytest.raises(RecordingError, match="an SQLite database, but not a ROS 2 bag"):
+        survey(other)
+    for name, content in (("log.zst", b"hello"), ("log.db3.zstd", b"")):
+        (tmp_path / name).write_bytes(zstandard.compress(content))
+        with pytest.raises(RecordingError, match="zstd-compressed"):
+            survey(tmp_path / name)
+
+
+def test_an_empty_bag_and_one_without_the_topic_are_named(tmp_path, machine):
+    path = write_bag(tmp_path / "log.db3", [])
+    with pytest.raises(RecordingError, match=r"no message of topic '/speed'"):
+        read_recording(path, machine)
+    assert not survey(path).columns
+
+
+def test_a_bag_is_cut_into_runs_by_a_topic(tmp_path, machine):
+    from cdtool.formats.channels.run_reading import read_runs
+    from cdtool.recordings.operations import RunCut
+
+    path = write_bag(tmp_path / "log.db3", [(topic, time, raw) for topic, time, raw in rows()])
+    with closing(sqlite3.connect(path)) as base, base:
+        base.execute("INSERT INTO topics VALUES(9, '/run', ?, 'cdr')", (FLOAT,))
+        base.executemany(
+            "INSERT INTO messages(topic_id, timestamp, data) VALUES(9, ?, ?)",
+            [(START, number(4.0)), (START + 500_000_000, number(5.0))],
+        )
+    found = read_runs(path, machine, RunCut("column", "/run data")).runs
+    assert [(run.recording.name, len(run.recording["speed"])) for run in found] == [("log#4", 50), ("log#5", 50)]
+
+
+def test_info_and_convert_take_a_bag_as_any_other_log(tmp_path):
+    folder = bag_folder(tmp_path / "bag", 2)
+    (tmp_path / "machine.toml").write_text(MACHINE)
+    shown = command("info", folder)
+    assert shown.status == 0 and "/speed data" in shown.out
+    done = command("convert", folder, tmp_path / "log.mcap", "-m", tmp_path / "machine.toml")
+    assert done.status == 0, done.err
+    assert len(survey(tmp_path / "log.mcap").columns) >= 2
+
+
+def test_definitions_of_the_standard_packages_are_known_and_others_are_not():
+    from cdtool.formats.bags.rosbag2 import _standard_definition
+
+    assert all(_standard_definition(kind) == DEFINITIONS[kind].text for kind in DEFINITIONS)
+    assert _standard_definition("std_msgs/Float64") == DEFINITIONS[FLOAT].text
+    assert _standard_definition("std_msgs/msg/Float32").split() == ["float32", "data"]
+    assert _standard_definition("machine_msgs/msg/Axis") == ""

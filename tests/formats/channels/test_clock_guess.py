@@ -1,0 +1,38 @@
+"""`cdtool info` without a machine file: the guess of the clock column and its unit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.commands.judging.information import info
+from cdtool.formats.channels.clock_guess import is_clock_name
+from cdtool.formats.csv.number_clock import DAY_S
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 10.0, 1000.0])
+def test_excel_days_are_distinguished_from_seconds_at_any_rate(tmp_path, rate_hz):
+    days = 45231.5 + np.arange(2000) / rate_hz / DAY_S
+    path = tmp_path / "log.csv"
+    path.write_text("time,torque\n" + "".join(f"{day:.12f},{i % 7}\n" for i, day in enumerate(days)))
+    shown = info(path)
+    assert any(finding.numbers.get("evidence", "") == "excel" for finding in shown.findings)
+    assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(rate_hz, rel=1e-3)] * 2
+
+
+@pytest.mark.parametrize("name", ["log.t", "run(2).time_ms", "Sheet1!Time [s]", "a.b.zeit"])
+def test_the_last_part_of_a_name_is_that_of_a_clock(name):
+    assert is_clock_name(name)
+
+
+@pytest.mark.parametrize("name", ["log.torque", "speed [m.t]", "target.q"])
+def test_other_last_parts_are_no_clocks(name):
+    assert not is_clock_name(name)
+
+
+@pytest.mark.parametrize(("name", "is_one"), [("time", True), ("travel", False)])
+def test_uneven_steps_are_those_of_a_clock_only_if_its_name_says_so(tmp_path, name, is_one):
+    steps = np.random.default_rng(1).choice([0.005, 0.016, 0.031, 0.047], 2000)
+    path = tmp_path / "log.csv"
+    path.write_text(f"{name},torque\n" + "".join(f"{time:.3f},{i % 7}\n" for i, time in enumerate(np.cumsum(steps))))
+    assert any(finding.numbers.get("evidence", "") == "steps" for finding in info(path).findings) is is_one

@@ -1,0 +1,100 @@
+"""Findings on logs whose clocks restart, wrap, stand still or do not overlap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.commands.judging.information import info
+from cdtool.formats.channels.reading import read_recording
+from cdtool.formats.mcap.write import Stream, write_mcap
+from cdtool.recordings.clock import clean_time
+from tests.base.findings.facts import fact_of
+from tests.command import cdtool
+from tests.formats.channels.test_channel_assembly import channels_and_facts, gate_columns, table
+
+
+def test_rows_dropped_after_a_restart_of_the_clock_are_a_loss(log, machine):
+    columns = gate_columns()
+    columns["t"][40:] = 10.0 * np.arange(10)
+    losses = [item for item in read_recording(log(table(columns)), machine()).findings if item.severity == "loss"]
+    restart = {"count": 10, "rows": 50, "first": (42, 43, 44), "row_name": "line", "restart": {"wrapped_bits": 0}}
+    assert losses == [Finding("backward_stamps", "time", restart, "loss")]
+
+
+def test_a_counters_wrap_is_reported_for_the_counter_in_the_file(log, machine):
+    columns = gate_columns()
+    columns["t"] = np.mod(65536.0 - 300.0 + 10.0 * np.arange(50), 65536.0)
+    facts = [fact for _, fact in channels_and_facts(read_recording(log(table(columns)), machine()))]
+    assert [fact.numbers["restart"] for fact in facts if fact.kind == "backward_stamps"] == [{"wrapped_bits": 16}]
+
+
+def test_a_clock_that_stands_still_is_a_clear_error(log, machine):
+    columns = gate_columns()
+    columns["t"][:] = 0.0
+    with pytest.raises(RecordingError, match="time: none of the 50 time stamps is above 0 s: the clock stands still"):
+        read_recording(log(table(columns)), machine())
+
+
+def two_topics(path, starts, stamps=40):
+    """Write speed and torque whose header clocks start at these times [s]."""
+    time = np.arange(stamps) / 100
+    names = (("/drive", "velocity[0]"), ("/gripper", "effort[0]"))
+    streams = [
+        Stream(topic, "sensor_msgs/msg/JointState", time + start, {field: time})
+        for (topic, field), start in zip(names, starts, strict=True)
+    ]
+    write_mcap(path, streams, start_ns=10**9)
+
+
+OWN_CLOCKS = """
+[channels.mcap]
+time = { clock = "header" }
+speed = { topic = "/drive", field = "velocity[0]" }
+torque = { topic = "/gripper", field = "effort[0]" }
+"""
+
+
+@pytest.mark.parametrize(("starts", "distance"), [((0.0, 100.0), 99.61), ((7e8, 0.0), 7e8), ((0.0, 0.3), 0.0)])
+def test_channels_whose_times_do_not_overlap_are_reported_with_their_distance(tmp_path, machine, starts, distance):
+    path = tmp_path / "run.mcap"
+    two_topics(path, starts)
+    findings = [item for item in read_recording(path, machine(OWN_CLOCKS)).findings if item.kind == "clocks_apart"]
+    later, before = ("torque", "speed") if starts[0] < starts[1] else ("speed", "torque")
+    assert [item.channel for item in findings] == [later] * bool(distance)
+    assert all(
+        fact_of(item) == ("clocks_apart", {"distance": pytest.approx(distance, rel=1e-6), "before": before})
+        for item in findings
+    )
+
+
+def test_every_row_of_a_clock_that_runs_backward_is_counted():
+    (finding,) = clean_time(np.arange(5000, 0, -1) * 1e-3).findings
+    assert finding.kind == "backward_stamps" and (finding.numbers["count"], finding.numbers["rows"]) == (4999, 5000)
+
+
+@pytest.mark.parametrize(("steady", "wanted"), [(True, ["speed, torque"]), (False, [])])
+def test_regular_header_stamps_are_named_where_log_times_vary(by_hand, machine, tmp_path, steady, wanted):
+    time, late = np.arange(1, 1000) * 10**7, np.random.default_rng(1).integers(0, 9 * 10**6, (2, 999))
+    logged, stamps = time + late[0], time if steady else time + late[1]
+    speed, torque = np.sin(time / 1e9), 5.0 * np.cos(time / 1e9)
+    header = [{"stamp": {"sec": at // 10**9, "nanosec": at % 10**9}} for at in stamps.tolist()]
+    contents = [{"header": h, "velocity": v, "torque": t} for h, v, t in zip(header, speed, torque, strict=True)]
+    path = by_hand([(at, at, content) for at, content in zip(logged.tolist(), contents, strict=True)])
+    fields = {"speed": "velocity", "torque": "torque"}
+    channels = "".join(f'{name} = {{ topic = "/a", field = "{field}" }}\n' for name, field in fields.items())
+    mapped = machine(f"[channels.mcap]\n{channels}")
+    findings = info(path, machine=mapped).findings
+    assert [item.channel for item in findings if item.kind == "steady_header"] == wanted
+    drafted = cdtool("init", path, "-o", tmp_path / "draft.toml")
+    assert ('write time = { clock = "header" }' in drafted.err) == steady and drafted.status == 0
+
+
+def test_a_speed_of_empty_arrays_is_to_be_deleted(by_hand, machine):
+    messages = [(i * 10**7, i * 10**7, {"position": [i / 400.0], "velocity": []}) for i in range(400)]
+    fields = {"position": "position[0]", "speed": "velocity[0]"}
+    channels = "".join(f'{name} = {{ topic = "/a", field = "{field}" }}\n' for name, field in fields.items())
+    recording = read_recording(by_hand(messages), machine(f"[channels.mcap]\n{channels}"))
+    assert Finding("speed_without_value", "speed") in recording.findings

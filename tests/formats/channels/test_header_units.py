@@ -1,0 +1,271 @@
+"""A header's unit that contradicts the machine file makes its channel not assessable; a matching one does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.formats.channels.channel_map import ChannelSource
+from cdtool.formats.channels.header_units import channel_unit_findings
+from cdtool.formats.channels.reading import read_recording
+from cdtool.formats.column_names import split_unit
+from cdtool.formats.columns import Column
+from tests.base.findings.facts import fact_of
+
+LOAD = """
+[machine]
+type = "{kind}"
+coordinates = "load"
+{inertia}
+"""
+LINEAR = LOAD.format(kind="linear_axis", inertia="load_mass = 50.0")
+ROTARY = LOAD.format(kind="rotary_axis", inertia="load_inertia = 1.0")
+
+
+def unit_findings(recording, channel):
+    kinds = "unit_contradicted", "clock_unit_contradicted"
+    return [item for item in recording.findings if item.channel == channel and item.kind in kinds]
+
+
+def findings_of_log(log, machine, machine_table, channel, header, stated):
+    """Return the findings on a channel whose column `x` has this header, if the machine file states `stated`."""
+    unit = "m/s" if "linear" in machine_table else "rad/s"
+    time = np.arange(30) * 0.01
+    rows = "".join(f"{t:.2f};{0.1 + t:.3f};{t:.3f}\n" for t in time)
+    speed = "" if channel == "speed" else f'speed = {{ column = "v", unit = "{unit}" }}\n'
+    text = f'[channels]\ntime = {{ column = "t", unit = "s" }}\n{speed}{channel} = {{ column = "x", {stated} }}\n'
+    path = log(f"t [s];x{f' [{header}]' if header else ''};v [{unit}]\n{rows}")
+    recording = read_recording(path, machine(text, machine_table))
+    assert channel == "speed" or unit_findings(recording, "speed") == []
+    return unit_findings(recording, channel)
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "header", "stated", "ratio", "advice", "scale"),
+    [
+        (LINEAR, "position", "mm", 'unit = "m"', 1000.0, "unit", ""),
+        (LINEAR, "speed", "mm/s", 'unit = "m/s"', 1000.0, "unit", ""),
+        (LINEAR, "force", "kN", 'unit = "N"', 1000.0, "unit", ""),
+        (LINEAR, "force", "N", 'unit = "kN"', 1000.0, "unit", ""),
+        (LINEAR, "acceleration", "g", 'unit = "m/s2", scale = -1', 9.807, "unit", ""),
+        (ROTARY, "speed", "rpm", 'unit = "rad/s"', 9.549, "unit", ""),
+        (ROTARY, "speed", "1/min", 'unit = "rad/s"', 9.549, "unit", ""),
+        (ROTARY, "position", "deg", 'unit = "rad"', 57.3, "unit", ""),
+        (ROTARY, "torque", "mNm", 'unit = "N m"', 1000.0, "unit", ""),
+        (ROTARY, "torque", "kNm", 'unit = "N m"', 1000.0, "unit", ""),
+        (ROTARY, "torque", "mA", 'unit = "A", scale = 0.5', 1000.0, "unit", ""),
+        (ROTARY, "torque", "A", 'unit = "N m"', 0.0, "unit and scale", "N m per A"),
+        (ROTARY, "torque", "Nm", 'unit = "A", scale = 0.5', 0.0, "unit without scale", ""),
+        (ROTARY, "torque", "V", 'unit = "A", scale = 0.5', 0.0, "unit and scale", "N m per V"),
+        (ROTARY, "torque", "%", 'unit = "1", scale = 20', 100.0, "unit", ""),
+        (ROTARY, "position", "count", 'unit = "rad"', 0.0, "unit and scale", "rad per count"),
+        (ROTARY, "torque", "mNm", 'unit = "N m", scale = 50', 1000.0, "unit", ""),
+        (ROTARY, "speed", "Nm", 'unit = "rad/s"', 0.0, "other column", ""),
+    ],
+    ids=lambda value: value if isinstance(value, str) and "[machine]" not in value else "",
+)
+def test_a_header_that_contradicts_the_machine_file_is_a_loss(
+    log, machine, kind, channel, header, stated, ratio, advice, scale
+):
+    (finding,) = findings_of_log(log, machine, kind, channel, header, stated)
+    in_file = stated.split('"')[1]
+    fact = (
+        "unit_contradicted",
+        {
+            "header": f"x [{header}]",
+            "header_unit": header,
+            "more": 0,
+            "stated": in_file,
+            "ratio": pytest.approx(ratio, rel=1e-3),
+            "advice": advice,
+            "scale": scale,
+        },
+    )
+    assert fact_of(finding) == fact and finding.severity == "loss"
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "header", "stated"),
+    [
+        (LINEAR, "position", "mm", 'unit = "mm"'),
+        (LINEAR, "position", "mm", 'unit = "m", scale = 0.001'),
+        (LINEAR, "position", "mm", 'unit = "m", scale = -0.001'),
+        (LINEAR, "acceleration", "m/s^2", 'unit = "m/s2", scale = -1'),
+        (LINEAR, "force", "kgf", 'unit = "N", scale = 9.81'),
+        (ROTARY, "speed", "1/min", 'unit = "rpm", scale = -1'),
+        (ROTARY, "speed", "rpm", 'unit = "rad/s", scale = 0.1047'),
+        (ROTARY, "torque", "Nm", 'unit = "N m", scale = 50'),
+        (ROTARY, "torque", "mA", 'unit = "mA", scale = 0.5'),
+        (ROTARY, "torque", "Nm", 'unit = "1", scale = 1'),
+        (ROTARY, "torque", "counts", 'unit = "1", scale = 0.1'),
+        (ROTARY, "torque", "%", 'unit = "N m", scale = 0.23'),
+        (ROTARY, "torque", "A", 'unit = "N m", scale = -0.056'),
+        (ROTARY, "position", "count", 'unit = "rad", scale = 0.0015'),
+        (LINEAR, "force", "V", 'unit = "N", scale = 200'),
+        (LINEAR, "force", "kN", 'unit = "N", scale = 1000'),
+        (LINEAR, "force", "kN", 'unit = "N", unit_confirmed = true'),
+        (LINEAR, "force", "lbs", 'unit = "lbf"'),
+        (LINEAR, "force", "Kilopond", 'unit = "kgf"'),
+        (LINEAR, "force", "raw", 'unit = "N", unit_confirmed = true'),
+        (LINEAR, "speed", "Meter pro Sekunde", 'unit = "m/s"'),
+        (ROTARY, "torque", "", 'unit = "N m"'),
+        (ROTARY, "label", "V", "scale = 1"),
+        (ROTARY, "trigger", "mV", "scale = 0.2"),
+    ],
+    ids=lambda value: value if isinstance(value, str) and "[machine]" not in value else "",
+)
+def test_a_header_with_a_matching_or_unknown_unit_is_not_reported(log, machine, kind, channel, header, stated):
+    assert findings_of_log(log, machine, kind, channel, header, stated) == []
+
+
+@pytest.mark.parametrize(
+    ("channel", "header", "severity"),
+    [
+        ("force", "filtered", "note"),
+        ("force", "N*10", "note"),
+        ("contact_pressure", "filtered", "loss"),
+        ("torque", "actual", "note"),
+    ],
+)
+def test_a_text_that_is_not_a_unit_is_reported(log, machine, channel, header, severity):
+    unit = {"force": "N", "torque": "N", "contact_pressure": "kPa"}[channel]
+    (finding,) = findings_of_log(log, machine, LINEAR, channel, header, f'unit = "{unit}"')
+    assert fact_of(finding) == (
+        "unit_contradicted",
+        {
+            "header": f"x [{header}]",
+            "header_unit": header,
+            "more": 0,
+            "stated": unit,
+            "ratio": 0.0,
+            "advice": "no unit",
+            "scale": "",
+        },
+    )
+    assert finding.severity == severity
+
+
+@pytest.mark.parametrize(
+    ("column", "fits"),
+    [
+        ("F_kN", False),
+        ("Kraft in daN", False),
+        ("Kraft [kN] gefiltert", False),
+        ("Kraft [N] (gefiltert)", True),
+        ("Kraft (1)", False),
+        ("wrench.force[1]", True),
+        ("F_N", True),
+        ("Kraft Newton", True),
+        ("Fz_max", True),
+        ("AI/10 [N]", True),
+        ("Kraft 100Hz", True),
+        ("Kraft [N] (max. 10 kN)", True),
+    ],
+)
+def test_the_name_of_a_force_may_state_its_unit(column, fits):
+    force = ChannelSource("force", (column,), unit="N", stated="N")
+    found = channel_unit_findings(force, [Column(column, np.empty(0), unit=split_unit(column)[1])])
+    assert not found if fits else found[0].numbers["header"] == column
+
+
+@pytest.mark.parametrize(
+    ("channel", "header", "stated"),
+    [
+        ("speed", "mm/s", "m/s"),
+        ("torque", "kN", "N"),
+        ("acceleration", "g", "m/s2"),
+        ("position", "in", "m"),
+        ("force", "lbf", "N"),
+    ],
+)
+def test_a_channel_whose_unit_is_contradicted_has_no_value(log, machine, channel, header, stated):
+    rows = "".join(f"{0.01 * k:.2f};{k}\n" for k in range(30))
+    text = f'[channels]\ntime = {{ column = "t", unit = "s" }}\n{channel} = {{ column = "x", unit = "{stated}" }}\n'
+    recording = read_recording(log(f"t [s];x [{header}]\n{rows}"), machine(text, LINEAR))
+    assert channel not in recording or np.isnan(recording[channel].values).all()
+    assert [item.severity for item in unit_findings(recording, channel)] == ["loss"]
+
+
+def test_the_unit_1_is_only_compared_if_the_machine_file_states_a_share():
+    plain = Column("x", np.empty(0), unit="1")
+    torque = ChannelSource("torque", ("x",), unit="N m", stated="N m")
+    assert channel_unit_findings(torque, [plain]) == []
+    duty = ChannelSource("torque", ("x",), factor=(0.01,), unit="1", stated="%")
+    assert channel_unit_findings(duty, [plain])[0].numbers["ratio"] == pytest.approx(100.0)
+
+
+def test_a_channel_of_linear_and_rotary_joints_is_in_the_si_unit_of_each():
+    both = ChannelSource("position", ("a", "b"), factor=(1.0, 1.0), unit="SI", stated="SI")
+    columns = [Column("a", np.empty(0), unit="rad"), Column("b", np.empty(0), unit="m")]
+    assert channel_unit_findings(both, columns) == []
+    columns[0] = Column("a", np.empty(0), unit="deg")
+    fact = fact_of(channel_unit_findings(both, columns)[0])
+    assert (fact.numbers["header"], fact.numbers["stated"]) == ("a [deg]", "SI")
+
+
+def test_a_row_of_units_is_compared_with_the_machine_file(log, machine):
+    channels = '[channels]\ntime = { column = "t", unit = "s" }\nposition = { column = "pos", unit = "m" }\n'
+    rows = "".join(f"{0.01 * k:.2f};{k}\n" for k in range(30))
+    recording = read_recording(log(f"t;pos\ns;mm\n{rows}"), machine(channels, LINEAR))
+    fact = fact_of(unit_findings(recording, "position")[0])
+    assert (fact.numbers["header"], fact.numbers["stated"]) == ("pos [mm]", "m")
+
+
+def test_joints_with_the_same_wrong_unit_are_one_warning(log, machine):
+    channels = """
+[channels]
+time = { column = "t", unit = "s" }
+position = { columns = ["a", "b"], unit = "rad" }
+speed = { columns = ["c", "d"], unit = "rad/s" }
+"""
+    rows = "".join(f"{0.01 * k:.2f};{k};{2 * k};{3 * k};{4 * k}\n" for k in range(30))
+    recording = read_recording(
+        log(f"t [s];a [deg];b [deg];c [rad/s];d [rpm]\n{rows}"), machine(channels, ROTARY + 'joints = ["a", "b"]\n')
+    )
+    assert [(item.numbers["header"], item.numbers["more"]) for item in unit_findings(recording, "position")] == [
+        ("a [deg]", 1)
+    ]
+    assert [(item.numbers["header"], item.numbers["more"]) for item in unit_findings(recording, "speed")] == [
+        ("d [rpm]", 0)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("header", "time", "rate", "ratio"),
+    [
+        ("ms", 'unit = "s"', 0.0, 1000.0),
+        ("mm", 'unit = "s"', 0.0, 0.0),
+        ("ms", "rate_hz = 100", 100.0, 10.0),
+        ("ms", "rate_hz = 1000", 1000.0, None),
+        ("count", "rate_hz = 100", 100.0, None),
+        ("s", 'unit = "s"', 0.0, None),
+    ],
+)
+def test_the_unit_of_the_clock_is_compared_with_the_machine_file(log, machine, header, time, rate, ratio):
+    channels = f'[channels]\ntime = {{ column = "t", {time} }}\nposition = {{ column = "x", unit = "m" }}\n'
+    rows = "".join(f"{k};{k}\n" for k in range(30))
+    findings = unit_findings(read_recording(log(f"t [{header}];x [m]\n{rows}"), machine(channels, LINEAR)), "time")
+    fact = (
+        "clock_unit_contradicted",
+        {
+            "header": f"t [{header}]",
+            "header_unit": header,
+            "stated": "s",
+            "rate": rate,
+            "ratio": None if ratio is None else pytest.approx(ratio),
+        },
+    )
+    assert [fact_of(item) for item in findings] == ([] if ratio is None else [fact])
+
+
+def test_the_unit_of_a_column_with_its_own_clock_is_compared(tmp_path, machine):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        for name, unit, values in (("time", "s", 0.01 * np.arange(30)), ("pos", "mm", np.arange(30.0))):
+            file[f"drive/{name}"] = values
+            file[f"drive/{name}"].attrs["unit"] = unit
+    channels = '[channels]\ntime = { column = "time", unit = "s" }\nposition = { column = "drive/pos", unit = "m" }\n'
+    recording = read_recording(path, machine(channels, LINEAR))
+    fact = fact_of(unit_findings(recording, "position")[0])
+    assert (fact.numbers["header"], fact.numbers["stated"]) == ("drive/pos [mm]", "m")

@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.reading import survey
+from cdtool.formats.containers.parquet import Parquet
+from tests.base.findings.facts import fact_of
+
+pa = pytest.importorskip("pyarrow")
+feather = pytest.importorskip("pyarrow.feather")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+
+@pytest.fixture(params=["parquet", "feather"])
+def saved(request, tmp_path):
+    def save(columns, **options):
+        path = tmp_path / f"log.{request.param}"
+        table = columns if isinstance(columns, pa.Table) else pa.table(columns)
+        if request.param == "parquet":
+            parquet.write_table(table, path, **options)
+        else:
+            feather.write_feather(table, str(path), **options)
+        return path
+
+    return save
+
+
+def test_numbers_of_every_kind_become_float64_and_others_are_named(saved):
+    path = saved(
+        {
+            "t": pa.array([0.0, 0.1, 0.2]),
+            "n": pa.array([1, None, 3], pa.int32()),
+            "half": pa.array([0.5, 1.5, 2.5], pa.float32()),
+            "on": pa.array([True, False, True]),
+            "word": pa.array(["a", "b", "c"]),
+            "list": pa.array([[1.0], [2.0], [3.0]]),
+        }
+    )
+    source = survey(path)
+    assert list(source.columns) == ["t", "n", "half", "on"]
+    assert all(column.values.dtype == np.float64 for column in source.columns.values())
+    np.testing.assert_array_equal(source.columns["n"].values, [1.0, np.nan, 3.0])
+    assert source.columns["on"].values.tolist() == [1.0, 0.0, 1.0]
+    word, other = (fact_of(finding) for finding in source.findings)
+    assert word == ("column_left_out", {"column": "word", "what": "string"})
+    assert (other.numbers["column"], other.numbers["what"][:5]) == ("list", "list<")
+
+
+def test_a_fields_unit_is_read_and_time_stamps_are_seconds_after_the_first(saved):
+    stamps = pa.array(np.datetime64("2025-03-04T05:06:07", "ns") + np.arange(3) * np.timedelta64(1_000_001, "ns"))
+    fields = [pa.field("when", stamps.type), pa.field("i", pa.float64(), metadata={"unit": "A"})]
+    source = survey(saved(pa.Table.from_arrays([stamps, pa.array([1.0, 2.0, 3.0])], schema=pa.schema(fields))))
+    assert source.columns["i"].unit == "A" and source.columns["when"].unit == "s"
+    assert source.columns["when"].values.tolist() == [0.0, 0.001000001, 0.002000002]
+    assert source.findings[0].numbers["start"].startswith("2025-03-04T05:06:07")
+
+
+def test_integers_that_float64_cannot_represent_are_reported(saved):
+    assert survey(saved({"t": [1, 2], "big": [2**53 + 1, 5]})).findings[0] == Finding("rounded_column", "big")
+
+
+def test_a_file_cut_off_anywhere_is_one_line_or_a_counted_loss(saved):
+    path = saved({"t": np.arange(5000.0), "v": np.random.default_rng(1).normal(size=5000)})
+    data = path.read_bytes()
+    for cut in (7, 9, 40, len(data) // 3, len(data) // 2, len(data) - 300, len(data) - 9, len(data) - 1):
+        path.write_bytes(data[:cut])
+        try:
+            source = Parquet().columns(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault) and path.name in str(fault)
+        else:
+            assert any(finding.severity == "loss" for finding in source.findings)
+
+
+def test_complete_record_batches_before_the_cut_are_read(tmp_path):
+    table = pa.table({"v": np.arange(100_000.0)})
+    path = tmp_path / "log.feather"
+    feather.write_feather(table, str(path), chunksize=10_000, compression="uncompressed")
+    path.write_bytes(path.read_bytes()[: 8 * 55_000])
+    source = survey(path)
+    values = source.columns["v"].values
+    assert len(values) == 50_000 and np.array_equal(values, np.arange(50_000.0))
+    assert source.findings[0] == Finding("cut_behind_row", "", {"row": 50000})
+
+
+def test_flipped_bytes_are_one_line_or_a_table(saved):
+    path = saved({"t": np.arange(500.0), "v": np.random.default_rng(1).normal(size=500)}, compression="zstd")
+    data = bytearray(path.read_bytes())
+    random = np.random.default_rng(5)
+    for at in random.integers(8, len(data), 150).tolist():
+        wrong = bytearray(data)
+        wrong[at] ^= 1 << int(random.integers(8))
+        path.write_bytes(wrong)
+        try:
+            Parquet().columns(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault)
+
+
+def test_a_small_file_that_decompresses_to_far_more_is_refused(tmp_path):
+    path = tmp_path / "bomb.parquet"
+    parquet.write_table(pa.table({"v": np.zeros(40_000_000)}), path, compression="zstd")
+    assert path.stat().st_size < 1_000_000
+    with pytest.raises(RecordingError, match="times its size: refused"):
+        survey(path)
+
+
+def test_without_the_library_the_error_names_the_extra(saved, monkeypatch):
+    path = saved({"v": [1.0, 2.0]})
+    monkeypatch.setattr("cdtool.formats.containers.container_checks.import_module", _absent)
+    with pytest.raises(RecordingError, match=r"pyarrow is not installed.*pip install '\.\[parquet\]'"):
+        survey(path)
+
+
+def _absent(name: str) -> None:
+    raise ImportError(name)

@@ -1,0 +1,180 @@
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.formats.channels.reading import survey
+from cdtool.formats.containers.tdms import Tdms, collect_warnings
+from tests.base.findings.facts import fact_of
+
+nptdms = pytest.importorskip("nptdms")
+
+
+def channel(group, name, data, **properties):
+    return nptdms.ChannelObject(group, name, data, properties=properties)
+
+
+@pytest.fixture
+def saved(tmp_path):
+    def save(*segments):
+        path = tmp_path / "log.tdms"
+        with nptdms.TdmsWriter(str(path)) as writer:
+            for objects in segments:
+                writer.write_segment(objects)
+        return path
+
+    return save
+
+
+def test_a_waveforms_increment_is_its_clock_and_its_unit_is_read(saved):
+    start = np.datetime64("2025-03-04T05:06:07.5", "us")
+    path = saved(
+        [
+            channel(
+                "m", "i", np.arange(5.0), wf_increment=0.01, wf_start_offset=0.5, wf_start_time=start, unit_string="A"
+            ),
+            channel("m", "F", np.arange(9.0), wf_increment=0.001, wf_start_time=start + np.timedelta64(250_000, "us")),
+        ]
+    )
+    source = survey(path)
+    assert source.columns["i"].unit == "A"
+    np.testing.assert_allclose(source.columns["i"].time, 0.5 + 0.01 * np.arange(5), rtol=1e-15)
+    np.testing.assert_allclose(source.columns["F"].time, 0.25 + 0.001 * np.arange(9), rtol=1e-15)
+    assert source.origin == (start - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+
+
+def test_segments_are_joined_and_equal_names_in_two_groups_are_distinguished(saved):
+    parts = [[channel("a", "v", np.arange(3.0) + 3 * k), channel("b", "v", np.arange(2))] for k in range(3)]
+    source = survey(saved(*parts))
+    assert source.columns["a/v"].values.tolist() == list(range(9)) and len(source.columns["b/v"].values) == 6
+
+
+def test_texts_and_time_stamps_are_named_and_left_out(saved):
+    stamps = np.array(["2025-01-01", "2025-01-02"], dtype="datetime64[us]")
+    source = survey(
+        saved([channel("m", "word", ["a", "b"]), channel("m", "when", stamps), channel("m", "v", np.ones(3))])
+    )
+    assert list(source.columns) == ["v"]
+    facts = [fact_of(finding) for finding in source.findings]
+    assert ("column_left_out", {"column": "word", "what": "not numeric"}) in facts
+    assert ("column_left_out", {"column": "when", "what": "of time stamps"}) in facts
+
+
+def test_the_complete_part_of_a_cut_file_is_read_and_the_loss_is_reported(saved):
+    data = np.random.default_rng(1).normal(size=1000)
+    path = saved(*[[channel("m", "v", data[k : k + 100])] for k in range(0, 1000, 100)])
+    whole = path.read_bytes()
+    for cut in (len(whole) - 8, len(whole) - 400, len(whole) // 2):
+        path.write_bytes(whole[:cut])
+        source = survey(path)
+        values = source.columns["v"].values
+        assert 400 <= len(values) < 1000 and values.tobytes() == data[: len(values)].tobytes()
+        assert any(finding.severity == "loss" for finding in source.findings), cut
+
+
+def test_damaged_files_are_one_line(saved):
+    path = saved([channel("m", "v", np.random.default_rng(1).normal(size=50), unit_string="A")])
+    whole = path.read_bytes()
+    random = np.random.default_rng(3)
+    for _ in range(150):
+        wrong = bytearray(whole)
+        wrong[int(random.integers(4, len(whole)))] ^= 1 << int(random.integers(8))
+        path.write_bytes(wrong)
+        try:
+            Tdms().columns(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault)
+
+
+START = np.datetime64("2025-03-04T05:06:07.5", "us")
+
+
+def later(seconds: float) -> np.datetime64:
+    return START + np.timedelta64(int(seconds * 1e6), "us")
+
+
+def test_waveforms_without_a_start_keep_their_offset_from_the_common_origin(saved):
+    path = saved(
+        [
+            channel("m", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=later(0.0)),
+            channel("m", "F", np.arange(5.0), wf_increment=0.01, wf_start_time=later(3600.25)),
+            channel("m", "n", np.arange(5.0), wf_increment=0.01, wf_start_offset=0.5),
+        ]
+    )
+    source = survey(path)
+    starts = {key: float(column.time[0]) for key, column in source.columns.items()}
+    assert starts == {"i": 0.0, "F": 3600.25, "n": 0.5}
+    assert source.origin == (START - np.datetime64(0, "us")) / np.timedelta64(1, "s")
+    (warning,) = [finding for finding in source.findings if finding.severity == "warning"]
+    assert fact_of(warning) == ("no_start_time", {"channels": ("n",)})
+
+
+def test_a_start_in_1904_is_an_empty_stamp(saved):
+    empty = np.datetime64("1904-01-01T00:00:00", "us")
+    rows = [channel("m", name, np.arange(5.0), wf_increment=0.01, wf_start_time=empty) for name in "ab"]
+    source = survey(saved(rows))
+    assert source.origin == 0.0 and not source.findings
+    source = survey(saved([*rows, channel("m", "c", np.arange(5.0), wf_increment=0.01, wf_start_time=START)]))
+    assert fact_of(source.findings[0]) == ("no_start_time", {"channels": ("a", "b")})
+
+
+def test_an_integer_increment_is_a_clock(saved):
+    source = survey(saved([channel("m", "i", np.arange(5.0), wf_increment=2)]))
+    assert source.columns["i"].time.tolist() == [0, 2, 4, 6, 8]
+
+
+def test_stamps_in_nanoseconds_since_1970_are_exact_next_to_waveforms(saved):
+    first = int(START.astype("datetime64[ns]").astype(np.int64)) + 123_456_789
+    stamps = first + np.cumsum(np.random.default_rng(5).integers(900_001, 1_100_000, 200))
+    path = saved(
+        [
+            channel("a", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=START),
+            channel("b", "time", stamps, unit_string="ns"),
+            channel("b", "F", np.arange(200.0)),
+        ]
+    )
+    source = survey(path)
+    nanoseconds = stamps - first + 123_456_789
+    assert np.allclose(source.columns["F"].time, nanoseconds / 1e9, rtol=1e-15, atol=0.0)
+    assert source.columns["i"].time[0] == 0.0
+    assert Finding("rounded_integers", "time", {"count": 200}) in source.findings
+
+
+def test_a_clock_with_its_own_start_is_not_shifted_and_is_reported(saved):
+    path = saved(
+        [
+            channel("a", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=START),
+            channel("b", "time", np.arange(5.0) / 1000.0, unit_string="s"),
+            channel("b", "F", np.arange(5.0)),
+        ]
+    )
+    source = survey(path)
+    assert source.columns["F"].time.tolist() == [0.0, 0.001, 0.002, 0.003, 0.004]
+    assert ("no_start_time", {"channels": ("F",)}) in [fact_of(finding) for finding in source.findings]
+
+
+def test_warnings_of_the_library_are_reported_and_not_printed(saved, capfd, caplog):
+    path = saved([channel("m", "v", np.arange(100.0))])
+    path.write_bytes(path.read_bytes()[:-30])
+    handlers = list(logging.getLogger("nptdms.reader").handlers)
+    source = survey(path)
+    assert capfd.readouterr() == ("", "") and not caplog.records
+    told = [finding for finding in source.findings if finding.kind == "library_message"]
+    assert [item.severity for item in told if item.numbers["text"].startswith("Last segment")] == ["note"]
+    assert [finding.severity for finding in source.findings].count("loss") == 1
+    assert logging.getLogger("nptdms.reader").handlers == handlers
+
+
+def test_only_the_warnings_of_the_library_are_collected(caplog):
+    ours, other = logging.getLogger("nptdms.reader"), logging.getLogger("another")
+    with collect_warnings("nptdms") as lines:
+        ours.warning("number %d", 3)
+        ours.debug("not collected")
+        other.warning("of another one")
+    ours.warning("later")
+    assert lines == ["number 3"]
+    assert [record.getMessage() for record in caplog.records] == ["of another one", "later"]

@@ -1,0 +1,188 @@
+"""machine.toml: accepted content, and errors that name the key and what is allowed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import ConfigurationError
+from cdtool.detectors.momentum import Momentum
+from cdtool.formats.machine_file import fingerprint, read_machine_file
+
+MACHINE = """
+[machine]
+type = "linear_axis"
+name = "gate"
+motor_inertia = 9.5e-4
+load_mass = 620.0
+transmission_ratio = 1.3333e-3
+viscous_friction = 2.67e-4
+coulomb_friction = 0.0
+"""
+CHANNELS = """
+[channels]
+time = { column = "t", unit = "ms" }
+torque = { column = "i_motor", unit = "A", scale = 0.56 }
+speed = { column = "n_motor", unit = "rpm" }
+position = { column = "phi", unit = "rad" }
+acceleration = { column = "acc_x", unit = "g", scale = -1, time_offset = 0.002 }
+force = { column = "load_cell", unit = "kN" }
+[channels.mcap]
+position = { topic = "/joint_states", field = "position[0]" }
+[detectors.friction_ekf]
+minimum_speed = 0.02
+"""
+
+
+def read(tmp_path: Path, text: str):
+    path = tmp_path / "machine.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_machine_file(path)
+
+
+def test_the_example_of_the_documentation_is_read(tmp_path):
+    file = read(tmp_path, MACHINE + CHANNELS)
+    assert file.machine.nominal_inertia[0] == pytest.approx(620.0 + 9.5e-4 / 1.3333e-3**2)
+    assert file.machine.friction(np.array([[2.0]]))[0, 0] == pytest.approx(2.0 * 2.67e-4 / 1.3333e-3**2)
+    by_name = {source.channel: source for source in file.columns.sources}
+    assert by_name["torque"].factor == (0.56,) and by_name["torque"].unit == "N m"
+    assert by_name["speed"].factor == pytest.approx((2.0 * math.pi / 60.0,))
+    assert by_name["acceleration"].factor == pytest.approx((-9.80665,))
+    assert by_name["acceleration"].time_offset == 0.002
+    assert by_name["force"].factor == (1000.0,)
+    assert file.columns.time.factor == 1e-3
+    assert [source.topic for source in file.topics.sources] == ["/joint_states"]
+    assert file.detector("feekf").minimum_speed == 0.02
+    assert file.detector("gm") == Momentum()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "allowed"),
+    [
+        ('type = "linear_axis"', 'type = "linear_axes"', "machine.type", "linear_axis"),
+        ("load_mass = 620.0", "load_mas = 620.0", "machine.load_mas", "did you mean load_mass"),
+        ("load_mass = 620.0", "load_mass = -1.0", "machine.load_mass", "at least 0"),
+        ("load_mass = 620.0", 'load_mass = "heavy"', "machine.load_mass", "number"),
+        ("transmission_ratio = 1.3333e-3", "transmission_ratio = 0.0", "machine.transmission_ratio", "travel"),
+        ('name = "gate"', 'name = "gate"\ncolour = "red"', "machine.colour", "unknown key"),
+        ('unit = "rpm"', 'unit = "rmp"', "channels.speed.unit", "rpm"),
+        ('unit = "rpm"', 'unit = "kN"', "channels.speed.unit", "rad/s"),
+        (", scale = 0.56 }", " }", "channels.torque.scale", "N m per A"),
+        ('speed = { column = "n_motor", unit = "rpm" }', 'speed = { column = "n" }', "channels.speed.unit", "missing"),
+        ("speed = { column", "sped = { column", "channels.sped", "speed"),
+        ('time = { column = "t", unit = "ms" }', "", "channels.time", "is missing"),
+        ('unit = "ms"', 'unit = "mm"', "channels.time.unit", "unit of time"),
+        ('column = "phi"', "column = -1", "channels.position.column", "counted from 0"),
+        ('column = "phi"', 'columns = ["a", "b"]', "channels.position.columns", "give 1"),
+        ('field = "position[0]"', 'feild = "position[0]"', "channels.mcap.position.field", "missing"),
+        ("[detectors.friction_ekf]", "[detectors.friction]", "detectors.friction", "friction_ekf"),
+        ("minimum_speed = 0.02", "minimum_sped = 0.02", "minimum_sped", "minimum_speed"),
+        ("minimum_speed = 0.02", "minimum_speed = 0", "minimum_speed", "above 0"),
+        ("[channels]", "[chanels]", "chanels", "channels"),
+    ],
+)
+def test_a_wrong_key_or_value_is_named_with_what_is_allowed(tmp_path, old, new, key, allowed):
+    text = MACHINE + CHANNELS
+    assert old in text
+    with pytest.raises(ConfigurationError) as caught:
+        read(tmp_path, text.replace(old, new, 1))
+    assert "machine.toml" in str(caught.value)
+    assert key in str(caught.value) and allowed in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_and_broken_files_are_one_line(tmp_path):
+    with pytest.raises(ConfigurationError, match="no such file"):
+        read_machine_file(tmp_path / "none.toml")
+    with pytest.raises(ConfigurationError, match="line 2"):
+        read(tmp_path, "[machine]\nname = = 3\n")
+
+
+def test_load_coordinates_accept_only_masses(tmp_path):
+    text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 95.1\nviscous_friction = 204.3\n'
+    file = read(tmp_path, text)
+    assert file.machine.nominal_inertia[0] == 95.1 and file.machine.viscous_friction == (204.3,)
+    with pytest.raises(ConfigurationError, match=r"machine\.motor_inertia.*no meaning"):
+        read(tmp_path, text + "motor_inertia = 1e-3\n")
+
+
+def test_many_joints_accept_one_value_or_one_each(tmp_path):
+    text = MACHINE.replace('name = "gate"', 'name = "portal"\njoints = ["x", "y"]').replace("620.0", "[620.0, 30.0]")
+    file = read(tmp_path, text + '[channels]\ntime = { rate_hz = 1000 }\nspeed = { columns = [1, 2], unit = "rpm" }\n')
+    assert file.machine.nominal_inertia == pytest.approx([1154.4, 564.4], abs=0.2)
+    assert file.columns.time.rate == 1000.0
+    with pytest.raises(ConfigurationError, match="one per joint"):
+        read(tmp_path, text.replace("[620.0, 30.0]", "[620.0, 30.0, 1.0]"))
+
+
+def test_a_load_side_speed_is_accepted_with_motor_channels(tmp_path):
+    text = MACHINE + CHANNELS.replace('{ column = "n_motor", unit = "rpm" }', '{ column = "v", unit = "mm/s" }')
+    source = next(item for item in read(tmp_path, text).columns.sources if item.channel == "speed")
+    assert (source.unit, source.factor) == ("m/s", (1e-3,))
+
+
+def test_the_fingerprint_changes_with_every_parameter(tmp_path):
+    one = fingerprint(read(tmp_path, MACHINE).machine)
+    assert one == fingerprint(read(tmp_path, MACHINE).machine)
+    assert one != fingerprint(read(tmp_path, MACHINE.replace("620.0", "620.1")).machine)
+    assert one != fingerprint(
+        read(tmp_path, MACHINE.replace("coulomb_friction = 0.0", "coulomb_friction = 0.1")).machine
+    )
+
+
+def test_a_motor_voltage_can_replace_the_torque(tmp_path):
+    torque = (
+        'torque = { column = "pwm", unit = "%", kind = "duty", supply_voltage = 24.0, resistance = 0.5, '
+        "back_emf_constant = 0.05, torque_constant = 0.05 }"
+    )
+    text = MACHINE + CHANNELS.replace('torque = { column = "i_motor", unit = "A", scale = 0.56 }', torque)
+    source = next(item for item in read(tmp_path, text).columns.sources if item.channel == "torque")
+    assert source.duty is not None and source.duty.supply_voltage == 24.0 and source.factor == (0.01,)
+    with pytest.raises(ConfigurationError, match="resistance"):
+        read(tmp_path, text.replace("resistance = 0.5, ", ""))
+
+
+def test_gains_of_one_detector_under_both_its_names_are_refused(tmp_path):
+    text = MACHINE + CHANNELS + "[detectors.feekf]\nminimum_speed = 0.04\n"
+    with pytest.raises(ConfigurationError, match=r"detectors\.feekf.*repeats friction_ekf"):
+        read(tmp_path, text)
+
+
+def test_a_unit_of_a_label_is_refused(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"channels\.label\.unit"):
+        read(tmp_path, MACHINE + CHANNELS.replace("force =", 'label = { column = "hit", unit = "N" }\nforce ='))
+
+
+LABEL = '[channels]\ntime = { column = "t", unit = "s" }\nlabel = { column = "class", kinds = KINDS }\n'
+
+
+def test_the_values_of_a_label_have_kinds(tmp_path):
+    file = read(tmp_path, MACHINE + LABEL.replace("KINDS", '{ 1 = "hard", "2.5" = "soft", "-1" = "hard" }'))
+    assert file.columns.sources[0].kinds == ((1.0, "hard"), (2.5, "soft"), (-1.0, "hard"))
+    assert file.label_kinds == ("hard", "soft")
+
+
+@pytest.mark.parametrize(
+    ("kinds", "said"),
+    [
+        ("{}", "is empty"),
+        ("{ hard = 1 }", "kinds.hard: is not a number"),
+        ('{ nan = "hard" }', "kinds.nan: is not a number"),
+        ('{ 1 = "" }', "kinds.1: has no name"),
+        ("{ 1 = 2 }", "kinds.1: is 2"),
+        ('{ 1 = "hard", "1.0" = "soft" }', "a value twice"),
+        ('["hard"]', "kinds: is "),
+    ],
+)
+def test_wrong_kinds_of_a_label_name_their_key(tmp_path, kinds, said):
+    with pytest.raises(ConfigurationError, match=said):
+        read(tmp_path, MACHINE + LABEL.replace("KINDS", kinds))
+
+
+def test_only_a_label_has_kinds(tmp_path):
+    channels = LABEL.replace("label", "event").replace("KINDS", '{ 1 = "hard" }')
+    with pytest.raises(ConfigurationError, match=r"event\.kinds: unknown key"):
+        read(tmp_path, MACHINE + channels)

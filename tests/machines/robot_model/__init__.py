@@ -1,0 +1,1 @@
+"""Tests of cdtool/machines/robot_model."""

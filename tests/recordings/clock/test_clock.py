@@ -1,0 +1,258 @@
+"""Causal alignment of channels, and the findings on time stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.base.errors import RecordingError
+from cdtool.base.findings import Finding
+from cdtool.recordings.clock import clean_time, differentiate, epoch_start, integrate, previous_value
+from cdtool.recordings.clock.stamps import gaps_in, gaps_of, missing_findings
+from cdtool.recordings.recording import Series
+from tests.base.findings.facts import fact_of
+
+
+def series(time, values, unit="m"):
+    return Series(np.asarray(time, float), np.asarray(values, float), unit)
+
+
+def test_the_previous_value_is_the_last_at_or_before_and_never_a_later_one():
+    held = previous_value(series([0.0, 1.0, 2.0], [10.0, 11.0, 12.0]), np.array([-0.1, 0.0, 0.99, 1.0, 2.5]))
+    np.testing.assert_array_equal(held[:, 0], [np.nan, 10.0, 10.0, 11.0, 12.0])
+
+
+def test_a_value_older_than_five_of_its_periods_is_missing():
+    held = previous_value(series([0.0, 1.0, 2.0], [10.0, 11.0, 12.0]), np.array([6.9, 7.1]))
+    np.testing.assert_array_equal(held[:, 0], [12.0, np.nan])
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(0.0, 10.0), min_size=1, max_size=30, unique=True), st.floats(0.0, 10.0))
+def test_later_samples_never_change_the_previous_value(stamps, now):
+    time = np.sort(stamps)
+    values = np.arange(len(time), dtype=float)
+    changed = np.where(time > now, -99.0, values)
+    before, after = (previous_value(series(time, v), np.array([now])) for v in (values, changed))
+    np.testing.assert_array_equal(before, after)
+
+
+def test_faulty_stamps_are_dropped_and_reported_together_with_their_rows():
+    clean = clean_time([0.0, 1.0, 2.0, 2.0, 1.5, 3.0, np.nan, 4.0, 5.0, 6.0, 7.0, 8.0], first_row=2, row_name="line")
+    np.testing.assert_array_equal(clean.time, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
+    np.testing.assert_array_equal(np.flatnonzero(clean.keep), [0, 1, 2, 5, 7, 8, 9, 10, 11])
+    assert [fact_of(item) for item in clean.findings] == [
+        ("unknown_stamps", {"count": 1, "rows": 12, "first": (8,), "row_name": "line"}),
+        ("backward_stamps", {"count": 1, "rows": 12, "first": (6,), "row_name": "line", "restart": None}),
+        ("repeated_stamps", {"count": 1, "rows": 12, "first": (5,), "row_name": "line"}),
+    ]
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(-1e3, 1e3) | st.just(float("nan")), max_size=40))
+def test_cleaned_stamps_always_strictly_increase(stamps):
+    try:
+        clean = clean_time(stamps)
+    except RecordingError as fault:
+        assert "stands still" in str(fault)
+        return
+    assert np.all(np.diff(clean.time) > 0.0)
+    assert clean.keep.sum() == len(clean.time)
+    assert clean.keep.all() == (
+        not any(
+            item.kind in ("repeated_stamps", "unknown_stamps", "stray_stamps", "stuck_stamps", "backward_stamps")
+            for item in clean.findings
+        )
+    )
+
+
+RESTART, WRAP_16, WRAP_32 = {"wrapped_bits": 0}, {"wrapped_bits": 16}, {"wrapped_bits": 32}
+
+
+@pytest.mark.parametrize(
+    ("stamps", "fact", "severity"),
+    [
+        (
+            [0, 1, 2, 3, 4, 5, 6, 0, 1, 2],
+            ("backward_stamps", {"count": 3, "rows": 10, "first": (7, 8, 9), "row_name": "sample", "restart": RESTART}),
+            "loss",
+        ),
+        (
+            [*range(200), 150, *range(200, 400)],
+            ("backward_stamps", {"count": 1, "rows": 401, "first": (200,), "row_name": "sample", "restart": None}),
+            "warning",
+        ),
+        (
+            [*range(200), 199, *range(200, 400)],
+            ("repeated_stamps", {"count": 1, "rows": 401, "first": (200,), "row_name": "sample"}),
+            "warning",
+        ),
+        (
+            [*range(30), 29, *range(30, 40)],
+            ("repeated_stamps", {"count": 1, "rows": 41, "first": (30,), "row_name": "sample"}),
+            "loss",
+        ),
+        (
+            [*range(30), np.nan, np.nan, *range(30, 40)],
+            ("unknown_stamps", {"count": 2, "rows": 42, "first": (30, 31), "row_name": "sample"}),
+            "loss",
+        ),
+        (
+            [*range(65500, 65536), *range(20)],
+            (
+                "backward_stamps",
+                {"count": 20, "rows": 56, "first": (36, 37, 38), "row_name": "sample", "restart": WRAP_16},
+            ),
+            "loss",
+        ),
+        (
+            [*range(2**32 - 30000, 2**32, 1000), *range(700, 9000, 1000)],
+            (
+                "backward_stamps",
+                {"count": 9, "rows": 39, "first": (30, 31, 32), "row_name": "sample", "restart": WRAP_32},
+            ),
+            "loss",
+        ),
+        (
+            [*range(2**31 - 30, 2**31), *range(-(2**31), 20 - 2**31)],
+            (
+                "backward_stamps",
+                {"count": 20, "rows": 50, "first": (30, 31, 32), "row_name": "sample", "restart": WRAP_32},
+            ),
+            "loss",
+        ),
+        (
+            [*range(65490, 65500), *range(20)],
+            (
+                "backward_stamps",
+                {"count": 20, "rows": 30, "first": (10, 11, 12), "row_name": "sample", "restart": RESTART},
+            ),
+            "loss",
+        ),
+        (
+            [*range(50), 60000, *range(50, 60)],
+            ("stray_stamps", {"count": 1, "rows": 61, "first": (50,), "row_name": "sample"}),
+            "loss",
+        ),
+        (
+            [*range(99), *range(60000, 60051), *range(99, 600)],
+            (
+                "backward_stamps",
+                {"count": 501, "rows": 651, "first": (150, 151, 152), "row_name": "sample", "restart": RESTART},
+            ),
+            "loss",
+        ),
+    ],
+    ids=["restart", "backward", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "stray", "ahead"],
+)
+def test_dropped_stamps_are_reported_with_their_share_and_are_a_loss_unless_they_are_few(stamps, fact, severity):
+    (finding,) = clean_time(np.array(stamps, dtype=float)).findings
+    assert (fact_of(finding), finding.severity) == (fact, severity)
+
+
+def test_a_counters_wrap_is_recognised_in_the_stamps_of_the_file():
+    counted = np.concatenate((np.arange(65500.0, 65536.0), np.arange(20.0)))
+    (finding,) = clean_time((counted - counted[0]) * 1e-6, counted=counted).findings
+    assert finding.kind == "backward_stamps" and finding.numbers["restart"] == WRAP_16
+
+
+@pytest.mark.parametrize("stamps", [[0.0] * 40, [5.0, 5.0], [7.0, 7.0, 3.0, 2.0]])
+def test_a_clock_that_stands_still_is_refused(stamps):
+    with pytest.raises(RecordingError, match=r"the clock stands still .*rate_hz"):
+        clean_time(stamps)
+
+
+def test_a_single_sample_and_events_at_one_time_are_accepted():
+    assert clean_time([5.0]).time.tolist() == [5.0]
+    events = clean_time([1.0, 1.0, 4.0, 4.0, 9.0], sampled=False)
+    assert events.time.tolist() == [1.0, 4.0, 9.0]
+    assert events.findings[0].severity == "loss"
+
+
+def test_the_start_of_an_epoch_is_returned_in_the_unit_of_the_stamps():
+    assert epoch_start(np.array([np.nan, 1.7e12, 1.7e12 + 1.0]), 1e-3) == 1.7e12
+    assert epoch_start(np.array([1.7e12]), 1e-6) == 0.0
+    assert epoch_start(np.array([np.nan]), 1.0) == 0.0
+
+
+def test_the_derivative_of_a_ramp_is_its_slope_and_a_missing_sample_is_skipped():
+    time = np.arange(500) * 1e-3
+    position = 3.0 * time
+    position[100:110] = np.nan
+    speed = differentiate(series(time, position), 50.0, "m/s")
+    assert speed.unit == "m/s"
+    present = np.isfinite(position)
+    present[0] = False
+    np.testing.assert_allclose(speed.values[present, 0], 3.0, rtol=1e-9)
+    assert np.isnan(speed.values[100:110]).all()
+
+
+def test_the_derivative_lags_by_its_two_low_passes_and_is_causal():
+    time = np.arange(2000) * 1e-3
+    position = 0.5 * time**2
+    speed = differentiate(series(time, position), 50.0, "m/s").values[:, 0]
+    lag = time[1999] - speed[1999]
+    assert lag == pytest.approx(2.0 / (2.0 * np.pi * 50.0), rel=0.2)
+    cut = differentiate(series(time[:900], position[:900]), 50.0, "m/s").values[:, 0]
+    np.testing.assert_array_equal(cut, speed[:900])
+
+
+def test_the_integral_of_a_constant_speed_is_the_distance():
+    distance = integrate(series([0.0, 1.0, 3.0, 4.0], [2.0, 2.0, np.nan, 2.0], "m/s"), "m")
+    np.testing.assert_allclose(distance.values[:, 0], [0.0, 2.0, 6.0, 8.0])
+
+
+def test_gaps_and_missing_values_are_reported():
+    time = np.concatenate((np.arange(100) * 1e-3, 0.2 + np.arange(100) * 1e-3))
+    (gap,) = gaps_in([time], 1e-3, "speed")
+    (missing,) = missing_findings(1, 200, "speed", masked=0)
+    assert not missing_findings(1, 200, "speed", masked=1)
+    assert fact_of(gap) == (
+        "sample_gaps",
+        {"count": 1, "first": ({"time": pytest.approx(0.099), "length": pytest.approx(0.101)},)},
+    )
+    assert missing == Finding("missing_values", "speed", {"count": 1, "values": 200})
+
+
+def test_the_hold_time_of_a_value_depends_on_the_rate_so_far_and_not_on_a_later_rate():
+    """If the rate of a log increases, the slow samples before do not expire earlier."""
+    slow, fast = np.arange(20) * 0.01, 0.2 + np.arange(2000) * 1e-3
+    time = np.concatenate((slow, fast))
+    values = np.arange(len(time), dtype=float)
+    clock = np.arange(0.0, 0.19, 1e-3)
+    whole = previous_value(series(time, values), clock)
+    part = previous_value(series(slow, values[:20]), clock)
+    np.testing.assert_array_equal(whole, part)
+    assert np.isfinite(whole).all()
+
+
+def test_after_a_pause_the_held_value_expires_again_by_the_recent_rate():
+    time = np.concatenate((np.arange(100) * 1e-3, 5.0 + np.arange(100) * 1e-3))
+    held = previous_value(series(time, np.arange(200.0)), np.array([0.1, 0.2, 5.05, 5.2]))
+    np.testing.assert_array_equal(np.isfinite(held[:, 0]), [True, False, True, False])
+
+
+@given(
+    st.lists(
+        st.sampled_from([0.0, -0.0, 0.5, -2.0, 1e300, np.nan, np.inf, -np.inf]) | st.floats(-9.0, 9.0), max_size=9
+    ),
+    st.integers(1, 2),
+)
+def test_the_integral_has_the_bits_of_the_cumulated_sum_of_its_steps(speeds, joints):
+    values = np.array(speeds[: len(speeds) // joints * joints]).reshape(-1, joints)
+    time = np.cumsum(np.arange(1.0, len(values) + 1.0) * 0.1)
+    held = np.where(np.isfinite(values), values, np.nan)
+    for k in range(len(held)):
+        held[k] = np.where(np.isnan(held[k]), held[k - 1] if k else 0.0, held[k])
+    steps = np.diff(time)[:, np.newaxis] * 0.5 * (held[1:] + held[:-1])
+    expected = np.vstack((np.zeros((min(1, len(values)), joints)), np.cumsum(steps, axis=0)))
+    assert integrate(Series(time, values, "m/s"), "m").values.tobytes() == expected.tobytes()
+
+
+@given(st.lists(st.sampled_from([0.9, 0.95, 1.0, 1.0, 1.0, 1.04, 1.05, 1.2, 2.5, 2.6, 9.0]), max_size=40))
+def test_a_clock_seen_as_regular_at_first_sight_has_neither_gaps_nor_jitter(steps):
+    time = np.cumsum([0.0, *steps])
+    period = float(np.median(np.diff(time))) if steps else 0.0
+    assert gaps_of(time, period, "time") == gaps_in([time], period, "time")

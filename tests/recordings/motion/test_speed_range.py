@@ -1,0 +1,169 @@
+"""Which of the speeds between learned ones a log runs: from its measured speed so far, and not from a contact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.commands.simulate.changed_machine import ChangedMachine
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.gate_recordings import as_recording
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.speed_course import TOLERANCE
+from cdtool.recordings.motion.speed_range import FORGET, GUARD, KNOWN, SpeedRange, in_ranges
+from cdtool.recordings.recording import Recording, Series
+from cdtool.thresholds.common_class import common_class
+from tests.recordings.motion.speed_logs import log
+
+
+def learned(speed: float, direction: int = 1) -> MotionClass:
+    parts = ((direction * speed, 0.9 / speed), (0.0, 1.0))
+    return common_class([log(*parts, seed=100 + i) for i in range(12)])
+
+
+SLOW, FAST = learned(0.2), learned(0.3)
+RANGE = SpeedRange((SLOW, FAST))
+BACK = SpeedRange((learned(0.2, -1), learned(0.3, -1)))
+
+
+def found_in(recording: Recording, among: SpeedRange = RANGE) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The time, where the speed fits, and the speed that it runs at."""
+    time = recording["speed"].time
+    return time, among.fitting(recording)[1], among.speed_so_far(recording, time)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.2, 0.3), st.integers(0, 2**31), st.sampled_from([1, -1]))
+def test_a_speed_in_the_range_fits_from_end_to_end_and_is_found(speed, seed, direction):
+    recording = log((direction * speed, 0.9 / speed), (0.0, 1.0), seed=seed)
+    time, fits, found = found_in(recording, RANGE if direction > 0 else BACK)
+    known = np.isfinite(found)
+    assert np.count_nonzero(~fits) <= 10
+    # The ramp of the fastest class ends 1.25 s after the log's start.
+    assert time[known][0] < 1.25 + GUARD + KNOWN + 0.2
+    assert known[(time > 1.9) & (time < 0.4 + 0.8 / speed)].all()
+    # At first from where the fastest class is within 10 % of its speed.
+    assert found[known] == pytest.approx(speed, rel=0.05)
+    assert found[known & (time > 2.5)] == pytest.approx(speed, rel=0.02)
+
+
+def gate_run(share: float, number: int) -> Recording:
+    """An impact-free stroke of the simulated gate, at a share of its nominal speed."""
+    changed = ChangedMachine(speed=share)
+    run = simulate_gate_run(changed.gate(GateParameters()), np.random.default_rng([int(1e3 * share), number]), "none")
+    return as_recording(changed.logged_gate(run, 0.56), f"run {number}", GateParameters()).without_ground_truth()
+
+
+@pytest.mark.parametrize("slow", [0.9, 0.95])
+def test_close_speeds_are_told_apart_where_they_differ_by_more_than_their_noise(slow):
+    # Early in the acceleration both are equally fast: what is found there says nothing.
+    among = SpeedRange(tuple(common_class([gate_run(share, 100 + i) for i in range(14)]) for share in (slow, 1.0)))
+    for share in (slow, 0.5 * (slow + 1.0), 1.0):
+        for number in range(4):
+            time, fits, found = found_in(gate_run(share, number), among)
+            nominal = share * among.classes[1].nominal_speed
+            known = np.flatnonzero(np.isfinite(found))
+            assert time[known[0]] < 2.5
+            assert found[known] == pytest.approx(nominal, rel=0.05), (share, number)
+            assert found[known[200:]] == pytest.approx(nominal, rel=0.02), (share, number)
+            assert fits.mean() > 0.995
+
+
+@pytest.mark.parametrize("speed", [0.15, 0.36])
+def test_a_speed_outside_the_range_does_not_fit_once_the_axis_runs(speed):
+    time, fits, _ = found_in(log((speed, 0.9 / speed), (0.0, 1.0)))
+    assert not fits[(time > 2.0) & (time < 3.0)].any()
+
+
+def test_the_fastest_and_slowest_speed_found_are_the_learned_ones():
+    for speed in (0.97 * SLOW.nominal_speed, 1.03 * FAST.nominal_speed):
+        time, fits, found = found_in(log((speed, 0.9 / speed), (0.0, 1.0)))
+        assert fits[time < 3.0].all()
+        assert SLOW.nominal_speed <= np.nanmin(found) <= np.nanmax(found) <= FAST.nominal_speed
+
+
+@pytest.mark.parametrize("slowed", [0.28, 0.25, 0.2, 0.1, 0.0])
+def test_a_contact_that_slows_the_axis_changes_nothing_before_it_is_as_old_as_the_guard(slowed):
+    usual, struck = log((0.3, 4.0)), log((0.3, 2.0), (slowed, 2.0))
+    time, _, found = found_in(struck)
+    free = found_in(usual)[2]
+    assert np.array_equal(found[time < 2.5], free[time < 2.5], equal_nan=True)
+    # From there on it stays, or follows what is older than the contact.
+    assert found[time < 2.5 + GUARD] == pytest.approx(free[time < 2.5 + GUARD], abs=2e-4, nan_ok=True)
+    if slowed < (1.0 - 2.0 * TOLERANCE) * 0.3:
+        # Nor later: it is another speed, which does not fit before it has lasted.
+        departed = (time > 2.7) & (time < 2.5 + FORGET)
+        _, fits, _ = found_in(struck)
+        assert not fits[departed].any()
+        assert np.nanmin(found[departed]) > 0.295
+
+
+def test_another_speed_in_the_range_is_learned_again_once_it_has_lasted():
+    time, fits, found = found_in(log((0.3, 1.4), (0.2, 2.6)))
+    later = (time > 1.9 + 0.3 + FORGET + GUARD + KNOWN) & (time < 4.0)
+    assert fits[later].all()
+    assert found[later] == pytest.approx(0.2, rel=0.03)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.2, 0.3), st.integers(0, 2**31), st.floats(0.6, 3.5))
+def test_nothing_depends_on_later_samples(speed, seed, end):
+    rng = np.random.default_rng(seed)
+    recording = log((speed, 0.9 / speed), (0.0, 1.0), seed=seed)
+    count = int(np.searchsorted(recording["speed"].time, end))
+    channels = {}
+    for name, series in recording.channels.items():
+        values = series.values.copy()
+        values[count:] = rng.normal(size=values[count:].shape)
+        channels[name] = Series(series.time, values, series.unit)
+    for ours, theirs in zip(found_in(recording), found_in(replace(recording, channels=channels)), strict=True):
+        assert np.array_equal(ours[:count], theirs[:count], equal_nan=True)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.2, 0.3), st.integers(0, 2**31))
+def test_own_clocks_gaps_and_nan_change_the_speed_little(speed, seed):
+    rng = np.random.default_rng(seed)
+    recording = log((speed, 0.9 / speed), (0.0, 1.0), seed=seed)
+    channels = {}
+    for name, series in recording.channels.items():
+        kept = rng.random(len(series)) > 0.5
+        gap = rng.uniform(1.5, 3.0)
+        kept &= (series.time < gap) | (series.time > gap + 0.2)
+        values = np.where(rng.random(series.values.shape) < 0.1, np.nan, series.values)
+        jittered = np.sort(series.time + rng.uniform(0.0, 1e-3, len(series)))
+        channels[name] = Series(jittered[kept], values[kept], series.unit)
+    damaged = replace(recording, channels=channels)
+    clock = np.arange(0.0, 3.0, 1.7e-3)
+    found = RANGE.speed_so_far(damaged, clock)
+    assert np.isfinite(found[clock > 2.5]).all()
+    assert found[np.isfinite(found)] == pytest.approx(speed, rel=0.05)
+    assert np.isnan(RANGE.speed_so_far(damaged, np.array([-1.0]))).all()
+
+
+def test_it_is_the_speed_of_the_joint_that_leads():
+    recording = log((0.25, 3.6), (0.0, 1.0))
+    channels = {
+        name: Series(series.time, np.column_stack((0.3 * series.values, series.values)), series.unit)
+        for name, series in recording.channels.items()
+    }
+    several = Recording("two", "made up", ("first", "second"), channels)
+    second = SpeedRange(tuple(replace(item, joint=1) for item in RANGE.classes))
+    assert np.array_equal(found_in(several, second)[2], found_in(recording)[2], equal_nan=True)
+
+
+def test_three_speeds_are_interpolated_between_neighbours():
+    among = SpeedRange((SLOW, learned(0.25), FAST))
+    for speed in (0.22, 0.28):
+        _, fits, found = found_in(log((speed, 0.9 / speed), (0.0, 1.0)), among)
+        assert fits.mean() > 0.998 and found[np.isfinite(found)] == pytest.approx(speed, rel=0.05)
+
+
+def test_classes_of_one_direction_and_joint_belong_together_in_order_of_speed():
+    back, other = MotionClass(-1, 0.2), MotionClass(1, 0.1, joint=1)
+    assert in_ranges([FAST, back, SLOW, other]) == [[2, 0], [1], [3]]
+    assert in_ranges([]) == []

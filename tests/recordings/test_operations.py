@@ -1,0 +1,99 @@
+"""Division into strokes and their classes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.base.errors import RecordingError, UsageError
+from cdtool.recordings.motion import motion_class
+from cdtool.recordings.operations import _directions, operations_of
+from cdtool.recordings.recording import Recording, Series
+from tests.bits import samples
+
+TIME = np.arange(12_000) * 1e-3
+
+
+def recording(speed: np.ndarray, **more: np.ndarray) -> Recording:
+    channels = {"speed": Series(TIME, speed, "m/s")}
+    channels |= {name: Series(TIME, values, "1") for name, values in more.items()}
+    return Recording("log", "log", ("axis",), channels)
+
+
+def speed_of(*strokes: tuple[float, float, float]) -> np.ndarray:
+    """(start, end, speed) strokes with noise."""
+    speed = 1e-3 * np.random.default_rng(0).normal(size=len(TIME))
+    for start, end, v in strokes:
+        speed[(start <= TIME) & (end > TIME)] += v
+    return speed
+
+
+def test_strokes_separated_by_rests_become_operations_with_direction_and_speed():
+    parts = operations_of(recording(speed_of((1, 3, 0.2), (4, 6, -0.2), (7, 11, 0.1))), "motion")
+    assert [part.name for part in parts] == ["log#1", "log#2", "log#3"]
+    assert [part.motion.direction for part in parts] == [1, -1, 1]
+    assert [part.motion.nominal_speed for part in parts] == pytest.approx([0.2, 0.2, 0.1], rel=0.02)
+    assert parts[1].recording.start == pytest.approx(3.5, abs=0.02)
+    assert parts[1].recording.end == pytest.approx(6.5, abs=0.02)
+
+
+def test_a_reversal_without_rest_ends_a_stroke():
+    parts = operations_of(recording(speed_of((1, 3, 0.2), (3, 5, -0.2))), "motion")
+    assert [part.motion.direction for part in parts] == [1, -1]
+
+
+def test_a_short_pause_does_not_end_a_stroke_and_a_short_motion_is_not_one():
+    parts = operations_of(recording(speed_of((1, 3, 0.2), (3.1, 5, 0.2), (8, 8.1, 0.2))), "motion")
+    assert len(parts) == 1
+
+
+def test_a_trigger_channel_cuts_where_it_is_high():
+    trigger = ((TIME >= 2) & (TIME < 5)) | ((TIME >= 6) & (TIME < 7))
+    parts = operations_of(recording(speed_of((0, 12, 0.2)), trigger=trigger.astype(float)), "trigger")
+    assert [(part.recording.start, round(part.recording.end, 3)) for part in parts] == [(2.0, 4.999), (6.0, 6.999)]
+
+
+def test_the_reference_speed_decides_the_class_where_it_is_logged():
+    stopped = speed_of((1, 2, 0.05))
+    log = recording(stopped, reference_speed=np.where(TIME > 1, 0.2, 0.0))
+    assert motion_class(log).nominal_speed == pytest.approx(0.2)
+
+
+def test_a_resting_recording_has_no_direction_and_no_stroke():
+    log = recording(np.zeros(len(TIME)))
+    assert motion_class(log).direction == 0
+    with pytest.raises(RecordingError, match="no operation found"):
+        operations_of(log, "motion")
+
+
+def test_an_unknown_way_to_cut_names_the_known_ones():
+    with pytest.raises(UsageError, match="motion"):
+        operations_of(recording(np.zeros(len(TIME))), "motions")
+
+
+def test_a_missing_trigger_channel_is_named():
+    with pytest.raises(RecordingError, match="trigger"):
+        operations_of(recording(np.zeros(len(TIME))), "trigger")
+
+
+def test_the_leading_joint_is_the_one_that_moves_most():
+    values = np.column_stack((0.01 * np.sin(TIME), np.sin(TIME)))
+    log = Recording("r", "r", ("a", "b"), {"speed": Series(TIME, values, "rad/s")})
+    assert motion_class(log).joint == 1
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data(), st.sampled_from([1, 2, 3, 15, 16, 17, 60, 400]))
+def test_directions_are_those_of_numpy_alone(data, count):
+    if data.draw(st.booleans()):
+        speed = data.draw(samples(min(count, 60)))[:, 0]
+    else:
+        random = np.random.default_rng(data.draw(st.integers(0, 2**31)))
+        speed = 0.2 * np.sin(np.linspace(0.0, 7.0, count)) + random.normal(0.0, 0.01, count)
+        speed[random.uniform(size=count) < 0.1] = data.draw(st.sampled_from([np.nan, 0.0, np.inf]))
+    found = _directions(speed)
+    known = np.nan_to_num(speed)
+    rest = 0.05 * np.percentile(np.abs(known), 99.0)
+    np.testing.assert_array_equal(found, np.where(np.abs(known) <= rest, 0, np.sign(known)))

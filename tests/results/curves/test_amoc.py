@@ -1,0 +1,73 @@
+"""Latency against false alarms: rates with their exposure, the factor in use, and quantities not reached."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from cdtool.results.curves.amoc import amoc_curves, rate_unit
+from cdtool.results.curves.sweep import MULTIPLES
+from cdtool.results.results import Results
+from tests.results.sweeps import CONTACTS, FACTOR, swept
+
+
+def alarms(multiple: float) -> int:
+    return 8 if multiple < 0.5 else 0
+
+
+def of(*rows, **provenance) -> Results:
+    return Results(provenance, ("momentum", "direct"), ("stiff",), (), (), (), sweep=tuple(rows))
+
+
+def test_rates_are_false_alarms_per_monitored_hour():
+    (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)))
+    assert curve.per == "hour"
+    assert curve.points[0].rate == pytest.approx(80.0)
+    assert curve.points[-1].rate == 0.0
+    assert curve.at_most == pytest.approx(-math.log(0.05) / 0.1)
+
+
+def test_rates_are_per_operation_where_the_budget_is():
+    results = of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms), false_alarm_budget="1/1000op")
+    (curve,) = amoc_curves(results)
+    assert curve.per == "operation"
+    assert curve.points[0].rate == pytest.approx(8 / 40)
+    assert curve.at_most == pytest.approx(-math.log(0.05) / 40)
+
+
+@pytest.mark.parametrize(
+    ("budget", "unit"), [("0.1/h", "hour"), ("1/1000op", "operation"), (None, "hour"), ("?", "hour")]
+)
+def test_the_unit_is_the_budgets_else_hours(budget, unit):
+    assert rate_unit(of(false_alarm_budget=budget)) == unit
+
+
+def test_the_point_in_use_has_the_factor_that_is_set():
+    (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms)))
+    assert curve.set_point.safety_factor == pytest.approx(FACTOR)
+    assert curve.set_point.median == pytest.approx(60.0)
+
+
+def test_points_are_in_the_order_of_the_factor_whatever_the_order_of_the_rows():
+    rows = swept("momentum", "stiff", lambda m: 60.0 * m, alarms)
+    assert amoc_curves(of(*rows)) == amoc_curves(of(*reversed(rows)))
+    factors = [point.safety_factor for point in amoc_curves(of(*rows))[0].points]
+    assert factors == sorted(factors) and len(factors) == len(MULTIPLES)
+
+
+def test_an_unreached_median_is_infinite_and_one_without_contacts_is_missing():
+    rows = swept("momentum", "stiff", lambda _: None, alarms, missed=lambda _: CONTACTS)
+    assert {point.median for point in amoc_curves(of(*rows))[0].points} == {math.inf}
+    blind = [replace(row, missed=0, not_assessable=CONTACTS) for row in rows]
+    (curve,) = amoc_curves(of(*blind))
+    assert all(math.isnan(point.median) for point in curve.points)
+    assert curve.not_assessable == CONTACTS
+
+
+def test_a_detector_not_assessable_in_the_hold_out_has_no_curve():
+    seen = swept("momentum", "stiff", lambda m: 60.0 * m, alarms)
+    blind = swept("direct", "stiff", lambda m: 60.0 * m, lambda _: 0, hours=0.0)
+    assert [curve.detector for curve in amoc_curves(of(*seen, *blind))] == ["momentum"]
+    assert amoc_curves(of()) == ()

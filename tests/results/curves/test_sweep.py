@@ -1,0 +1,188 @@
+"""A detection with changed limits gives the same result as matching with these limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Band, Status, Verdict
+from cdtool.recordings.recording import Contact
+from cdtool.results.curves.false_alarm_budget import Budget, set_factor
+from cdtool.results.curves.sweep import MULTIPLES, critical_factor, highest_held, sweep
+from cdtool.thresholds.limit import FittedLimit
+from cdtool.truth.matching import match
+from tests.results.detections import ACTIVATION, OPERATION, detection
+
+
+@pytest.mark.parametrize(
+    "activation",
+    [ACTIVATION, Activation(3, 0.2, hysteresis=0.4), Activation(3, latch=True)],
+    ids=["plain", "hysteresis", "latch"],
+)
+@pytest.mark.parametrize("seed", range(6))
+def test_each_step_is_what_matching_says_with_those_limits(seed, activation):
+    contacts = [Contact(3.0, 3.2, 0.005), Contact(6.0, 6.1, 0.005)]
+    factors = 3.0 * MULTIPLES
+    swept = sweep(detection(seed, activation=activation), contacts, activation, 1.0, factors)
+    assert swept.false_alarms[0] > 0 and swept.false_alarms[-1] == 0
+    for i, factor in enumerate(factors):
+        moved = detection(seed, float(factor), activation)
+        matching = match(moved.verdict, contacts, moved.statistic, 1.0, rearm=activation.wait)
+        assert len(matching.false_alarms) == swept.false_alarms[i]
+        np.testing.assert_allclose([item.latency for item in matching.matches], swept.latency[i])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_above_the_critical_factor_there_is_no_alarm_and_below_it_there_is_one(seed):
+    critical = critical_factor(detection(seed), ACTIVATION)
+    assert detection(seed, critical * 1.000001).verdict.outcome == "no alarm"
+    assert detection(seed, critical * 0.999999).verdict.outcome == "alarm"
+
+
+def test_too_few_assessable_samples_have_no_critical_factor():
+    blind = replace(detection(0), threshold=None, judgement=None)
+    assert critical_factor(blind, ACTIVATION) == -np.inf
+
+
+@pytest.mark.parametrize(
+    ("text", "rate", "per", "shown"),
+    [
+        ("1/1000op", 1e-3, "operation", "1/1000op"),
+        ("0.002/op", 2e-3, "operation", "1/500op"),
+        ("1/8h", 0.125, "hour", "1/8h"),
+        (" 2 / hour ", 2.0, "hour", "2/h"),
+        ("1e-3/operations", 1e-3, "operation", "1/1000op"),
+    ],
+)
+def test_budgets_are_read(text, rate, per, shown):
+    budget = Budget.parse(text)
+    assert (budget.rate, budget.per, str(budget)) == (pytest.approx(rate), per, shown)
+
+
+@pytest.mark.parametrize("text", ["", "1000", "1/0op", "-1/op", "1/1000 runs", "1/nan op", "inf/h"])
+def test_an_invalid_budget_is_refused_with_an_example(text):
+    with pytest.raises(UsageError, match="1/1000op"):
+        Budget.parse(text)
+
+
+def test_the_factor_is_the_smallest_that_meets_the_budget_per_operation():
+    runs = [detection(seed) for seed in range(20)]
+    made = set_factor(Budget(0.1, "operation"), "d", runs, ACTIVATION)
+    critical = sorted((critical_factor(run, ACTIVATION) for run in runs), reverse=True)
+    assert made.factor == pytest.approx(critical[1], rel=1e-8) and made.alarms == 1
+    alarming = [detection(seed, made.factor).verdict.outcome == "alarm" for seed in range(20)]
+    assert sum(alarming) == 1 and made.operations == 20
+
+
+def test_the_budget_is_met_on_average_by_independent_operations():
+    pool = np.array([critical_factor(detection(seed), ACTIVATION) for seed in range(120)])
+    rng = np.random.default_rng(4)
+    broken = []
+    for _ in range(400):
+        order = rng.permutation(len(pool))
+        runs, others = pool[order[:20]], pool[order[20:]]
+        factor = np.sort(runs)[::-1][1] * (1.0 + 1e-9)  # the result of set_factor for 1/10op on 20 operations
+        broken.append(np.mean(others > factor))
+    assert np.mean(broken) == pytest.approx(2 / 21, abs=0.01)
+
+
+def test_the_factor_meets_a_budget_per_hour_and_a_smaller_one_violates_it():
+    runs = [detection(seed) for seed in range(20)]
+    hours = sum(run.assessed_seconds for run in runs) / 3600.0
+    budget = Budget(4.5 / hours, "hour")
+    made = set_factor(budget, "d", runs, ACTIVATION)
+
+    def alarms(factor: float) -> int:
+        return sum(len(detection(seed, factor).verdict.alarms) for seed in range(20))
+
+    assert alarms(made.factor) == made.alarms <= 3 < alarms(made.factor * 2.0 ** (-1.5 / 32))
+
+
+def test_too_small_an_exposure_is_refused_with_the_missing_amount():
+    with pytest.raises(UsageError, match=r"1/1000op needs 999 impact-free operations.*20 were assessable.*add 979"):
+        set_factor(Budget(1e-3, "operation"), "d", [detection(seed) for seed in range(20)], ACTIVATION)
+
+
+def test_unassessable_operations_do_not_count_as_exposure():
+    runs = [detection(seed) for seed in range(12)]
+    status = np.full_like(runs[0].statistic.status, Status.NOT_APPLICABLE)
+    blind = replace(runs[0], statistic=replace(runs[0].statistic, status=status))
+    with pytest.raises(UsageError, match="11 were assessable"):
+        set_factor(Budget(1 / 13, "operation"), "d", [blind, *runs[1:]], ACTIVATION)
+
+
+def test_limits_without_spread_cannot_be_set():
+    stuck = FittedLimit((0.0,), (0.0,), (0.0,), (0.0,), safety_factor=3.0)
+    runs = []
+    for seed in range(4):
+        found = detection(seed)
+        assert found.judgement is not None
+        runs.append(replace(found, judgement=replace(found.judgement, thresholds=(stuck,))))
+    with pytest.raises(UsageError, match="no spread"):
+        set_factor(Budget(0.5, "operation"), "d", runs, ACTIVATION)
+
+
+def test_a_detection_without_a_threshold_never_alarms():
+    statistic = detection(0).statistic
+    nothing = np.full(statistic.values.shape, np.nan)
+    blind = Detection(OPERATION, "d", statistic, Band(nothing, nothing), Verdict("not_assessable"))
+    swept = sweep(blind, [Contact(3.0, 3.1, 0.0)], ACTIVATION, 1.0, MULTIPLES)
+    assert not swept.false_alarms.any() and np.isnan(swept.latency).all()
+
+
+def test_a_budget_states_the_missing_amount_with_all_digits():
+    with pytest.raises(UsageError, match=r"budget 1/2000000op needs 1999999 impact-free operations .* 12 were") as at:
+        Budget.parse("1/2000000op").check(12.0, "gm")
+    assert "add 1999987 to the runs learned from" in at.value.hint
+    with pytest.raises(UsageError, match=r"needs 1 impact-free operation to be set, 0 were"):
+        Budget.parse("1/op").check(0.0, "gm")
+    assert [str(Budget.parse(text)) for text in ("1/3op", "0.002/op", "1/8h", "2500000/h")] == [
+        "1/3op",
+        "1/500op",
+        "1/8h",
+        "2500000/h",
+    ]
+
+
+@given(
+    st.lists(st.integers(-3, 6), max_size=40).map(lambda values: np.array(values, dtype=np.float64)),
+    st.integers(1, 5),
+    st.integers(1, 5),
+)
+def test_the_highest_value_that_is_held_is_that_of_all_windows(values, debounce, later):
+    needed = np.where(np.arange(len(values)) < 20, debounce, later).astype(np.int64)
+    held = [values[k - n + 1 : k + 1].min() for k, n in enumerate(needed) if k + 1 >= n]
+    assert highest_held(values, needed) == max(held, default=-np.inf)
+
+
+def test_a_budget_with_a_confidence_is_met_that_often():
+    """The rate above the c-th largest of n is distributed as beta(c, n + 1 - c)."""
+    budget = Budget.parse("1/20op at 90%")
+    rng = np.random.default_rng(3)
+    rates = []
+    for _ in range(2000):
+        critical = np.sort(rng.random(120))[::-1]
+        rates.append(1.0 - critical[budget.allowed(120.0)])
+    assert 0.90 <= np.mean(np.array(rates) <= 0.05) < 0.98
+    assert budget.needed == 45.0 and budget.allowed(45.0) == 0 and budget.allowed(44.0) == -1
+
+
+def test_a_budget_by_hours_with_a_confidence_allows_fewer_alarms():
+    budget = Budget.parse("0.1/h at 95%")
+    assert budget.needed == pytest.approx(29.957, abs=1e-3)
+    assert (budget.allowed(29.9), budget.allowed(30.0), Budget.parse("0.1/h").allowed(30.0)) == (-1, 0, 2)
+    assert budget.allowed(200.0) < Budget.parse("0.1/h").allowed(200.0)
+
+
+@pytest.mark.parametrize("text", ["1/100op at 20%", "1/100op at 100%", "1/100op at", "1/100op at x%", "3/op at 95%"])
+def test_a_wrong_confidence_is_refused(text):
+    with pytest.raises(UsageError, match="false-alarm budget is"):
+        Budget.parse(text)
+    assert str(Budget.parse("1/100op at 95%")) == "1/100op at 95%"

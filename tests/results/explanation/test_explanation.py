@@ -1,0 +1,326 @@
+"""Why an alarm was raised and why a contact was missed, with numbers that can be calculated by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdtool.alarms.activation import Activation
+from cdtool.alarms.pipeline import Detection, judge
+from cdtool.base.errors import UsageError
+from cdtool.detectors.detection import Band, Signal, Status
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.operations import Operation
+from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.results.explanation.explanation import AlarmExplanation, MissExplanation, explain_alarm, explain_miss
+from cdtool.results.explanation.explanation import explain_operation as explain
+from cdtool.results.explanation.margin import joint_margins
+from cdtool.results.explanation.words import words
+from cdtool.thresholds.limit import Limit
+from cdtool.truth.matching import Matching, match
+
+TIME = np.arange(5000) * 1e-3
+NINE = Activation(debounce=9)
+CONTACT = Contact(3.0, 3.4, 0.001)
+
+
+def detection(
+    values: np.ndarray,
+    limits: Sequence[float] = (1.0,),
+    status: np.ndarray | None = None,
+    time: np.ndarray = TIME,
+    channels: Mapping[str, np.ndarray] = MappingProxyType({}),
+    threshold: Any = None,
+    activation: Activation = NINE,
+) -> Detection:
+    """A statistic (n,) or (n, J) with limits set by hand, assessed as in the pipeline."""
+    columns = values.reshape(len(time), -1)
+    joints = ("hip", "knee")[: columns.shape[1]]
+    given = {"torque": columns, **{name: np.column_stack([part] * len(joints)) for name, part in channels.items()}}
+    recording = Recording("log", "log", joints, {name: Series(time, part, "1") for name, part in given.items()})
+    marks = np.column_stack([np.zeros(len(time)) if status is None else status] * len(joints)).astype(np.uint8)
+    signal = Signal(time, columns, marks, "N m", joints=joints)
+    return judge(
+        Operation(recording, MotionClass(1, 1.0)), "momentum", signal, [threshold or Limit.given(limits)], activation
+    )
+
+
+def matching(item: Detection, *contacts: Contact) -> Matching:
+    return match(item.verdict, contacts, item.statistic)
+
+
+def pulse(start: int, count: int, height: float = 1.5, rest: float = 0.2) -> np.ndarray:
+    """Samples start to start + count - 1 at a height, all others at zero."""
+    values = np.full(len(TIME), rest)
+    values[start : start + count] = height
+    return values
+
+
+@dataclass(frozen=True)
+class Upper:
+    """A one-sided band: 2 + k * 0.5 above, unlimited below."""
+
+    safety_factor: float = 4.0
+
+    def with_safety_factor(self, factor: float) -> Upper:
+        return Upper(factor)
+
+    def evaluate(self, _: Recording, signal: Signal) -> tuple[Signal, Band]:
+        shape = signal.values.shape
+        return signal, Band(np.full(shape, -np.inf), np.full(shape, 2.0 + 0.5 * self.safety_factor))
+
+
+def test_margin_and_share_are_the_distance_to_the_nearest_limit_and_what_is_used_of_it():
+    values = np.zeros(len(TIME))
+    values[:4] = 0.75, -1.5, 1.0, -0.25
+    (margin,) = joint_margins(detection(values, (1.0,)))
+    assert margin.margin[:5] == pytest.approx([0.25, -0.5, 0.0, 0.75, 1.0])
+    assert margin.share[:5] == pytest.approx([0.75, 1.5, 1.0, 0.25, 0.0])
+    below = margin.moment(1)
+    assert (below.limit, below.statistic, below.margin) == (-1.0, -1.5, -0.5)
+
+
+def test_with_one_limit_the_share_counts_from_the_middle_of_the_band():
+    values = np.full(len(TIME), 2.0)
+    values[:3] = 4.0, 3.0, 1.0
+    (margin,) = joint_margins(detection(values, threshold=Upper()))
+    assert margin.share[:4] == pytest.approx([1.0, 0.5, -0.5, 0.0])
+    assert margin.margin[:4] == pytest.approx([0.0, 1.0, 3.0, 2.0])
+
+
+def test_a_sample_not_assessable_has_no_margin_but_a_reason():
+    status = np.zeros(len(TIME))
+    status[10] = Status.START_UP
+    (margin,) = joint_margins(detection(np.zeros(len(TIME)), status=status))
+    moment = margin.moment(10)
+    assert math.isnan(moment.margin) and math.isnan(moment.share) and moment.reason == "start-up"
+
+
+def test_an_alarm_is_traced_to_the_last_exit_from_the_band():
+    values = pulse(3020, 200)
+    values[3010:3013] = 1.5  # three samples outside, then inside again: not the last exit
+    item = detection(values)
+    (alarm,) = item.verdict.alarms
+    found = explain_alarm(item, alarm, NINE, CONTACT)
+    assert (found.joint, found.alarm.side, found.role) == ("hip", "above", "detection")
+    assert found.left == pytest.approx(3.020) and alarm.time == pytest.approx(3.028)
+    assert (found.debounce, found.skipped) == (9, 0)
+
+
+def test_missing_samples_are_skipped_as_the_activation_skips_them():
+    status = np.zeros(len(TIME))
+    status[[3022, 3025]] = Status.GAP
+    item = detection(pulse(3020, 200), status=status)
+    (alarm,) = item.verdict.alarms
+    found = explain_alarm(item, alarm, NINE)
+    assert (found.left, found.skipped) == (pytest.approx(3.020), 2)
+    assert alarm.time == pytest.approx(3.030)
+    status[3025] = Status.NOT_APPLICABLE  # interrupts the sequence
+    item = detection(pulse(3020, 200), status=status)
+    found = explain_alarm(item, item.verdict.alarms[0], NINE)
+    assert (found.left, found.skipped) == (pytest.approx(3.026), 0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_between_leaving_the_band_and_any_alarm_lie_just_the_debounced_samples(seed):
+    rng = np.random.default_rng(seed)
+    values = np.convolve(rng.normal(size=len(TIME) + 19), np.ones(20) / 8.0, "valid")
+    status = rng.choice([0, 0, 0, 0, 0, 0, 1, 3, 3], len(TIME))
+    item = detection(values, status=status, activation=Activation(4, rearm=0.01))
+    assert len(item.verdict.crossings) > 5
+    for crossing in item.verdict.crossings:
+        found = explain_alarm(item, crossing, Activation(4))
+        inside = (found.left <= TIME) & (crossing.time >= TIME)
+        marks = status[inside]
+        assert found.skipped == np.count_nonzero(marks == Status.GAP)
+        assert np.count_nonzero(marks == Status.VALID) == 4 == found.debounce
+        assert (np.abs(values[inside][marks == Status.VALID]) > 1.0).all()
+
+
+def test_the_margin_is_given_at_fixed_times_before_the_alarm_and_at_the_onset():
+    item = detection(0.205 + np.clip(TIME - 3.0, 0.0, None) * 10.0)  # the first sample above 1 is at 3.080 s
+    (alarm,) = item.verdict.alarms
+    found = explain_alarm(item, alarm, NINE, CONTACT)
+    after = [round(1e3 * (moment.time - alarm.time)) for moment in found.moments]
+    assert after == [-100, -88, -50, -20, -10, -5, 0]
+    margins = [0.795, 0.795, 0.415, 0.115, 0.015, -0.035, -0.085]
+    assert [moment.margin for moment in found.moments] == pytest.approx(margins)
+    assert [moment.share for moment in found.moments] == pytest.approx([1.0 - margin for margin in margins])
+
+
+def test_an_alarm_of_another_detection_is_refused():
+    other = detection(pulse(1000, 30)).verdict.alarms[0]
+    with pytest.raises(UsageError, match=r"no alarm at 1\.008 s"):
+        explain_alarm(detection(pulse(3020, 30)), other, NINE)
+
+
+def test_a_slow_signal_gives_each_sample_once():
+    time = np.arange(100) * 0.02
+    item = detection(1.5 * (time >= 1.0), time=time, activation=Activation(1))
+    found = explain_alarm(item, item.verdict.alarms[0], Activation(1))
+    assert [moment.time for moment in found.moments] == pytest.approx([0.9, 0.94, 0.98, 1.0])
+
+
+def test_a_miss_states_its_closest_approach_with_duration_and_time():
+    values = pulse(3040, 5)
+    values[3060:3080] = 0.9
+    values[3050] = -1.7
+    item = detection(values)
+    (found,) = explain(item, matching(item, CONTACT), NINE)
+    assert isinstance(found, MissExplanation) and (found.outcome, found.debounce) == ("missed", 9)
+    (near,) = found.approaches
+    assert (near.nearest.time, near.nearest.margin, near.nearest.limit) == pytest.approx((3.05, -0.7, -1.0))
+    assert (near.longest, near.outside_from) == pytest.approx((5, 3.04))
+    assert near.held == pytest.approx(0.9)
+    assert math.isnan(near.latched_from)
+    assert any("5 consecutive samples outside; 9 are required" in line for line in words(found))
+
+
+def test_a_limit_just_below_the_share_that_was_held_would_have_alarmed_and_one_above_not():
+    rng = np.random.default_rng(3)
+    values = np.convolve(rng.normal(size=len(TIME) + 29), np.ones(30) / 30.0, "valid")
+    status = rng.choice([0, 0, 0, 0, 3], len(TIME))
+    values[TIME < 3.0] = values[TIME > 4.0] = 0.0
+    item = detection(values, (2.0,), status=status)
+    (found,) = explain(item, matching(item, CONTACT), NINE)
+    assert isinstance(found, MissExplanation)
+    held = found.approaches[0].held
+    assert detection(values, (2.0 * held * (1.0 - 1e-9),), status=status).verdict.alarms
+    assert not detection(values, (2.0 * held * (1.0 + 1e-9),), status=status).verdict.alarms
+
+
+def test_the_nearest_joint_is_listed_first_and_one_without_a_limit_is_omitted():
+    values = np.column_stack((pulse(3040, 30, 0.6), pulse(3040, 30, 0.8)))
+    item = detection(values, (1.0, 1.0))
+    (found,) = explain(item, matching(item, CONTACT), NINE)
+    assert isinstance(found, MissExplanation)
+    assert [(near.joint, near.held) for near in found.approaches] == [
+        ("knee", pytest.approx(0.8)),
+        ("hip", pytest.approx(0.6)),
+    ]
+    assert found.joint == "knee" and {moved.joint for moved in found.moved} == {"knee"}
+    unwatched = detection(values, (1.0, math.inf))
+    (found,) = explain(unwatched, matching(unwatched, CONTACT), NINE)
+    assert isinstance(found, MissExplanation) and [near.joint for near in found.approaches] == ["hip"]
+
+
+def test_a_statistic_outside_since_before_the_contact_is_reported():
+    item = detection(pulse(2900, 600))
+    early, missed = explain(item, matching(item, CONTACT), NINE)
+    assert isinstance(early, AlarmExplanation) and early.role == "false alarm"
+    assert isinstance(missed, MissExplanation) and missed.outcome == "missed"
+    assert missed.approaches[0].latched_from == pytest.approx(2.9)
+    assert missed.approaches[0].longest == 0
+    assert any("already outside the band since 2.900 s" in line for line in words(missed))
+
+
+def test_unassessable_samples_are_given_by_share_and_an_unassessable_contact_by_reason():
+    status = np.zeros(len(TIME))
+    status[3000:3250] = Status.START_UP
+    item = detection(np.full(len(TIME), 0.2), status=status)
+    (missed,) = explain(item, matching(item, CONTACT), NINE)
+    assert isinstance(missed, MissExplanation)
+    assert missed.not_judged == {"start-up": pytest.approx(250 / 1001)}
+    assert any("start-up 25 %" in line for line in words(missed))
+    status[2999:] = Status.GAP
+    item = detection(np.full(len(TIME), 0.2), status=status)
+    (blind,) = explain(item, matching(item, CONTACT), NINE)
+    assert isinstance(blind, MissExplanation) and blind.outcome == "not_assessable"
+    assert (blind.approaches, blind.moments) == ((), ())
+    assert words(blind)[0] == "contact at 3.000 s (load cell) not assessable: missing samples 100 %"
+
+
+def test_every_alarm_and_every_miss_is_explained_once_in_order_of_time_with_its_role():
+    values = pulse(1000, 30) + pulse(3020, 30) + pulse(3700, 30)
+    item = detection(values)
+    found = explain(item, matching(item, CONTACT, Contact(4.2, 4.3, 0.001)), NINE)
+    roles = [part.role if isinstance(part, AlarmExplanation) else part.outcome for part in found]
+    assert roles == ["false alarm", "detection", "further alarm", "missed"]
+    assert [part.contact.start if part.contact else None for part in found] == [None, 3.0, 3.0, 4.2]
+    assert [words(part)[0].split(":")[0] for part in found[:1]] == ["false alarm at 1.008 s"]
+    assert words(found[2])[0].startswith("further alarm at 3.708 s, 708 ms after the contact")
+
+
+def test_an_alarm_of_a_contact_in_progress_has_neither_onset_nor_latency():
+    item = detection(pulse(400, 30) + pulse(3020, 30))
+    begun = Contact(0.0, 1.0, 0.0, in_progress=True)
+    first, second = explain(item, matching(item, begun, CONTACT), NINE)
+    assert isinstance(first, AlarmExplanation) and isinstance(second, AlarmExplanation)
+    assert (first.role, first.contact, second.role) == ("in progress", None, "detection")
+    told = " ".join(words(first))
+    assert told.startswith("alarm at 0.408 s, in a contact in progress when the recording begins")
+    assert "its onset is not recorded: no latency" in told
+    assert "onset at" not in told and "after the contact" not in told and "after the onset" not in told
+
+
+def test_without_ground_truth_an_alarm_is_not_called_false():
+    item = detection(pulse(1000, 30))
+    (found,) = explain(item, matching(item), NINE)
+    assert isinstance(found, AlarmExplanation) and found.role == "alarm"
+    recording = item.operation.recording
+    with_cell = {**recording.channels, "force": Series(TIME, np.zeros(len(TIME)), "N")}
+    known = replace(item, operation=replace(item.operation, recording=replace(recording, channels=with_cell)))
+    (found,) = explain(known, matching(known), NINE)
+    assert isinstance(found, AlarmExplanation) and found.role == "false alarm"
+
+
+def test_alarms_of_two_joints_that_count_as_one_false_alarm_are_both_explained_as_false():
+    item = detection(np.column_stack((pulse(1000, 30), pulse(1005, 30))), limits=(1.0, 1.0))
+    found = matching(item, CONTACT)
+    assert (len(item.verdict.alarms), len(found.false_alarms)) == (2, 1)
+    roles = [part.role for part in explain(item, found, NINE) if isinstance(part, AlarmExplanation)]
+    assert roles == ["false alarm", "false alarm"]
+
+
+def test_an_alarm_that_is_latched_still_explains_the_contact_it_detected():
+    item = detection(pulse(2800, 30) + pulse(3020, 30))
+    assert len(item.verdict.alarms) == 1
+    found = explain(item, matching(item, CONTACT), NINE)
+    assert [part.role for part in found if isinstance(part, AlarmExplanation)] == ["false alarm", "detection"]
+
+
+def test_a_miss_without_a_threshold_has_no_approach():
+    item = detection(np.zeros(len(TIME)))
+    status = np.full(item.statistic.values.shape, Status.NO_LIMIT, dtype=np.uint8)
+    bare = replace(item, threshold=None, statistic=replace(item.statistic, status=status))
+    found = explain_miss(bare, matching(bare, CONTACT).matches[0], NINE)
+    assert found.approaches == () and found.reason == "no limit known here 100 %"
+
+
+def test_the_words_name_joint_limit_debounce_and_what_moved_first():
+    rng = np.random.default_rng(8)
+    acceleration = -4.0 * (TIME >= 3.005) + 0.05 * rng.normal(size=len(TIME))
+    item = detection(pulse(3020, 200), channels={"acceleration": acceleration})
+    (found,) = explain(item, matching(item, CONTACT), NINE, inputs=("torque",))
+    assert words(found) == [
+        "alarm at 3.028 s, 28 ms after the contact (onset at 3.000 s, load cell)",
+        "hip: above its upper limit, 1.5 against 1 N m. Last exit from the band 20 ms after the onset, 8 ms before "
+        "the alarm (debounce: 9 consecutive samples outside).",
+        "Likely cause: not clear.",
+        "No impact-free runs to compare with: limits set by hand are not learned from runs; learn a signature with "
+        "cdtool learn-signature and give it to cdtool detect --signature. Compared with this log's own past instead.",
+        "Moved first: acceleration down 5 ms after the onset, torque up 20 ms.",
+        "First input of momentum: torque, 20 ms after the onset.",
+    ]
+
+
+def test_a_reference_that_moves_first_points_to_the_command():
+    reference = 0.2 + 1.0 * np.clip(TIME - 2.9, 0.0, None)
+    item = detection(pulse(3020, 200), channels={"reference_speed": reference})
+    (alone,) = explain(item, matching(item), NINE)
+    assert any(line.startswith("The command moved first") for line in words(alone))
+    feedback = detection(pulse(3020, 200), channels={"reference_torque": reference})
+    (answered,) = explain(feedback, matching(feedback), NINE)
+    assert not any("command" in line for line in words(answered))
+
+
+def test_movement_after_the_alarm_is_listed_separately():
+    item = detection(pulse(3020, 200), channels={"speed": 0.2 - 2.0 * np.clip(TIME - 3.1, 0.0, None)})
+    (found,) = explain(item, matching(item, CONTACT), NINE)
+    assert "After the alarm: speed down 101 ms after the onset." in words(found)

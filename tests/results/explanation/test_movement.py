@@ -1,0 +1,165 @@
+"""The first channel to move, on channels with known steps and on the simulated gate."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.base.errors import UsageError
+from cdtool.recordings.recording import Recording, Series
+from cdtool.results.explanation.movement import COMMANDS, Movement, which_moved_first
+from cdtool.truth.onset import OnsetRule, find_contacts
+from tests.bits import every_value
+
+GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
+TIME = np.arange(5000) * 1e-3
+ONSET = 3.0
+
+
+def kink(at: float, slope: float, noise: float, seed: int) -> np.ndarray:
+    """Noise on a slow ramp whose slope changes at a known time."""
+    rng = np.random.default_rng(seed)
+    return 0.3 * TIME + slope * np.clip(TIME - at, 0.0, None) + noise * rng.normal(size=len(TIME))
+
+
+def step(at: float, height: float, noise: float, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return 2.0 + height * (at <= TIME) + noise * rng.normal(size=len(TIME))
+
+
+def recording(**channels: np.ndarray) -> Recording:
+    return Recording("r", "r", ("axis",), {name: Series(TIME, values, "1") for name, values in channels.items()})
+
+
+def moved(found: tuple[Movement, ...]) -> dict[str, float]:
+    return {item.channel: item.time for item in found if not math.isnan(item.time)}
+
+
+THREE = recording(
+    torque=step(3.12, 5.0, 0.1, 1),
+    speed=kink(3.05, -40.0, 0.02, 2),
+    acceleration=step(3.01, -3.0, 0.05, 3),
+    reference_speed=np.full(len(TIME), 0.2),
+)
+
+
+def test_channels_come_in_the_order_of_their_known_changes_with_time_and_direction():
+    found = which_moved_first(THREE, "axis", ONSET)
+    assert [item.channel for item in found] == ["acceleration", "speed", "torque", "reference_speed"]
+    assert [item.direction for item in found] == ["down", "down", "up", ""]
+    assert [item.time for item in found[:3]] == pytest.approx([3.01, 3.05, 3.12], abs=5e-3)
+    assert (found[3].reason, math.isnan(found[3].time)) == ("no departure found", True)
+
+
+def test_a_change_outside_the_analysed_interval_is_not_reported():
+    assert "torque" not in moved(which_moved_first(THREE, "axis", ONSET, after=0.1))
+    late = recording(torque=step(2.9, 5.0, 0.1, 1))
+    assert moved(which_moved_first(late, "axis", 3.3)) == {}
+    assert moved(which_moved_first(late, "axis", ONSET, lead=0.15))["torque"] == pytest.approx(2.9, abs=2e-3)
+
+
+def test_a_shift_in_time_or_value_changes_nothing():
+    expected = moved(which_moved_first(THREE, "axis", ONSET))
+    shifted = {name: Series(series.time + 4000.0, series.values + 50.0, "1") for name, series in THREE.channels.items()}
+    found = moved(which_moved_first(replace(THREE, channels=shifted), "axis", ONSET + 4000.0))
+    assert {name: time - 4000.0 for name, time in found.items()} == pytest.approx(expected, abs=1.1e-3)
+
+
+def test_missing_samples_and_a_lone_spike_neither_move_a_channel_nor_hide_its_movement():
+    values = step(3.01, -3.0, 0.05, 3)
+    values[1000:5000:3] = np.nan
+    values[2970] = 90.0
+    found = moved(which_moved_first(recording(acceleration=values), "axis", ONSET))
+    assert found["acceleration"] == pytest.approx(3.01, abs=5e-3)
+
+
+def test_a_quantised_channel_that_flickers_by_one_step_has_not_moved():
+    rng = np.random.default_rng(4)
+    flicker = 0.01 * (rng.random(len(TIME)) > 0.98)
+    jump = flicker + 0.05 * (TIME >= 3.02)
+    assert moved(which_moved_first(recording(position=flicker), "axis", ONSET)) == {}
+    assert moved(which_moved_first(recording(position=jump), "axis", ONSET))["position"] == pytest.approx(3.02)
+
+
+def test_constant_channels_never_move_whatever_their_value_and_nothing_warns():
+    channels = recording(torque=np.zeros(len(TIME)), speed=np.full(len(TIME), 0.1), position=0.1 * TIME)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert moved(which_moved_first(channels, "axis", ONSET)) == {}
+
+
+@pytest.mark.parametrize(
+    "part",
+    [(2.9, 5.0), (0.0, 2.951), (2.0, 2.0), (3.2, 5.0)],
+    ids=["begins shortly before", "ends before", "one sample", "begins after"],
+)
+def test_a_log_that_is_too_short_says_so_without_a_warning(part):
+    short = THREE.between(*part)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = which_moved_first(short, "axis", ONSET)
+    assert {item.reason for item in found} == {"too few samples"}
+
+
+def test_a_channel_without_any_value_says_so():
+    (found,) = which_moved_first(recording(torque=np.full(len(TIME), np.nan)), "axis", ONSET)
+    assert found.reason == "too few samples"
+
+
+def test_half_a_second_before_the_event_is_sufficient():
+    found = moved(which_moved_first(THREE.between(2.5, 5.0), "axis", ONSET))
+    assert list(found) == ["acceleration", "speed", "torque"]
+
+
+def test_load_cell_and_label_are_not_used():
+    truth = {"force": Series(TIME, step(2.99, 900.0, 1.0, 5), "N"), "label": Series(TIME, 1.0 * (TIME > 3.0), "1")}
+    with_truth = replace(THREE, channels={**THREE.channels, **truth})
+    moved, without_truth = (which_moved_first(item, "axis", ONSET) for item in (with_truth, THREE))
+    assert every_value(moved) == every_value(without_truth)
+
+
+def test_a_joint_is_listed_alone_and_the_whole_machine_joint_by_joint():
+    torque = np.column_stack((step(3.05, 5.0, 0.1, 6), step(3.02, -5.0, 0.1, 7)))
+    robot = Recording("r", "r", ("hip", "knee"), {"torque": Series(TIME, torque, "N m")})
+    (alone,) = which_moved_first(robot, "hip", ONSET)
+    assert alone.time == pytest.approx(3.05, abs=2e-3)
+    both = which_moved_first(robot, "whole machine", ONSET)
+    assert [(item.joint, item.direction) for item in both] == [("knee", "down"), ("hip", "up")]
+    with pytest.raises(UsageError, match="unknown joint 'nee'") as fault:
+        which_moved_first(robot, "nee", ONSET)
+    assert "knee" in fault.value.hint
+
+
+@pytest.mark.parametrize("name", ["01.mcap", "02.mcap", "03.csv", "04.csv"])
+def test_a_stiff_impact_of_the_gate_moves_acceleration_then_speed_then_torque(name):
+    log = cdtool.read(GATE / "stiff" / name, GATE / "machine.toml")
+    (contact,) = find_contacts(log, OnsetRule(above=20.0, back_to=8.0))
+    found = moved(which_moved_first(log, "gate", contact.start))
+    order = [channel for channel in found if channel in ("acceleration", "speed", "torque")]
+    assert order == ["acceleration", "speed", "torque"]
+    assert 0.0 < found["acceleration"] - contact.start < 0.025
+    assert not set(found) & set(COMMANDS)
+
+
+@pytest.mark.parametrize("name", ["01.mcap", "02.mcap", "03.csv", "04.csv"])
+def test_in_a_soft_impact_the_accelerometer_is_the_last_to_notice(name):
+    log = cdtool.read(GATE / "soft" / name, GATE / "machine.toml")
+    (contact,) = find_contacts(log, OnsetRule(above=20.0, back_to=8.0))
+    found = moved(which_moved_first(log, "gate", contact.start))
+    assert found["speed"] < found["torque"] < found["acceleration"]
+
+
+def test_in_runs_without_contact_hardly_a_channel_moves():
+    looks, seen = 0, 0
+    for path in sorted((GATE / "holdout").iterdir()):
+        log = cdtool.read(path, GATE / "machine.toml")
+        for around in np.arange(3.0, 7.4, 0.4):
+            found = which_moved_first(log, "gate", float(around))
+            looks, seen = looks + len(found), seen + len(moved(found))
+    assert looks > 250 and seen <= 0.03 * looks

@@ -1,0 +1,203 @@
+"""[limits]: the quantities they name, and their outcomes."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import replace
+
+import pytest
+
+from cdtool.base.errors import ConfigurationError
+from cdtool.base.tables import Table
+from cdtool.results.limits import check_limits, not_met, read_limits
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, Results
+from cdtool.results.summary import FIGURES, summarise
+from cdtool.statistics.rates import poisson_at_most
+
+DETECTORS = [("momentum", "gm"), ("friction_ekf", "feekf")]
+GROUPS = ("stiff", "soft.2", "holdout")
+
+
+def contact(detector: str, group: str, latency: float | None, outcome: str = "detected") -> ContactResult:
+    return ContactResult(
+        f"{group}-{latency}-{outcome}",
+        group,
+        detector,
+        "gate",
+        5.0,
+        0.001,
+        5.0,
+        latency,
+        outcome,
+        300.0,
+        900.0,
+        watched_ms=1000.0,
+    )
+
+
+def results() -> Results:
+    contacts = [contact("momentum", "stiff", x) for x in (10.0, 20.0, 30.0, 40.0)]
+    contacts += [contact("friction_ekf", "stiff", 10.0), contact("friction_ekf", "stiff", None, "missed")]
+    contacts += [contact("momentum", "soft.2", None, "not_assessable")]
+    contacts += [contact("friction_ekf", "soft.2", 70.0)]
+    exposure = [ExposureResult(group, name, 4, 4, 0.5) for group in GROUPS for name, _ in DETECTORS]
+    alarm = FalseAlarmResult("h", "holdout", "momentum", "gate", 1.0)
+    return Results({}, ("momentum", "friction_ekf"), GROUPS, tuple(contacts), (alarm,), tuple(exposure))
+
+
+SUMMARIES = summarise(results())
+
+
+def rules(text: str):
+    return read_limits(Table(tomllib.loads(text), "b.toml", "limits."), DETECTORS, GROUPS)
+
+
+def check(text: str):
+    return check_limits(rules(text), SUMMARIES)
+
+
+def test_a_short_name_a_group_and_a_figure_name_one_limit():
+    (limit,) = check('"gm.stiff.mean_ms" = { max = 25.0 }')
+    assert (limit.detector, limit.group, limit.value, limit.outcome) == ("momentum", "stiff", 25.0, "met")
+    assert not_met([limit]) == []
+
+
+def test_above_the_largest_and_below_the_least_are_not_met_with_the_reason():
+    (high,) = check('"gm.stiff.max_ms" = { max = 39.9 }')
+    assert high.outcome == "violated" and high.reason == "40 is more than 39.9"
+    (low,) = check('"feekf.stiff.detected" = { min = 2 }')
+    assert low.outcome == "violated" and low.reason == "1 is less than 2"
+
+
+def test_a_star_selects_every_detector_and_every_group_with_contacts():
+    limits = check('"*.*.missed" = { max = 0 }')
+    assert [(item.detector, item.group, item.outcome) for item in limits] == [
+        ("momentum", "stiff", "met"),
+        ("friction_ekf", "stiff", "violated"),
+        ("momentum", "soft.2", "not_assessable"),
+        ("friction_ekf", "soft.2", "met"),
+    ]
+
+
+def test_two_parts_select_every_group_and_group_names_may_contain_dots():
+    assert len(check('"*.false_alarms_per_hour" = { max = 2.0 }')) == 6
+    (limit,) = check('"feekf.soft.2.mean_ms" = { max = 80 }')
+    assert limit.group == "soft.2"
+
+
+def test_unassessable_values_do_not_pass():
+    (limit,) = check('"gm.soft.2.mean_ms" = { max = 100 }')
+    assert limit.outcome == "not_assessable" and limit.value is None
+    assert limit.reason == "none of 1 contacts could be assessed"
+    assert not_met([limit]) == [limit]
+
+
+def test_an_unreached_quantile_violates_its_limit():
+    (limit,) = check('"feekf.stiff.p95_ms" = { max = 1000 }')
+    assert limit.outcome == "violated" and limit.value is None and "not reached" in limit.reason
+
+
+def test_false_alarms_are_counted_in_groups_without_contacts():
+    (limit,) = check('"gm.holdout.false_alarms_per_hour" = { max = 1.9 }')
+    assert limit.value == 2.0 and limit.outcome == "violated"
+    (bound,) = check('"feekf.holdout.false_alarms_per_hour_at_most" = { max = 6.0 }')
+    assert bound.value == pytest.approx(-math.log(0.05) / 0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('"gmm.stiff.mean_ms" = { max = 1 }', "unknown detector 'gmm'.*gm"),
+        ('"gm.stif.mean_ms" = { max = 1 }', "unknown group 'stif'.*stiff"),
+        ('"gm.stiff.mean" = { max = 1 }', "unknown metric 'mean'.*mean_ms"),
+        ('"gm" = { max = 1 }', "does not name a metric"),
+        ('"gm.stiff.mean_ms" = { }', "has no bound"),
+        ('"gm.stiff.mean_ms" = 5', "a table"),
+        ('"gm.stiff.mean_ms" = { max = 1, min = 2 }', "min 2 above max 1"),
+        ('"gm.stiff.mean_ms" = { maximum = 1, max = 2 }', "unknown key"),
+        ('"gm.stiff.mean_ms" = { max = "fast" }', "a number"),
+    ],
+)
+def test_a_wrong_limit_is_one_line_that_names_its_key(text, said):
+    with pytest.raises(ConfigurationError, match=rf"(?s)b\.toml: limits\..*{said}"):
+        rules(text)
+
+
+def test_a_figure_of_contacts_in_a_group_without_any_is_an_error():
+    with pytest.raises(ConfigurationError, match="not available in these results"):
+        check('"gm.holdout.p95_ms" = { max = 1 }')
+
+
+def test_a_detector_that_was_not_run_is_an_error():
+    with pytest.raises(ConfigurationError, match="not available in these results"):
+        check_limits(
+            rules('"gm.stiff.p95_ms" = { max = 1 }'), [item for item in SUMMARIES if item.detector != "momentum"]
+        )
+
+
+def test_without_monitored_time_a_limit_on_false_alarms_does_not_pass():
+    blind = replace(results(), exposure=(ExposureResult("holdout", "friction_ekf", 4, 50, 0.0, 50),))
+    summaries = [item for item in summarise(blind) if item.detector == "friction_ekf" and item.group == "holdout"]
+    for figure in ("false_alarms", "false_alarms_per_operation_at_most", "false_alarms_per_hour"):
+        (limit,) = check_limits(rules(f'"feekf.holdout.{figure}" = {{ max = 9 }}'), summaries)
+        assert limit.outcome == "not_assessable" and limit.reason == "nothing was monitored"
+    assert FIGURES["operations"](summaries[0]) == 0
+
+
+def test_the_bound_of_a_rate_counts_its_alarms():
+    (limit,) = check('"gm.holdout.false_alarms_per_operation_at_most" = { max = 9 }')
+    assert limit.value == pytest.approx(poisson_at_most(1, 4.0)) and limit.value > poisson_at_most(0, 4.0)
+
+
+def test_force_limits_do_not_pass_without_a_verdict():
+    (limit,) = check('"gm.stiff.force_failed" = { max = 0 }')
+    assert limit.outcome == "not_assessable" and "force profile" in limit.reason
+
+
+def test_a_group_of_which_no_log_could_be_scored_does_not_pass():
+    empty = replace(results(), contacts=(), exposure=(), false_alarms=())
+    (limit,) = check_limits(rules('"gm.stiff.p95_ms" = { max = 50 }'), summarise(empty))
+    assert limit.outcome == "not_assessable" and limit.reason == "no recording of the group was scored"
+
+
+def test_a_missed_contact_makes_the_largest_force_at_the_alarm_infinite():
+    (limit,) = check('"feekf.stiff.force_at_alarm_max_n" = { max = 1e9 }')
+    assert limit.outcome == "violated"
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_every_quantity_is_a_number_or_undefined_with_a_reason(figure):
+    for summary in SUMMARIES:
+        value = FIGURES[figure](summary)
+        assert isinstance(value, int | float)
+        assert summary.why_undefined(figure)
+
+
+def test_a_missed_contact_makes_the_largest_latency_infinite():
+    by_name = {(item.detector, item.group): item for item in SUMMARIES}
+    assert by_name["friction_ekf", "stiff"].max_ms == math.inf
+    assert by_name["momentum", "stiff"].max_ms == 40.0
+
+
+@pytest.mark.parametrize("figure", ["mean_ms_upper", "median_ms_upper", "p95_ms_upper"])
+def test_the_upper_end_of_an_interval_of_few_contacts_is_not_assessable_and_says_why(figure):
+    (found,) = check(f'"gm.stiff.{figure}" = {{ max = 900 }}')
+    assert (found.outcome, found.value) == ("not_assessable", None)
+    assert "needs 10 recordings" in found.reason or "needs 6 contacts" in found.reason
+    (value,) = check(f'"gm.stiff.{figure.removesuffix("_upper")}" = {{ max = 900 }}')
+    assert value.outcome == "met" and value.value > 0.0
+
+
+def test_campaigns_widen_the_interval_of_the_mean():
+    from cdtool.results.results import RecordingResult
+
+    base = results()
+    rows = [contact("momentum", "stiff", 10.0 * (i // 5) + 0.1 * (i % 5)) for i in range(60)]
+    alone = replace(base, contacts=tuple(rows))
+    recordings = tuple(
+        RecordingResult(row.recording, "stiff", "", 8.0, 1, 1, campaign=f"day {i // 5}") for i, row in enumerate(rows)
+    )
+    by_day = replace(alone, recordings=recordings)
+    width = [next(s.mean for s in summarise(item) if s.contacts) for item in (alone, by_day)]
+    assert width[1].high - width[1].low > 1.3 * (width[0].high - width[0].low)

@@ -1,0 +1,201 @@
+"""Results, their file, and the statistics derived from them."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import asdict, fields, replace
+from typing import Any
+
+import pytest
+
+from cdtool.base.errors import RecordingError
+from cdtool.base.files.strict_json import strict_json
+from cdtool.results.files.results_file import json_pieces, read_results, to_json
+from cdtool.results.results import SCHEMA_VERSION, RecordingFinding, Skipped, onset_words
+from cdtool.results.rows import Rows
+from cdtool.results.summary import summarise
+from tests.report.html.html_case import case
+from tests.results.full_results import FULL, RESULTS, STEP
+from tests.synthetic.many_results import many_results
+
+
+def test_a_summary_counts_contacts_not_in_its_mean():
+    momentum, torque, holdout, _ = summarise(RESULTS)
+    assert (momentum.mean_ms, momentum.median_ms, momentum.std_ms) == pytest.approx((30.0, 40.0, 26.4575), rel=1e-5)
+    assert (momentum.contacts, momentum.detected, momentum.missed, momentum.not_assessable) == (5, 3, 1, 1)
+    assert math.isnan(torque.mean_ms) and torque.missed == 1
+    assert (holdout.false_alarms, holdout.operations, holdout.hours) == (1, 9, 0.5)
+
+
+def test_the_json_is_strict_with_null_for_missing_values():
+    values = json.loads(to_json(RESULTS), parse_constant=lambda name: pytest.fail(name))
+    assert values["contacts"][0]["peak_force_n"] is None and values["contacts"][3]["latency_ms"] is None
+    assert values["provenance"]["gain"] is None and values["schema_version"] == SCHEMA_VERSION
+
+
+@pytest.mark.parametrize("results", [FULL, RESULTS, many_results(30, 3), case()[0].results], ids=range(4))
+def test_the_json_is_laid_out_as_strict_json_lays_out_all_of_it(results):
+    rows = {item.name: getattr(results, item.name) for item in fields(results)}
+    plain = replace(results, **{name: tuple(held) for name, held in rows.items() if isinstance(held, Rows)})
+    assert to_json(results) == to_json(plain) == strict_json(asdict(plain)) + "\n"
+
+
+def test_the_json_of_many_rows_is_never_in_memory_as_a_whole():
+    lengths = list(map(len, json_pieces(many_results(4000))))
+    assert max(lengths) < 400_000 < sum(lengths) / 10
+
+
+def test_results_survive_writing_and_reading(tmp_path):
+    path = tmp_path / "results.json"
+    path.write_text(to_json(FULL), encoding="utf-8")
+    again = read_results(path)
+    assert to_json(again) == to_json(FULL)
+    assert again.forces[0].steps[1] == replace(STEP, peak_n=None)
+    assert (again.limits, again.sweep, again.points[0].steps[0].name) == (FULL.limits, FULL.sweep, "dynamic")
+
+
+def test_names_in_json_have_no_control_characters_and_can_be_encoded(tmp_path):
+    name = "a\x1b[31m\x9b31m\u202egnp.exe\u2028\udc80 碰撞"
+    text = to_json(replace(RESULTS, skipped=(Skipped(name, name),)))
+    assert not set(name) & set(text) - set("a[31mgnp.ex 碰撞")
+    path = tmp_path / "results.json"
+    path.write_text(text, encoding="utf-8")
+    assert read_results(path).skipped == (Skipped(name, name),)
+
+
+def test_a_number_without_decimals_is_read_as_one_with(tmp_path):
+    path = tmp_path / "results.json"
+    path.write_text(to_json(RESULTS).replace('"onset_s": 5.0', '"onset_s": 5'), encoding="utf-8")
+    assert isinstance(read_results(path).contacts[0].onset_s, float)
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{}", "[]", '{"schema_version": 2}', '{"schema_version": 1}', '{"schema_version": NaN}', "\x00"]
+)
+def test_an_invalid_results_file_is_one_clear_error(tmp_path, content):
+    path = tmp_path / "results.json"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"results\.json"):
+        read_results(path)
+
+
+def version_3(**values: object) -> dict[str, Any]:
+    """Results as a file of version 3 has them: what is lost is listed as left out, findings have a reason alone."""
+    old = json.loads(to_json(RESULTS))
+    return {**old, "schema_version": 3, **values}
+
+
+def test_losses_that_version_3_lists_as_left_out_are_findings(tmp_path):
+    path = tmp_path / "results.json"
+    cut = {"recording": "a.csv", "reason": "damaged, used as far as it goes: the last line (9) is cut off, dropped"}
+    empty, gap = {"recording": "c.csv", "reason": "empty"}, {"recording": "b.csv", "reason": "time: 1 gap"}
+    path.write_text(json.dumps(version_3(skipped=[cut, empty], findings=[gap])), encoding="utf-8")
+    read = read_results(path)
+    assert read.schema_version == SCHEMA_VERSION and read.skipped == (Skipped("c.csv", "empty"),)
+    assert read.losses == (RecordingFinding("a.csv", "the last line (9) is cut off, dropped", "loss"),)
+    assert read.warnings == (RecordingFinding("b.csv", "time: 1 gap", "warning"),)
+
+
+@pytest.mark.parametrize("wrong", [{"skipped": 7}, {"skipped": [7]}, {"findings": [{"reason": []}]}])
+def test_a_wrong_file_of_version_3_is_one_clear_error(tmp_path, wrong):
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(version_3(**wrong)), encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"results\.json: not a results file: results\.(skipped|findings)"):
+        read_results(path)
+
+
+@pytest.mark.parametrize(
+    ("onset", "rule", "unit"),
+    [
+        (
+            "load cell above 20 N for 3 ms",
+            "load cell above 20 N for 3 ms",
+            None,
+        ),
+        ("load cell above 20 N for 3 ms; label file labels.csv", "load cell above 20 N for 3 ms", None),
+        ("load cell above 20 N for 3 samples", "load cell above 20 N for 3 samples", "samples"),
+        ("load cell above 20 N for 1 sample", "load cell above 20 N for 1 sample", "samples"),
+    ],
+)
+def test_the_rule_of_the_onset_is_apart_from_the_label_file_and_names_its_unit(tmp_path, onset, rule, unit):
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(version_3(provenance={"onset": onset})), encoding="utf-8")
+    provenance = read_results(path).provenance
+    assert provenance["onset"] == rule and provenance.get("onset_unit") == unit
+
+
+def test_the_words_of_the_onset_name_the_label_file():
+    rule = "load cell above 20 N for 3 ms"
+    assert onset_words({}) == "rule not stated" and onset_words({"onset": rule, "label_file": None}) == rule
+    assert onset_words({"onset": rule, "label_file": "a/b/labels.csv"}) == f"{rule}; label file labels.csv"
+    assert onset_words({"onset": rule, "label_file": "C:\\b\\labels.csv"}) == f"{rule}; label file labels.csv"
+
+
+def test_another_version_is_named_with_a_hint(tmp_path):
+    path = tmp_path / "results.json"
+    path.write_text(to_json(RESULTS).replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 99'))
+    with pytest.raises(RecordingError, match=r"schema_version is 99; this version of cdtool reads 2") as fault:
+        read_results(path)
+    assert "benchmark" in fault.value.hint
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"latency_ms": 10.0', '"latency_ms": "10"', r'results\.contacts\[0\]\.latency_ms is "10", not a number$'),
+        ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact is true, not a whole number$"),
+        ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact is 1\.5, not a whole number$"),
+        ('"clipped": false', '"cliped": false', r"unknown field 'cliped'"),
+        ('"onset_s": 5.0,', "", r"results\.contacts\[0\]: onset_s missing$"),
+        ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s is null, not a number$"),
+        ('"groups": [\n  "stiff",\n  "holdout"\n ]', '"groups": "stiff"', r"results\.groups is not a list"),
+        (
+            '"outcome": "missed"',
+            '"outcome": "mised"',
+            r"contacts\[3\]\.outcome is .mised., not one of detected, missed, not_assessable, in_progress$",
+        ),
+        (
+            '"outcome": "violated"',
+            '"outcome": "brokn"',
+            r"limits\[0\]\.outcome is .brokn., not one of met, violated",
+        ),
+        (
+            '"detector": "momentum"',
+            '"detector": "m"',
+            r"contacts\[0\]\.detector is 'm', which .*detectors does not",
+        ),
+        ('"group": "stiff"', '"group": "stif"', r"contacts\[0\]\.group is 'stif', which .*groups does not list$"),
+    ],
+)
+def test_a_wrong_field_is_named(tmp_path, old, new, words):
+    path = tmp_path / "results.json"
+    text = to_json(FULL)
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(RecordingError) as fault:
+        read_results(path)
+    assert re.search(words, fault.value.message)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, r"results\.json: no such file$"),
+        ("", r"results\.json: not a results file: it is empty$"),
+        ('{"schema_version": 2, "detec', r"results\.json: not a results file: truncated or damaged at line 1$"),
+        (b"\xff\xfe\x00", r"results\.json: not a results file: not UTF-8 text$"),
+        (
+            '{"schema_version": 2}',
+            r"results: provenance, detectors, groups, contacts, false_alarms, exposure missing$",
+        ),
+    ],
+)
+def test_read_errors_are_in_plain_words(tmp_path, content, words):
+    path = tmp_path / "results.json"
+    if content is not None:
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(RecordingError) as fault:
+        read_results(path)
+    assert re.search(words, fault.value.message)

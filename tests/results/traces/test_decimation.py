@@ -1,0 +1,103 @@
+"""A decimated series draws the same as the whole one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
+from cdtool.results.traces.decimation import decimate, kept_samples
+
+numbers = st.one_of(st.floats(-1e6, 1e6), st.just(float("nan")))
+series = st.integers(1, 600).flatmap(lambda n: arrays(np.float64, n, elements=numbers, fill=st.floats(-1.0, 1.0)))
+pixels = st.integers(2, 40)
+
+
+def clock(values: FloatArray) -> FloatArray:
+    steps = np.random.default_rng(len(values)).uniform(0.5, 1.5, len(values))
+    return np.cumsum(steps)
+
+
+@given(series, pixels)
+def test_least_largest_first_and_last_value_stay_and_the_size_is_bounded(values, pixels):
+    time = clock(values)
+    kept_time, kept = decimate(time, values, pixels)
+    assert len(kept) <= 4 * pixels
+    assert np.all(np.diff(kept_time) > 0.0)
+    for ours, whole in ((kept[0], values[0]), (kept[-1], values[-1])):
+        np.testing.assert_equal(ours, whole)
+    present = values[~np.isnan(values)]
+    if len(present):
+        assert np.nanmin(kept) == present.min()
+        assert np.nanmax(kept) == present.max()
+    else:
+        assert np.isnan(kept).all()
+
+
+@given(series, pixels)
+def test_kept_values_are_samples_and_a_gap_stays_a_gap(values, pixels):
+    time = clock(values)
+    kept = kept_samples(time, values, pixels)
+    assert np.all(np.diff(kept) > 0)
+    if np.isnan(values).any():
+        assert np.isnan(values[kept]).any()
+
+
+@given(series)
+def test_a_short_series_is_returned_as_it_is(values):
+    time = clock(values)
+    kept_time, kept = decimate(time, values, max(2, -(-len(values) // 4)))
+    np.testing.assert_array_equal(kept_time, time)
+    np.testing.assert_array_equal(kept, values)
+
+
+def test_a_spike_and_the_extremes_of_each_column_survive_a_million_samples():
+    time = np.arange(1_000_000) * 1e-3
+    values = np.sin(time)
+    values[123_456] = 9.0
+    values[700_000:800_000] = np.nan
+    kept_time, kept = decimate(time, values, 500)
+    assert 500 < len(kept) <= 2000
+    assert 9.0 in kept
+    inside = (kept_time > 701.0) & (kept_time < 799.0)
+    assert inside.any()
+    assert np.isnan(kept[inside]).all()
+
+
+def test_less_than_two_pixels_is_refused():
+    with pytest.raises(UsageError, match="pixels is 1"):
+        decimate(np.arange(9.0), np.arange(9.0), 1)
+
+
+def _by_whole_arrays(time, values, pixels):
+    """Return the samples that are kept, found with arrays of all columns of pixels."""
+    if len(time) <= 4 * pixels:
+        return np.arange(len(time))
+    edges = np.searchsorted(time, np.linspace(time[0], time[-1], pixels + 1)[1:-1])
+    starts = np.unique([0, *edges.tolist()])
+    starts = starts[starts < len(time)]
+    column = np.repeat(np.arange(len(starts)), np.diff([*starts.tolist(), len(time)]))
+    missing = np.isnan(values)
+    low, high = np.where(missing, np.inf, values), np.where(missing, -np.inf, values)
+    least, greatest = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+    marks = (~missing & (low == least[column]), ~missing & (high == greatest[column]), missing)
+    kept = [0, len(time) - 1]
+    for mark in marks:
+        kept += [np.flatnonzero(mark & (column == i))[0] for i in range(len(starts)) if (mark & (column == i)).any()]
+    return np.unique(kept)
+
+
+FEW = st.sampled_from([0.0, -0.0, 1.0, 1.0 + 1e-15, -2.0, np.inf, -np.inf, np.nan])
+
+
+@given(st.lists(FEW, max_size=120), st.integers(2, 12), st.sampled_from([0.0, 0.5, 30.0]), st.integers(0, 2**32 - 1))
+def test_the_samples_that_are_kept_are_those_of_whole_arrays(values, pixels, gap, seed):
+    random = np.random.default_rng(seed)
+    time = np.cumsum(random.uniform(0.5, 1.5, len(values)) + gap * (random.random(len(values)) < 0.1))
+    samples = np.array(values, dtype=np.float64)
+    expected = _by_whole_arrays(time, samples, pixels)
+    assert kept_samples(time, samples, pixels).tolist() == expected.tolist()

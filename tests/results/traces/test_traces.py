@@ -1,0 +1,175 @@
+"""Traces: stored data, selection of operations, and the file next to results.json."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from dataclasses import replace
+from itertools import cycle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.base.errors import RecordingError
+from cdtool.recordings.recording import Contact, Series
+from cdtool.results.traces.choice import MOST_KEPT, TraceChoice
+from cdtool.results.traces.file import encode_traces, read_traces
+from cdtool.results.traces.trace import Trace, make_trace
+from cdtool.truth.matching import match
+from tests.bits import every_value
+from tests.results.detections import OPERATION, TIME, detection
+
+CONTACT = Contact(3.0, 3.2, 0.005, 900.0)
+
+
+def trace(seed: int = 1, why: str = "sample") -> Trace:
+    found = detection(seed)
+    force = Series(TIME, np.where((TIME > 3.0) & (TIME < 3.2), 900.0, 0.0) + 0.01 * np.sin(40.0 * TIME), "N")
+    recording = replace(OPERATION.recording, channels={**OPERATION.recording.channels, "force": force})
+    operation = replace(OPERATION, recording=recording)
+    matching = match(found.verdict, [CONTACT], found.statistic)
+    return make_trace("stiff", operation, [CONTACT], [found], [matching], [["because"]], why)
+
+
+def test_a_trace_keeps_extremes_the_view_and_the_outcome_of_the_contact():
+    kept, found = trace(), detection(1)
+    (panel,) = kept.panels
+    assert len(panel.course.time) <= 4 * (200 + 250) < len(TIME)
+    column = found.statistic.joints.index(panel.joint)
+    assert panel.course.value.max() == found.statistic.values[:, column].max()
+    assert kept.view[0] < 3.0 < kept.view[1] and kept.shown == CONTACT
+    assert panel.seen[0].outcome == "detected" and panel.seen[0].late == pytest.approx(panel.seen[0].alarm - 3.0)
+    assert kept.force.max() == pytest.approx(900.0, abs=0.02) and panel.why == ("because",)
+
+
+def test_traces_survive_writing_and_reading_within_a_pixel_and_give_the_same_bytes_again(tmp_path):
+    kept = trace()
+    path = tmp_path / "results.traces.json.gz"
+    path.write_bytes(encode_traces([kept]))
+    (again,) = read_traces(path)
+    course, read = kept.panels[0].course, again.panels[0].course
+    span = np.ptp(course.value)
+    np.testing.assert_allclose(read.value, course.value, atol=2e-4 * span)
+    np.testing.assert_allclose(read.time, course.time, atol=1e-5)
+    np.testing.assert_array_equal(read.status, course.status)
+    np.testing.assert_array_equal(np.isnan(read.upper), np.isnan(course.upper))
+    assert every_value(again.contacts) == every_value(kept.contacts) and again.panels[0].seen == kept.panels[0].seen
+    assert encode_traces([again]) == path.read_bytes()
+
+
+@pytest.mark.parametrize("last", [9_999.0, 10_000.0, 12_000.0, 86_400.0, 3e7])
+def test_a_trace_of_a_recording_of_hours_can_be_read(tmp_path, last):
+    kept = trace()
+    course = replace(kept.panels[0].course, time=np.append(kept.panels[0].course.time[:-1], kept.start + last))
+    long = replace(kept, end=kept.start + last, panels=(replace(kept.panels[0], course=course),))
+    path = tmp_path / "results.traces.json.gz"
+    path.write_bytes(encode_traces([long]))
+    (again,) = read_traces(path)
+    np.testing.assert_allclose(again.panels[0].course.time, course.time, atol=max(1e-5, 1e-8 * last))
+    assert encode_traces([again]) == path.read_bytes()
+
+
+def test_traces_of_the_version_before_have_one_spelling_of_not_assessable_once_they_are_read(tmp_path):
+    blind = replace(trace(), panels=(replace(trace().panels[0], verdict="not_assessable", reason="start-up"),))
+    values = json.loads(gzip.decompress(encode_traces([blind])))
+    assert values["schema_version"] == 3 and values["traces"][0]["panels"][0]["verdict"] == "not_assessable"
+    values["schema_version"] = 2
+    values["traces"][0]["panels"][0]["verdict"] = "not assessable"
+    path = tmp_path / "results.traces.json.gz"
+    path.write_bytes(gzip.compress(json.dumps(values).encode(), mtime=0))
+    (read,) = read_traces(path)
+    assert read.panels[0].verdict == "not_assessable" and read.panels[0].is_not_assessable
+    assert encode_traces([read]) == encode_traces([blind])
+
+
+def test_values_above_a_limit_stay_above_it_and_a_missing_limit_stays_missing(tmp_path):
+    kept = trace()
+    course = replace(kept.panels[0].course, lower=np.full_like(kept.panels[0].course.lower, -np.inf))
+    one_sided = replace(kept, panels=(replace(kept.panels[0], course=course),))
+    path = tmp_path / "t.json.gz"
+    path.write_bytes(encode_traces([one_sided]))
+    read = read_traces(path)[0].panels[0].course
+    assert np.isneginf(read.lower).all()
+    clear = np.abs(course.value - course.upper) > 1e-3 * np.ptp(course.value)
+    np.testing.assert_array_equal((read.value > read.upper)[clear], (course.value > course.upper)[clear])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"not gzip",
+        gzip.compress(b"{}", mtime=0),
+        gzip.compress(b'{"schema_version": 7, "traces": []}', mtime=0),
+    ],
+)
+def test_an_invalid_traces_file_is_one_clear_error(tmp_path, content):
+    path = tmp_path / "t.json.gz"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"t\.json\.gz"):
+        read_traces(path)
+
+
+def test_the_file_is_strict_json_with_unassessable_samples(tmp_path):
+    text = gzip.decompress(encode_traces([trace()])).decode()
+    json.loads(text, parse_constant=lambda name: pytest.fail(name))
+
+
+def choose(outcomes: list[tuple[str, float]], work: int | None = None) -> dict[int, str]:
+    choice = TraceChoice(work or len(outcomes))
+    for number, (striking, slowest) in enumerate(outcomes):
+        choice.offer(number, "stiff", 1, striking, slowest)
+    return choice.kept()
+
+
+def test_all_missed_the_slowest_and_a_sample_are_kept_in_order():
+    outcomes = [("missed by gm" if i % 500 == 7 else "", float(i % 997)) for i in range(3000)]
+    kept = choose(outcomes)
+    numbers = list(kept)
+    assert numbers == sorted(numbers) and len(kept) <= MOST_KEPT + 1
+    assert {7, 507, 1007, 1507, 2007, 2507} <= set(numbers)
+    slowest = sorted(range(3000), key=lambda i: -(i % 997))[:3]
+    assert set(slowest) <= set(numbers)
+    assert sum(why == "evenly sampled from all" for why in kept.values()) == 20
+
+
+def test_misses_beyond_the_maximum_are_counted():
+    choice = TraceChoice(500)
+    for number in range(500):
+        choice.offer(number, "stiff", 1, "missed by gm", 0.0)
+    assert len(choice.kept()) <= MOST_KEPT and choice.left_out == 500 - 70
+
+
+OPERATIONS = st.lists(
+    st.tuples(
+        st.sampled_from(["stiff", "soft"]),
+        st.integers(1, 3),
+        st.sampled_from(["", "", "", "missed by gm"]),
+        st.sampled_from([0.0, 0.01, 0.02, 0.03, 0.5]),
+    ),
+    max_size=300,
+)
+
+
+@given(OPERATIONS, st.integers(0, 20), st.integers(1, 3), st.lists(st.integers(1, 9), min_size=1))
+def test_what_a_choice_keeps_was_wanted_by_every_state_of_it_with_fewer_operations(operations, behind, of_a_log, sizes):
+    """A worker decides for the logs of a piece from the state some pieces before: no trace that is kept is missing."""
+    logs = [operations[i : i + of_a_log] for i in range(0, len(operations), of_a_log)]
+    choice, states, wanted = TraceChoice(len(logs)), [], set()
+    first = number = 0
+    for size in cycle(sizes):
+        states.append(choice.copy())
+        early = states[max(0, len(states) - 1 - behind)].copy()
+        for log in range(first, min(first + size, len(logs))):
+            for operation in logs[log]:
+                was_wanted = early.offer(log, *operation) is not None
+                if choice.offer(log, *operation) is not None:
+                    assert was_wanted
+                wanted |= {number} if was_wanted else set()
+                number += 1
+        first += size
+        if first >= len(logs):
+            break
+    assert number == len(operations) and set(choice.kept()) <= wanted

@@ -1,0 +1,183 @@
+"""The audit on simulated contacts with known clocks, and where it cannot know anything."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.truth.synchronisation.audit import audit
+from cdtool.truth.synchronisation.delay import EventDelay
+from cdtool.truth.synchronisation.latency import ChannelLatency, TimedEvent, latency_from, pooled, preferred
+from tests.synthetic.shifted_clocks import Clocks, Sensors, axis, collisions
+
+
+def load_cell(found: tuple[ChannelLatency, ...]) -> ChannelLatency:
+    (own,) = [item for item in preferred(found) if item.channel == "force"]
+    return own
+
+
+def contains(found: ChannelLatency, clocks: Clocks) -> bool:
+    return found.offset.low <= clocks.at(found.at) <= found.offset.high
+
+
+def test_offset_and_drift_of_a_load_cell_are_found_with_jitter_and_other_rates():
+    clocks = Clocks(0.0123, 60e-6, machine_rate=500.0, cell_rate=2000.0, jitter=1e-4)
+    recording, contacts = collisions(np.random.default_rng(1), np.arange(10) * 60.0, clocks)
+    found = load_cell(audit(recording, axis(), contacts))
+    assert contains(found, clocks) and found.offset.high - found.offset.low < 1e-3
+    assert found.drift.low <= 60e-6 <= found.drift.high and abs(found.drift.value - 60e-6) < 5e-6
+    assert found.offset_at(0.0) == pytest.approx(0.0123, abs=1e-3)
+
+
+def test_intervals_contain_the_offset_and_drifts_are_within_5_ppm():
+    """A reduced benchmarks/sync_coverage.py."""
+    hits = 0
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        clocks = Clocks(rng.uniform(0.0, 0.02), rng.uniform(0.0, 1e-4))
+        recording, contacts = collisions(rng, np.arange(6) * 120.0, clocks)
+        found = load_cell(audit(recording, axis(), contacts))
+        hits += contains(found, clocks)
+        assert abs(found.drift.value - clocks.drift) < 5e-6
+    assert hits >= 3
+
+
+@pytest.mark.parametrize("count, reason", [(1, "1 contact with a delay"), (4, "4 contacts"), (5, "")])
+def test_a_load_cell_is_not_assessable_below_five_contacts(count, reason):
+    recording, contacts = collisions(np.random.default_rng(3), np.arange(count) * 5.0, Clocks())
+    found = load_cell(audit(recording, axis(), contacts))
+    assert found.reason.startswith(reason) and found.assessable == (not reason) == found.offset.known
+    assert len(found.used) == count
+
+
+@pytest.mark.parametrize("spread, assessable", [(0.005, True), (0.03, False)])
+def test_an_interval_wider_than_20_ms_is_not_assessable(spread, assessable):
+    events = [TimedEvent(EventDelay(float(i), spread * (i % 3), 1e-3, 0.9)) for i in range(9)]
+    found = latency_from(ChannelLatency("force", "position", "momentum balance"), events)
+    assert found.assessable == assessable and ("ms wide, at most 20 ms" in found.reason) == (not assessable)
+
+
+def test_friction_that_turns_round_at_a_rebound_is_no_delay():
+    rng, rises = np.random.default_rng(7), (0.02, 0.04)
+    recording, contacts = collisions(rng, np.arange(6) * 5.0, Clocks(), rises=rises, rebound=0.9)
+    assert abs(load_cell(audit(recording, axis(), contacts)).offset.value) < 5e-4
+
+
+def test_a_filter_in_the_load_cell_is_a_latency():
+    rng, sensors = np.random.default_rng(3), Sensors(cell_filter=0.008)
+    recording, contacts = collisions(rng, np.arange(5) * 10.0, Clocks(), sensors)
+    assert load_cell(audit(recording, axis(), contacts)).offset.value == pytest.approx(0.008, abs=2e-3)
+
+
+def test_stiff_and_soft_contacts_are_told_apart():
+    rng = np.random.default_rng(4)
+    stiff, one = collisions(rng, np.arange(4) * 5.0, Clocks(0.006), rises=(0.004, 0.005))
+    soft, two = collisions(rng, 30.0 + np.arange(4) * 5.0, Clocks(0.006), rises=(0.04, 0.05))
+    channels = {
+        name: Series(
+            np.concatenate((stiff[name].time, soft[name].time)),
+            np.concatenate((stiff[name].values, soft[name].values)),
+            stiff[name].unit,
+        )
+        for name in stiff.channels
+    }
+    found = load_cell(audit(replace(stiff, channels=channels), axis(), [*one, *two]))
+    assert found.stiff.value == pytest.approx(0.006, abs=1e-3)
+    assert found.soft.value == pytest.approx(0.006, abs=2e-3)
+
+
+def test_the_offset_follows_a_shift_of_the_stamps():
+    recording, contacts = collisions(np.random.default_rng(5), np.arange(5) * 5.0, Clocks())
+    force = recording["force"]
+    later = {**recording.channels, "force": Series(force.time + 0.015, force.values, "N")}
+    moved = [replace(item, start=item.start + 0.015, end=item.end + 0.015) for item in contacts]
+    first = load_cell(audit(recording, axis(), contacts))
+    second = load_cell(audit(replace(recording, channels=later), axis(), moved))
+    assert second.offset.value - first.offset.value == pytest.approx(0.015, abs=3e-4)
+
+
+def test_missing_samples_and_a_gap_do_not_displace_the_result():
+    clocks = Clocks(0.004)
+    recording, contacts = collisions(np.random.default_rng(6), np.arange(5) * 5.0, clocks)
+    force = recording["force"].values.copy()
+    force[::7] = np.nan
+    speed = recording["speed"]
+    kept = (speed.time < 0.5) | (speed.time > 0.9)
+    channels = {
+        **recording.channels,
+        "force": recording["force"].with_values(force, "N"),
+        "speed": Series(speed.time[kept], speed.values[kept], "m/s"),
+    }
+    assert contains(load_cell(audit(replace(recording, channels=channels), axis(), contacts)), clocks)
+
+
+def test_without_torque_the_deceleration_alone_is_compared():
+    clocks = Clocks(0.007)
+    recording, contacts = collisions(np.random.default_rng(7), np.arange(5) * 5.0, clocks, rises=(0.004, 0.01))
+    channels = {name: series for name, series in recording.channels.items() if name != "torque"}
+    found = load_cell(audit(replace(recording, channels=channels), axis(), contacts))
+    assert found.rests_on == "deceleration" and found.offset.value == pytest.approx(0.007, abs=2e-3)
+
+
+def test_a_late_speed_is_found_against_the_position():
+    time = np.arange(8000) * 1e-3
+    position = np.sin(2.0 * time) + 0.3 * np.sin(7.0 * time)
+    speed = 2.0 * np.cos(2.0 * time) + 2.1 * np.cos(7.0 * time)
+    speed += 1e-3 * np.random.default_rng(8).standard_normal(len(time))
+    channels = {"position": Series(time, position, "m"), "speed": Series(time + 0.0042, speed, "m/s")}
+    (found,) = audit(Recording("log", "log", ("axis",), channels), axis(), [])
+    assert found.channel == "speed" and found.offset.low <= 0.0042 <= found.offset.high
+    assert found.offset.value == pytest.approx(0.0042, abs=1e-4)
+
+
+def test_a_second_of_uniform_motion_shows_no_latency():
+    time = np.arange(3000) * 1e-3
+    channels = {"position": Series(time, 0.2 * time, "m"), "speed": Series(time, np.full(3000, 0.2), "m/s")}
+    (found,) = audit(Recording("log", "log", ("axis",), channels), axis(), [])
+    assert not found.assessable and found.reason
+
+
+@pytest.mark.parametrize("values", [np.nan, 0.0, np.inf, 1e200])
+@pytest.mark.parametrize("count", [0, 1, 5, 1500])
+def test_unusable_channels_are_not_assessable(count, values):
+    time = np.arange(count) * 1e-3
+    units = {"position": "m", "speed": "m/s", "acceleration": "m/s2", "torque": "N", "force": "N"}
+    channels = {name: Series(time, np.full(count, values), unit) for name, unit in units.items()}
+    found = audit(Recording("log", "log", ("axis",), channels), axis(), [Contact(0.5, 0.6, 1e-3, 10.0)])
+    assert found and not any(item.assessable for item in found) and all(item.reason for item in found)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("channel", ["force", "torque", "acceleration"])
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_a_channel_of_a_few_samples_beside_good_ones_causes_no_warning(channel, count):
+    time = np.arange(3000) * 1e-3
+    units = {"position": "m", "speed": "m/s", "acceleration": "m/s2", "torque": "N", "force": "N"}
+    channels = {name: Series(time, np.sin(3.0 * time), unit) for name, unit in units.items()}
+    few = 0.5 + 0.1 * np.arange(count)
+    channels[channel] = Series(few, few, units[channel])
+    outside = [Contact(0.5, 0.6, 1e-3, 10.0), Contact(0.0, 0.01, 1e-3, 1.0), Contact(50.0, 50.1, 1e-3, 1.0)]
+    found = audit(Recording("log", "log", ("axis",), channels), axis(), outside)
+    assert {item.channel for item in found} >= {"speed", "force"}
+
+
+def test_logs_with_one_contact_each_are_pooled():
+    each = []
+    for seed in range(5):
+        recording, contacts = collisions(np.random.default_rng(seed), np.array([0.0]), Clocks(0.009))
+        each.append(load_cell(audit(recording, axis(), contacts)))
+    found = pooled(each, [0.0] * 5)
+    assert found.offset.low <= 0.009 <= found.offset.high and len(found.events) == 5
+    assert found.offset.high - found.offset.low < 4e-3
+
+
+def test_drift_of_pooled_logs_needs_their_starts():
+    each, starts = [], [1.6e9 + 200.0 * number for number in range(5)]
+    for number in range(5):
+        clocks = Clocks(0.002 + 50e-6 * 200.0 * number)
+        recording, contacts = collisions(np.random.default_rng(number), np.array([0.0]), clocks)
+        each.append(load_cell(audit(recording, axis(), contacts)))
+    assert pooled(each, starts).drift.value == pytest.approx(50e-6, abs=5e-6)

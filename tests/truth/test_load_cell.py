@@ -1,0 +1,309 @@
+"""Contacts on load cells with drift, jumps, coarse steps, slow sampling or jitter, and logs that begin in a contact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cdtool.base.arrays import FloatArray
+from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.truth.doubts import truth_findings
+from cdtool.truth.onset import OnsetRule, find_contacts
+
+GATE = OnsetRule(above=20.0, back_to=8.0)
+SPEED, STIFFNESS = 0.2, 22e3  # a soft impact of the gate: 4.4 N in the first millisecond
+END = 8.0
+
+
+def clock(rate: float, jitter: float = 0.0, seed: int = 0) -> FloatArray:
+    """Times of a cell at that sample rate, each delayed by up to a share of its period."""
+    rng = np.random.default_rng(seed)
+    return (np.arange(int(END * rate)) + jitter * rng.uniform(0.0, 1.0, int(END * rate))) / rate
+
+
+def pulse(time: FloatArray, onset: float, length: float = 0.3, peak: float = 1000.0) -> FloatArray:
+    inside = (time >= onset) & (time < onset + length)
+    return np.where(inside, peak * np.sin(np.pi * (time - onset) / length), 0.0)
+
+
+def noise(time: FloatArray, sigma: float = 3.0, seed: int = 1) -> FloatArray:
+    return np.random.default_rng(seed).normal(0.0, sigma, len(time))
+
+
+def contacts(time: FloatArray, force: FloatArray, rule: OnsetRule = GATE) -> list[Contact]:
+    return find_contacts(Recording("r", "r", ("axis",), {"force": Series(time, force, "N")}), rule)
+
+
+T = clock(1000.0)
+DRIFTS = {
+    "none": 0.0 * T,
+    "rising, 30 N over 7 s": 30.0 * T / 7.0,
+    "falling, 30 N over 7 s": -30.0 * T / 7.0,
+    "slow sine": 15.0 * np.sin(2.0 * np.pi * 0.15 * T),
+    "step at rest": 12.0 * (T > 3.0),
+}
+
+
+@pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
+@pytest.mark.parametrize("drift", DRIFTS)
+def test_no_drift_moves_the_onset_by_more_than_a_sample(drift, rule):
+    clean = contacts(T, pulse(T, 6.0) + noise(T), rule)
+    found = contacts(T, pulse(T, 6.0) + noise(T) + DRIFTS[drift], rule)
+    assert [item.start for item in found] == pytest.approx([clean[0].start], abs=1.01e-3)
+    assert found[0].peak_force == pytest.approx(clean[0].peak_force, abs=5.0)
+    assert found[0].rest == pytest.approx(DRIFTS[drift][6000], abs=2.5)
+    assert found[0].shift == pytest.approx(DRIFTS[drift][6000] - DRIFTS[drift][0], abs=3.0)
+
+
+def test_the_drift_before_the_onset_is_reported():
+    (rising,) = contacts(T, pulse(T, 6.0) + noise(T) + DRIFTS["rising, 30 N over 7 s"])
+    assert rising.drift == pytest.approx(30.0 / 7.0, abs=1.5)
+
+
+@pytest.mark.parametrize("drift", DRIFTS)
+@pytest.mark.parametrize("sigma", [0.3, 3.0])
+def test_a_drifting_cell_without_a_contact_shows_none(drift, sigma):
+    for seed in range(5):
+        assert contacts(T, noise(T, sigma, seed) + DRIFTS[drift]) == []
+    if drift != "step at rest":  # with a level of eight deviations of the noise, a step of 12 N is a contact
+        assert contacts(T, noise(T, sigma) + DRIFTS[drift], OnsetRule()) == []
+
+
+@pytest.mark.parametrize("length", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("offset", [0.0, 4.0])
+def test_a_log_that_begins_in_contact_has_it_in_progress_and_its_release_is_no_contact(length, sign, offset):
+    force = offset + sign * 500.0 * (length > T) + noise(T)
+    (begun,) = contacts(T, force)
+    assert begun.in_progress
+    assert (begun.start, begun.end) == (T[0], pytest.approx(length, abs=2e-3))
+    begun, later = contacts(T, force + sign * pulse(T, 6.0))
+    assert begun.in_progress and not later.in_progress
+    assert later.start == pytest.approx(6.001, abs=1.1e-3)
+    assert later.rest == pytest.approx(offset, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    "course",
+    [
+        lambda t: 800.0 * np.exp(-t / 0.15) * (t < 0.6),  # falling from the peak
+        lambda t: np.where(t < 0.5, 100.0 + 1200.0 * t, 0.0),  # still rising
+        lambda t: np.where(t < 0.4, 500.0, np.where(t < 2.0, 150.0, 0.0)),  # an impact, then a steady push
+    ],
+    ids=["falling", "rising", "in two levels"],
+)
+def test_whatever_the_force_does_at_the_start_its_release_is_never_an_onset(course):
+    found = contacts(T, course(T) + noise(T) + pulse(T, 6.0))
+    assert [item.in_progress for item in found] == [True, False]
+    assert found[1].start == pytest.approx(6.001, abs=1.1e-3)
+
+
+@pytest.mark.parametrize("offset", [300.0, -300.0])
+@pytest.mark.parametrize("peak", [1000.0, -1000.0, 200.0, -200.0])
+def test_an_untared_cell_is_at_rest_if_it_returns_to_its_level(offset, peak):
+    (found,) = contacts(T, offset + noise(T) + pulse(T, 5.0, peak=peak))
+    assert not found.in_progress
+    assert found.start == pytest.approx(5.003, abs=4e-3)
+
+
+def test_a_contact_that_never_ends_lasts_to_the_last_sample():
+    (found,) = contacts(T, noise(T) + np.clip(2000.0 * (T - 6.0), 0.0, 300.0))
+    assert not found.in_progress
+    assert (found.start, found.end) == (pytest.approx(6.004, abs=4e-3), T[-1])
+
+
+def test_contacts_0_3_s_apart_are_each_found_over_the_rest_before_them():
+    onsets = (4.0, 4.5, 5.0, 5.5)
+    force = sum(pulse(T, onset, 0.2) for onset in onsets) + noise(T) + DRIFTS["rising, 30 N over 7 s"]
+    found = contacts(T, force, OnsetRule(20.0, 8.0, separation=0.1))
+    assert [item.start for item in found] == pytest.approx([onset + 0.001 for onset in onsets], abs=1.1e-3)
+
+
+@pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
+@pytest.mark.parametrize(("rate", "jitter"), [(1000, 0.0), (1000, 0.9), (100, 0.0), (100, 0.9), (62.5, 0.0), (60, 0.9)])
+def test_the_onset_is_within_its_uncertainty_of_the_truth_at_every_rate(rate, jitter, rule):
+    for seed in range(10):
+        time = clock(rate, jitter, seed)
+        true = 5.9 + 0.03 * seed
+        force = STIFFNESS * SPEED * np.clip(time - true, 0.0, 0.5) + noise(time, seed=seed)
+        (found,) = contacts(time, force, rule)
+        back = (rule.back_to or 24.0) / (STIFFNESS * SPEED)  # from touch until the lower level
+        assert true <= found.start <= true + back + 2.0 / rate
+        assert found.start < time[np.argmax(force)]
+        assert found.resolution >= 1.0 / rate - 1e-9
+
+
+@pytest.mark.parametrize(("rate", "jitter"), [(62.5, 0.0), (60, 0.9), (100, 0.0)])
+@pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
+def test_one_sample_of_157_newtons_of_a_slow_cell_is_a_contact(rate, jitter, rule):
+    time = clock(rate, jitter)
+    force = noise(time)
+    hit = int(5.0 * rate)
+    force[hit] = 157.0
+    (found,) = contacts(time, force, rule)
+    assert (found.start, found.peak_force) == (time[hit], pytest.approx(157.0, abs=3.0))
+
+
+def test_three_samples_at_1_khz_are_a_contact_and_one_is_not():
+    for samples, count in ((1, 0), (2, 0), (3, 1)):
+        force = noise(T)
+        force[5000 : 5000 + samples] = 157.0
+        assert len(contacts(T, force)) == count
+
+
+def test_a_burst_of_noise_is_not_a_contact_and_hides_none():
+    for seed in range(20):
+        burst = np.where((T > 3.0) & (T < 3.03), noise(T, 60.0, 100 + seed), 0.0)
+        (found,) = contacts(T, pulse(T, 6.0) + noise(T, seed=seed) + burst)
+        assert found.start == pytest.approx(6.001, abs=1.1e-3)
+
+
+@pytest.mark.parametrize("frequency", [40.0, 60.0, 100.0])
+def test_an_impact_that_rings_is_a_contact(frequency):
+    angle = 2.0 * np.pi * frequency * (T - 6.0)
+    ringing = np.where(T >= 6.0, 900.0 * np.exp(-(T - 6.0) / 0.03) * np.sin(angle), 0.0)
+    (found,) = contacts(T, ringing + noise(T))
+    assert found.start == pytest.approx(6.0, abs=1.1e-3)
+
+
+@pytest.mark.parametrize("step", [1.0, 5.0, 10.0])
+def test_coarse_steps_and_drift_shift_the_onset_within_the_step_size(step):
+    force = pulse(T, 6.0) + noise(T, 1.0) + DRIFTS["rising, 30 N over 7 s"]
+    (found,) = contacts(T, step * np.round(force / step))
+    assert found.start == pytest.approx(6.001, abs=2e-3)
+
+
+def test_missing_samples_and_gaps_are_skipped_and_a_hole_before_the_onset_is_in_the_uncertainty():
+    force = pulse(T, 6.0) + noise(T)
+    force[np.random.default_rng(3).random(len(T)) < 0.1] = np.nan
+    force[(T > 2.0) & (T < 3.5)] = np.nan
+    (found,) = contacts(T, force)
+    assert found.start == pytest.approx(6.001, abs=4e-3)
+    force[(T > 5.95) & (T < 6.02)] = np.nan
+    (found,) = contacts(T, force)
+    assert found.start - found.uncertainty <= 6.0 < found.start
+    assert found.resolution > 0.06
+    kept = (T < 2.0) | (T > 3.5)  # rows that do not exist
+    assert contacts(T[kept], (pulse(T, 6.0) + noise(T))[kept])[0].start == pytest.approx(6.001, abs=1.1e-3)
+
+
+def test_the_resolution_grows_with_clock_noise_drift_and_slope():
+    def resolution(force: FloatArray, time: FloatArray = T) -> float:
+        return contacts(time, force)[-1].resolution
+
+    soft = STIFFNESS * SPEED * np.clip(T - 6.0, 0.0, 0.5)
+    reference = resolution(soft + noise(T, 0.5))
+    assert resolution(soft + noise(T, 4.0)) > reference
+    assert resolution(0.2 * soft + noise(T, 0.5)) > 2.0 * reference
+    wandering = 6.0 * np.sin(2.0 * np.pi * 0.8 * T)
+    assert resolution(soft + noise(T, 0.5) + wandering) > reference
+    slow = clock(100.0)
+    assert resolution(STIFFNESS * SPEED * np.clip(slow - 6.0, 0.0, 0.5) + noise(slow, 0.5), slow) > 0.01
+    assert reference >= 1e-3
+
+
+def test_a_label_that_is_high_from_the_first_sample_on_is_in_progress():
+    label = ((T < 0.5) | ((T > 3.0) & (T < 3.2))).astype(float)
+    found = find_contacts(Recording("r", "r", ("axis",), {"label": Series(T, label, "1")}), GATE)
+    assert [item.in_progress for item in found] == [True, False]
+
+
+def test_a_load_cell_on_its_own_clock_and_rate_needs_no_other_channel():
+    own = 0.4137 + clock(333.0, 0.2)
+    (found,) = contacts(own, pulse(own, 6.0) + noise(own))
+    assert found.start == pytest.approx(6.003, abs=4e-3)
+
+
+def test_hours_of_a_drifting_cell_are_searched_in_seconds():
+    time = np.arange(600_000) * 1e-3
+    force = noise(time) + 40.0 * np.sin(2.0 * np.pi * time / 300.0)
+    onsets = np.arange(30.0, 590.0, 40.0)
+    force += sum(pulse(time, onset) for onset in onsets)
+    found = contacts(time, force)
+    assert [item.start for item in found] == pytest.approx(list(onsets + 0.001), abs=1.1e-3)
+
+
+def test_a_rebound_within_the_separation_is_the_same_contact_whatever_the_cell_reads_between():
+    force = noise(T) + pulse(T, 3.0, 0.1) + pulse(T, 3.6, 0.1, 400.0) + 20.5 * ((T > 3.1) & (T < 3.6))
+    (found,) = contacts(T, force)
+    assert (found.start, found.end) == (pytest.approx(3.001, abs=1.1e-3), pytest.approx(3.7, abs=3e-3))
+    (begun,) = contacts(T, 500.0 * (T < 0.5) + pulse(T, 1.0) + noise(T))  # a rebound from a contact that began before
+    assert begun.in_progress and begun.end == pytest.approx(1.3, abs=3e-3)
+
+
+def test_a_shift_of_rest_during_a_contact_is_not_a_contact_in_progress():
+    """The pushes of the UR10e: friction keeps part of the measured force."""
+    for before, after in ((-29.0, -25.0), (30.0, 20.0)):
+        (found,) = contacts(T, noise(T, 0.1) + np.where(T > 3.3, after, before) + pulse(T, 3.0, peak=40.0), OnsetRule())
+        assert not found.in_progress and found.start == pytest.approx(3.003, abs=5e-3)
+
+
+@pytest.mark.parametrize("rest", [0.0, 3.0, -200.0], ids=["at exactly 0", "at one reading", "not tared"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("rate", "reading"),
+    [(62.5, [157.0]), (62.5, [157.0, 157.0]), (62.5, [157.0, 310.0]), (1000.0, [157.0] * 5), (1000.0, [157.0] * 3)],
+    ids=["one slow sample", "two slow samples", "two that differ", "5 ms at 1 kHz", "3 ms at 1 kHz"],
+)
+def test_a_short_contact_is_found_where_the_cell_rests_at_one_constant_reading(rate, reading, sign, rest):
+    time = clock(rate)
+    force = np.full(len(time), rest)
+    hit = int(5.0 * rate)
+    force[hit : hit + len(reading)] += sign * np.array(reading)
+    for rule in (OnsetRule(), GATE):
+        (found,) = contacts(time, force, rule)
+        assert (found.start, found.peak_force, found.in_progress) == (time[hit], pytest.approx(max(reading)), False)
+
+
+@pytest.mark.parametrize("step", [0.05, 1.0, 20.0, 50.0])
+def test_flicker_of_a_coarse_cell_is_not_a_contact_next_to_a_real_one(step):
+    time = clock(62.5)
+    force = step * np.round(pulse(time, 6.0, peak=60.0 * step) / step)
+    force[[100, 200, 201, 300]] += step * np.array([1.0, 1.0, 1.0, -1.0])
+    (found,) = contacts(time, force, OnsetRule())
+    assert found.start == pytest.approx(6.02, abs=0.02)
+
+
+@pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("offset", [60.0, 200.0, 700.0])
+@pytest.mark.parametrize("left", [0.45, -0.2])
+def test_a_cell_that_is_not_tared_is_at_rest_where_the_log_ends_in_a_contact_against_its_offset(
+    left, offset, sign, rule
+):
+    felt = np.interp(T, [6.0, 6.5, 7.2], [0.0, 2466.0, (1.0 + left) * offset])
+    kept = T < 7.2
+    (found,) = contacts(T[kept], (sign * (offset - felt) + noise(T))[kept], rule)
+    assert not found.in_progress
+    assert found.start == pytest.approx(6.003, abs=6e-3)
+    assert found.peak_force == pytest.approx(2466.0, abs=15.0)
+    assert found.rest == pytest.approx(sign * offset, abs=2.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("offset", [200.0, 291.0, 400.0])
+def test_a_touch_held_before_the_impact_is_not_a_release(offset, sign):
+    """The soft impacts of the gate: the guard is pressed to its stop at 290 N, then hit."""
+    felt = np.interp(T, [6.0, 6.1, 6.35, 6.7, 7.2], [0.0, 290.0, 290.0, 2466.0, 600.0])
+    kept = T < 7.2
+    for rule in (OnsetRule(), GATE):
+        (found,) = contacts(T[kept], (sign * (offset - felt) + noise(T))[kept], rule)
+        assert not found.in_progress
+        assert found.start == pytest.approx(6.003, abs=6e-3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_release_that_rings_is_still_the_end_of_a_contact_in_progress(sign):
+    ringing = np.where(T > 1.0, np.exp(-(T - 1.0) / 0.05) * np.cos(2.0 * np.pi * 40.0 * (T - 1.0)), 1.0)
+    (begun,) = contacts(T, sign * 500.0 * ringing + noise(T))
+    assert begun.in_progress
+
+
+def test_the_offset_of_a_cell_that_is_not_tared_is_reported():
+    force = 200.0 - pulse(T, 6.0) + noise(T)
+    log = Recording("r", "r", ("axis",), {"force": Series(T, force, "N")})
+    (finding,) = truth_findings(log, find_contacts(log, GATE), GATE)
+    assert finding.channel == "force" and finding.kind == "not_tared"
+    assert finding.numbers["rest"] == pytest.approx(200.0, abs=0.5)
+    tared = Recording("r", "r", ("axis",), {"force": Series(T, force - 195.0, "N")})
+    assert truth_findings(tared, find_contacts(tared, GATE), GATE) == []
