@@ -1,8 +1,8 @@
 """Draw the layers of the package from its imports: python docs/make_layers.py
 
 The rows of docs/images/layers.svg are the rooms of cdtool/ in the order of the import contract in pyproject.toml. A
-filled square means: the row's room imports the column's. The lowest layer of the contract is one row, the foundation.
-Imports for the type checker and inside functions count; names in the tables of the registry do not.
+filled square means: the row's room imports the column's. Imports for the type checker and inside functions count; names
+in the tables of the registry do not.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 PACKAGE = DOCS.parent / "cdtool"
 FILE = DOCS / "images" / "layers.svg"
-FOUNDATION = "foundation"
 # By the text: to parse every file takes seconds.
 _IMPORT = re.compile(
     r"^[ \t]*(?:(?:from|import) cdtool\.(?P<module>\w+)|from cdtool import (?P<names>[^()\n]+|\([^)]+\)))", re.MULTILINE
@@ -47,17 +46,15 @@ def read_contract() -> list[tuple[str, ...]]:
 
 def read_layers() -> Layers:
     """Return the contract's layers with the imports of the code; raises ValueError for a module without a layer."""
-    *above, lowest = read_contract()
-    room_of = {name: name for layer in above for name in layer} | dict.fromkeys(lowest, FOUNDATION)
-    layers = (*above, (FOUNDATION,))
+    layers = tuple(read_contract())
     imports: dict[str, set[str]] = {room: set() for layer in layers for room in layer}
     for file in sorted(PACKAGE.rglob("*.py")):
         name = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
         if name in ("__init__", "__main__"):
             continue
-        if name not in room_of:
+        if name not in imports:
             raise ValueError(f"cdtool/{name} is in no layer of pyproject.toml")
-        imports[room_of[name]] |= {room_of[item] for item in _imported(file) if item in room_of}
+        imports[name] |= {item for item in _imported(file) if item in imports}
     return Layers(layers, {room: frozenset(found - {room}) for room, found in imports.items()})
 
 

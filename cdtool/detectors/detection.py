@@ -157,6 +157,27 @@ def contiguous(statistic: Signal, band: Band) -> tuple[FloatArray, StatusArray, 
     """Return values, status and both limits (n, J) as kernels need them; raises ValueError for limits of other shape.
 
     A threshold of a plug-in may return a limit of all samples once, or a view that is not contiguous.
+
+    Parameters
+    ----------
+    statistic : Signal
+        What the limits apply to.
+    band : Band
+        The limits.
+
+    Returns
+    -------
+    tuple of ndarray
+        Values (n, J), status (n, J) as uint8, lower and upper limit (n, J).
+
+    Raises
+    ------
+    ValueError
+        A limit has another shape than the values.
+
+    Examples
+    --------
+    Used by `cdtool.alarms.activation.Activation.alarms`.
     """
     values = np.ascontiguousarray(statistic.values, dtype=np.float64)
     status = np.ascontiguousarray(statistic.status, dtype=np.uint8)

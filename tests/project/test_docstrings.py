@@ -6,7 +6,8 @@ Public is what a user of the Python API or the author of a plug-in calls:
 * every class in the tables of the detectors and the thresholds, and the methods of their contracts;
 * every public function of `cdtool.detectors.base`, `cdtool.detectors.filters` and `cdtool.thresholds.base`, which are
   the tools of a plug-in, and of `cdtool.statistics`;
-* every function of the detectors, the thresholds and the evaluation that another folder of cdtool imports.
+* every function of the detectors, the thresholds, and of truth, statistics and results together that another folder of
+  cdtool imports.
 
 A public function needs Parameters with a description of each, Returns, Raises if it raises an error itself, and
 Examples; a class needs Parameters, Notes and Examples. Examples run as doctests, or name where there is one.
@@ -37,12 +38,15 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("detectors", "thresholds", "evaluation")
+ROOMS = ("detectors", "thresholds", "results")
+OF_RESULTS = ("truth", "statistics")  # with the results one room
 WHOLE_MODULES = ("cdtool.detectors.base", "cdtool.detectors.filters", "cdtool.thresholds.base")
 STATISTICS = "cdtool.statistics"
 CONTRACTS = (Detector.signal, Threshold.fit, FittedThreshold.evaluate)
 
-_IMPORT = re.compile(rf"^ *from (cdtool\.(?:{'|'.join(ROOMS)})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+_IMPORT = re.compile(
+    rf"^ *from (cdtool\.(?:{'|'.join((*ROOMS, *OF_RESULTS))})[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE
+)
 _FUNCTION = re.compile(r"^def ([a-z]\w*)", re.MULTILINE)
 _HEADING = re.compile(r"^([A-Z][a-z]+)\n-{3,}\n", re.MULTILINE)
 _FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
@@ -58,7 +62,8 @@ def texts() -> dict[str, str]:
 
 def room_of(module: str) -> str:
     """The folder of cdtool that a module is in."""
-    return f"{module}..".split(".")[1]
+    room = f"{module}..".split(".")[1]
+    return "results" if room in OF_RESULTS else room
 
 
 def imported_elsewhere() -> Iterator[tuple[str, str]]:
@@ -191,7 +196,7 @@ def test_a_function_of_the_api_describes_every_keyword_what_it_returns_and_raise
     assert not faults, f"{name}: {'; '.join(faults)}"
 
 
-def test_the_public_functions_of_detectors_thresholds_and_evaluation_have_their_sections():
+def test_the_public_functions_of_the_method_have_their_sections():
     faults = {
         name: faults_of_function(function, contract=function in CONTRACTS)
         for name, function in names_of_functions().items()
@@ -289,7 +294,7 @@ def test_the_example_of_a_detector_or_threshold_runs(name, folder):
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_the_other_examples_of_detectors_thresholds_and_evaluation_run(room, folder):
+def test_the_other_examples_of_the_method_run(room, folder):
     modules = [name for name, text in texts().items() if room_of(name) == room and ">>>" in text]
     tests = [test for name in modules for test in doctest.DocTestFinder().find(import_module(name), name)]
     tests = [test for test in tests if test.name not in rules()]

@@ -26,18 +26,18 @@ def test_the_picture_of_the_docs_is_that_of_the_imports(script, layers):
     text = script.FILE.read_text(encoding="utf-8")
     assert text == script.svg(layers), "run python docs/make_layers.py"
     root = ElementTree.fromstring(text)
-    assert root.findtext(f"{SVG}title") and "pipeline imports" in (root.findtext(f"{SVG}desc") or "")
+    assert root.findtext(f"{SVG}title") and "alarms imports" in (root.findtext(f"{SVG}desc") or "")
 
 
 def test_a_room_imports_only_what_lies_below_its_layer(layers):
     depth = {room: number for number, layer in enumerate(layers.layers) for room in layer}
-    assert layers.imports["cli"] and not layers.imports["foundation"]
+    assert layers.imports["commands"] and not layers.imports["base"]
     for room, imported in layers.imports.items():
         assert all(depth[other] > depth[room] for other in imported), room
 
 
 def test_another_import_is_another_picture(script, layers):
-    fewer = dict(layers.imports, pipeline=layers.imports["pipeline"] - {"detectors"})
+    fewer = dict(layers.imports, alarms=layers.imports["alarms"] - {"detectors"})
     assert script.svg(script.Layers(layers.layers, fewer)) != script.svg(layers)
 
 

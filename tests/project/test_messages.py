@@ -80,11 +80,11 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
 def shown_by(path: Path) -> set[str]:
     """Return the commands that a module belongs to; none for one that several commands use."""
     parts = [*path.relative_to(ROOT / "cdtool").parts[:-1], path.stem]
-    names = {part.replace("_", "-") for part in parts}
-    own = {name for name in COMMANDS if parts[0] in ("cli", "workflows", "simulation") and set(name.split()) & names}
-    if "simulation" in parts:
+    names = {part.removesuffix("_command").replace("_", "-") for part in parts[1:]}
+    own = {name for name in COMMANDS if parts[0] == "commands" and set(name.split()) & names}
+    if "simulate" in parts:
         own |= {name for name in COMMANDS if name.startswith("simulate")}
-    if "signature" in parts or path.stem == "threshold_settings":
+    if {"signature", "learn", "learning"} & {*parts} or path.stem == "threshold_settings":
         own |= {name for name in COMMANDS if "signature" in name} | {"detect"}
     return own.union(*(SHOWN_BY.get(part, set()) for part in parts))
 

@@ -60,9 +60,14 @@ def copy(tmp_path: Path) -> Path:
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
     folder = tmp_path / "source"
-    (folder / "cdtool").mkdir(parents=True)
-    for name in ("__init__.py", "version.py", "py.typed"):  # of the whole package a build takes ten times as long
-        shutil.copy(ROOT / "cdtool" / name, folder / "cdtool")
+    (folder / "cdtool" / "base").mkdir(parents=True)
+    for name in (
+        "__init__.py",
+        "base/__init__.py",
+        "base/version.py",
+        "py.typed",
+    ):  # of the whole package a build takes ten times as long
+        shutil.copy(ROOT / "cdtool" / name, folder / "cdtool" / name)
     for name in ("pyproject.toml", "README.md", "LICENSE", ".gitattributes", ".git_archival.txt"):
         shutil.copy(ROOT / name, folder)
     (folder / "tests").mkdir()

@@ -21,8 +21,8 @@ WRITERS = Registry(
         "figure": "cdtool.report.writers.figure:Figure",
         "comparison_markdown": "cdtool.commands.compare.comparison_markdown:ComparisonMarkdown",
         "comparison_json": "cdtool.commands.compare.comparison_json:ComparisonJson",
-        "protocol_html": "cdtool.commands.protocol.document.html_writer:ProtocolHtml",
-        "protocol_pdf": "cdtool.commands.protocol.document.pdf_writer:ProtocolPdf",
+        "protocol_html": "cdtool.commands.protocol.document.protocol_html:ProtocolHtml",
+        "protocol_pdf": "cdtool.commands.protocol.document.protocol_pdf:ProtocolPdf",
     },
     contract=("name", "suffixes", "in_folder", "subject", "kinds", "files", "has_content", "write"),
 )
