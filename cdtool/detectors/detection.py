@@ -177,7 +177,9 @@ def contiguous(statistic: Signal, band: Band) -> tuple[FloatArray, StatusArray, 
 
     Examples
     --------
-    Used by `cdtool.alarms.activation.Activation.alarms`.
+    >>> signal = Signal(np.arange(2.0), np.zeros((2, 1)), np.full((2, 1), Status.VALID, np.uint8), "N")
+    >>> contiguous(signal, Band(np.array([[-1.0]]), np.array([[1.0]])))[3].ravel().tolist()
+    [1.0, 1.0]
     """
     values = np.ascontiguousarray(statistic.values, dtype=np.float64)
     status = np.ascontiguousarray(statistic.status, dtype=np.uint8)

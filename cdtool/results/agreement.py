@@ -47,6 +47,21 @@ def with_model_error(low: float, high: float) -> tuple[float, float]:
 
     15 %: of 160 means on ten machines of another simulator than the model's, 158 are within it
     (`python benchmarks/injection.py --plain 10`). Known parameters leave less: 5 % or 2 ms on the simulated gate.
+
+    Parameters
+    ----------
+    low, high : float
+        The range of the latencies of a model [ms].
+
+    Returns
+    -------
+    tuple of float
+        The wider range [ms].
+
+    Examples
+    --------
+    >>> with_model_error(20.0, 40.0)
+    (17.0, 46.0)
     """
     return 0.85 * low, 1.15 * high
 

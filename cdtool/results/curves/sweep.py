@@ -159,6 +159,22 @@ def critical_factor(detection: Detection, activation: Activation) -> float:
     """Return the largest safety factor below which an operation alarms: the highest debounced exceedance of any joint.
 
     -inf if there are never as many consecutive assessable samples as the debounce needs.
+
+    Parameters
+    ----------
+    detection : Detection
+        The operation with its signal and its band.
+    activation : Activation
+        The debounce.
+
+    Returns
+    -------
+    float
+        The factor.
+
+    Examples
+    --------
+    `cdtool.benchmark` sets the safety factors of a false-alarm budget by it.
     """
     return critical_factors(detection, [activation])[0]
 

@@ -17,7 +17,24 @@ from cdtool.results.traces.trace import Trace
 def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]:
     """Return the results with their statistics, their traces, and a note if there are no traces.
 
-    Raises RecordingError if either file is damaged.
+    Parameters
+    ----------
+    results : str or Path
+        A results.json or results.parquet.
+
+    Returns
+    -------
+    tuple
+        Results with statistics, traces, and a note: empty if there are traces.
+
+    Raises
+    ------
+    RecordingError
+        One of the files is damaged.
+
+    Examples
+    --------
+    `cdtool.read_results` shows its use.
     """
     path = location(results)
     evaluated = evaluate(read_results(path))

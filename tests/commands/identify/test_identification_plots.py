@@ -11,7 +11,8 @@ import pytest
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisSettings, identify_rigid_axis
 from cdtool.commands.identify.fleet_identification import ParameterSeries, drift_of
 from cdtool.commands.identify.identification_outputs import ControllerComparison, StartComparison, UnseenRun
-from cdtool.commands.identify.plots import draw_controller, draw_drift, draw_friction, draw_starts, draw_unseen_run, png
+from cdtool.commands.identify.plots import draw_controller, draw_drift, draw_friction, draw_starts, draw_unseen_run
+from cdtool.report.plots.figures import png
 from tests.synthetic.gate_runs import GATE, free_runs
 
 UNITS = ("N", "m/s", "m")

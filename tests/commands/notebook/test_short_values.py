@@ -15,7 +15,15 @@ from cdtool.recordings.recording import Recording, Series
 from tests.commands.notebook.values import GATE, LOG, MACHINE, is_plain_row, returned_values, values_in
 
 # Rooms with values that no function of the API returns.
-INTERNAL = ("formats", "messages", "ingest", "robot_model", "simulation", "axis_model", "injection", "report", "clock")
+INTERNAL = (
+    "formats",
+    "machines/robot_model",
+    "machines/axis_model",
+    "commands/simulate",
+    "commands/inject",
+    "report",
+    "recordings/clock",
+)
 LONGEST = 200
 
 
@@ -48,7 +56,7 @@ def test_every_value_with_arrays_has_a_short_repr():
     package = Path(cdtool.__file__).parent
     without = []
     for path in sorted(package.rglob("*.py")):
-        if path.relative_to(package).parts[0] in INTERNAL:
+        if any(path.is_relative_to(package / room) for room in INTERNAL):
             continue
         text = path.read_text(encoding="utf-8")
         if "Array" not in text and "ndarray" not in text:
