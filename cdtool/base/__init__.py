@@ -1,1 +1,1 @@
-"""What every room uses and no other room explains: errors, files, findings, tables."""
+"""What is not about collisions: errors, files, findings, tables of TOML, compiled kernels."""

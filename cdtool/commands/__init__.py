@@ -1,1 +1,1 @@
-"""The work of each command as plain functions that print nothing: a folder or module per command, and shared steps."""
+"""The commands: a folder for each with its whole slice; what several share is below them."""

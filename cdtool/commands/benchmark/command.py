@@ -128,7 +128,8 @@ def benchmark(
     evaluated: Evaluated = done.evaluated
     try:
         command = _command(file, protocol, output or [], detectors, false_alarm_budget)
-        evaluated, lines = documents.write(done, command)
+        evaluated = documents.verdict_of(done, command)
+        lines = documents.write(done.inputs)
     finally:  # a protocol that cannot be made does not cost the reports
         report = Report(evaluated, done.traces)
         written = write_reports(report, documents.reports, force=force, quiet=quiet, inputs=done.inputs)

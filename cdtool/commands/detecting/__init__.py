@@ -1,1 +1,1 @@
-"""`cdtool detecting`."""
+"""One log through one detector, as `cdtool detect` and `cdtool explain` need it."""

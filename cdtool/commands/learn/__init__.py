@@ -1,1 +1,1 @@
-"""`cdtool learn`."""
+"""`cdtool learn-signature`."""

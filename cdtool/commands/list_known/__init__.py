@@ -1,1 +1,1 @@
-"""`cdtool list-known`."""
+"""`cdtool list`."""

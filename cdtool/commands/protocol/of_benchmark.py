@@ -42,17 +42,25 @@ class ProtocolOfBenchmark:
         """Raise UsageError for a document that cannot be written."""
         check_outputs(self._documents, force=self._force, subject="protocol")
 
-    def write(self, done: Benchmark, command: str) -> tuple[Evaluated, list[str]]:
-        """Write the protocol of a finished benchmark; return its evaluation with the verdict, and what to show."""
+    def verdict_of(self, done: Benchmark, command: str) -> Evaluated:
+        """Make the protocol of a finished benchmark, and return its evaluation with the verdict."""
         if not self._documents:
-            return done.evaluated, []
-        from cdtool.commands.protocol.document.document import ProtocolReport, protocol_statement
+            return done.evaluated
+        from cdtool.commands.protocol.document.document import protocol_statement
         from cdtool.commands.protocol.making import make_protocol
 
-        made = make_protocol(self._file, done, command)
-        inputs = (*done.inputs, self._file.path)
-        write_outputs(ProtocolReport(made), self._documents, force=self._force, inputs=inputs, subject="protocol")
-        return done.evaluated.with_protocol(*protocol_statement(made)), written_lines(made, self._documents)
+        self._made = make_protocol(self._file, done, command)
+        return done.evaluated.with_protocol(*protocol_statement(self._made))
+
+    def write(self, inputs: Sequence[Path]) -> list[str]:
+        """Write the protocol, without replacing one of the inputs; return the lines to show."""
+        if not self._documents:
+            return []
+        from cdtool.commands.protocol.document.document import ProtocolReport
+
+        report, every = ProtocolReport(self._made), (*inputs, self._file.path)
+        write_outputs(report, self._documents, force=self._force, inputs=every, subject="protocol")
+        return written_lines(self._made, self._documents)
 
 
 def written_lines(made: Protocol, written: Sequence[Path]) -> list[str]:

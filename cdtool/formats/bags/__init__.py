@@ -1,1 +1,1 @@
-"""Bags and other logs of topics."""
+"""ROS bags, and MCAP as a target: logs of topics."""

@@ -1,1 +1,1 @@
-"""`cdtool labels`."""
+"""Tables that a person or another program writes beside the logs: contacts and triggers."""

@@ -1,1 +1,1 @@
-"""`cdtool transmissions`."""
+"""The transmission between drive and contact: its transfer function and its simulation."""

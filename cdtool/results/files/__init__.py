@@ -1,1 +1,1 @@
-"""`cdtool files`."""
+"""Results in a file or folder, read back and checked field by field."""

@@ -1,1 +1,1 @@
-"""`cdtool contact`."""
+"""Parameters of a contact from its force at the load cell."""

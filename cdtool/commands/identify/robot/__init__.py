@@ -1,1 +1,1 @@
-"""`cdtool robot`."""
+"""Parameters of a robot of several joints: base parameters, friction, torque constants."""

@@ -1,1 +1,1 @@
-"""`cdtool names`."""
+"""What the names of columns say: quantity, unit, joint."""

@@ -1,1 +1,1 @@
-"""`cdtool coverage`."""
+"""`cdtool coverage`: where a machine notices a contact, over position and stiffness."""

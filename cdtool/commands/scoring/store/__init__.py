@@ -1,1 +1,1 @@
-"""`cdtool store`."""
+"""What a store holds of a benchmark: learned thresholds, outcomes of logs, finished runs."""
