@@ -18,7 +18,8 @@ from time import perf_counter
 import numpy as np
 from timing import environment, table
 
-from cdtool.commands.scoring.benchmark import Benchmark, benchmark
+from cdtool.commands.scoring.benchmark import benchmark
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.report.outputs import write_outputs
 from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import evaluate
@@ -32,7 +33,7 @@ MOST_SECONDS, MOST_MEGABYTES = 60.0, 15.0
 SAMPLE = Path(__file__).parent.parent / "sample_logs" / "gate" / "benchmark.toml"
 
 
-def many(done: Benchmark, recordings: int) -> Results:
+def many(done: BenchmarkResult, recordings: int) -> Results:
     """Results of that many recordings: one contact each in two groups, none in the hold-out."""
     rng = np.random.default_rng(1)
     rows, contacts, false_alarms = [], [], []

@@ -11,9 +11,7 @@ Every command is available as a function:
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> DetectionResult; of a list DetectionResults
-        cdtool.detect_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
     cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
-        cdtool.explain_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
     cdtool.benchmark("benchmark.toml")                                  -> BenchmarkResult
     cdtool.protocol("protocol.toml")                                    -> Protocol: of a force test, to be signed
     cdtool.score("triggers.csv", "benchmark.toml")                      -> BenchmarkResult
@@ -42,13 +40,12 @@ if TYPE_CHECKING:
     from cdtool.alarms.pipeline import Detection
     from cdtool.base.errors import CdtoolError
     from cdtool.base.version import __version__
-    from cdtool.commands.benchmark.api import benchmark
     from cdtool.commands.compare.comparing import compare
     from cdtool.commands.compare.planning import plan
     from cdtool.commands.convert.converting import convert
     from cdtool.commands.convert.recovering import recover
-    from cdtool.commands.detect.result import DetectionResult, DetectionResults, detect, detect_runs
-    from cdtool.commands.explain.explaining import explain, explain_runs
+    from cdtool.commands.detect.result import DetectionResult, DetectionResults, detect
+    from cdtool.commands.explain.explaining import explain
     from cdtool.commands.identify.identifying import identify
     from cdtool.commands.init.drafting import init, init_study
     from cdtool.commands.inject.coverage.coverage import coverage
@@ -58,14 +55,15 @@ if TYPE_CHECKING:
     from cdtool.commands.learning.learning import learn_signature
     from cdtool.commands.protocol.making import protocol
     from cdtool.commands.report.read_results import read_results
-    from cdtool.commands.score.api import score
+    from cdtool.commands.score.score_triggers import score
+    from cdtool.commands.scoring.benchmark import benchmark
     from cdtool.commands.scoring.benchmark_result import BenchmarkResult
-    from cdtool.commands.signature.upkeep import check_signature
-    from cdtool.commands.signature.upkeep import update_with_runs as update_signature
+    from cdtool.commands.signature.upkeep import check_signature, update_signature
     from cdtool.commands.simulate.arm_recordings import write_arm_recordings as simulate_arm
     from cdtool.commands.simulate.gate_recordings import write_gate_recordings as simulate_gate
     from cdtool.commands.study.study import study_sensors
-    from cdtool.commands.tune.result import TuningResult, tune
+    from cdtool.commands.tune.result import TuningResult
+    from cdtool.commands.tune.tuning import tune
     from cdtool.detectors.detection import Alarm, Band, Signal, Status, Verdict
     from cdtool.formats.machine_file import MachineFile, read_machine_file
     from cdtool.recordings.clock import previous_value
@@ -79,14 +77,12 @@ _API = {
     "read": "cdtool.commands.judging.reading:read",
     "learn_signature": "cdtool.commands.learning.learning:learn_signature",
     "check_signature": "cdtool.commands.signature.upkeep:check_signature",
-    "update_signature": "cdtool.commands.signature.upkeep:update_with_runs",
+    "update_signature": "cdtool.commands.signature.upkeep:update_signature",
     "coverage": "cdtool.commands.inject.coverage.coverage:coverage",
     "detect": "cdtool.commands.detect.result:detect",
-    "detect_runs": "cdtool.commands.detect.result:detect_runs",
     "explain": "cdtool.commands.explain.explaining:explain",
-    "explain_runs": "cdtool.commands.explain.explaining:explain_runs",
-    "benchmark": "cdtool.commands.benchmark.api:benchmark",
-    "score": "cdtool.commands.score.api:score",
+    "benchmark": "cdtool.commands.scoring.benchmark:benchmark",
+    "score": "cdtool.commands.score.score_triggers:score",
     "convert": "cdtool.commands.convert.converting:convert",
     "identify": "cdtool.commands.identify.identifying:identify",
     "inject": "cdtool.commands.inject.injecting:inject",
@@ -98,7 +94,7 @@ _API = {
     "plan": "cdtool.commands.compare.planning:plan",
     "info": "cdtool.commands.judging.information:info",
     "study_sensors": "cdtool.commands.study.study:study_sensors",
-    "tune": "cdtool.commands.tune.result:tune",
+    "tune": "cdtool.commands.tune.tuning:tune",
     "simulate_arm": "cdtool.commands.simulate.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.commands.simulate.gate_recordings:write_gate_recordings",
     "read_results": "cdtool.commands.report.read_results:read_results",
@@ -150,9 +146,7 @@ __all__ = [
     "convert",
     "coverage",
     "detect",
-    "detect_runs",
     "explain",
-    "explain_runs",
     "identify",
     "info",
     "init",

@@ -17,7 +17,7 @@ import numpy as np
 import cdtool
 from cdtool.alarms.activation import ActivationSettings
 from cdtool.commands.detect.plot import plot_detected
-from cdtool.commands.scoring.benchmark import Benchmark
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.simulate.arm_recordings import write_arm_recordings
 from cdtool.commands.simulate.gate_recordings import write_gate_recordings
 from cdtool.formats.machine_file import read_machine_file
@@ -110,7 +110,7 @@ def thesis_rule(work: Path, names: Sequence[str]) -> str:
     return "\n".join(lines)
 
 
-def _alarmed(done: Benchmark) -> dict[str, str]:
+def _alarmed(done: BenchmarkResult) -> dict[str, str]:
     """Return, for each assessable detector, how many of the hold-out runs have an alarm."""
     shares = {}
     for item in done.results.exposure:
@@ -184,7 +184,7 @@ def _first_force(recording: Recording, level: float) -> float:
     return float(force.time[np.flatnonzero(force.values[:, 0] > level)[0]])
 
 
-def triggers(done: dict[str, Benchmark]) -> None:
+def triggers(done: dict[str, BenchmarkResult]) -> None:
     """Figures 5.7, 5.8, 6.9 and 6.10: who raises an alarm when."""
     names = {("gate", "stiff"): "5_7", ("gate", "soft"): "5_8"}
     names |= {

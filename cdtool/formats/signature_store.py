@@ -82,7 +82,7 @@ def _no_signature(file: Path, content: bytes, why: str = "") -> SignatureError:
     return SignatureError(f"{file}: {what}", "create one with cdtool learn-signature")
 
 
-def update_signature(path: str | Path, change: Callable[[SignatureFile], SignatureFile]) -> SignatureFile:
+def rewrite_signature(path: str | Path, change: Callable[[SignatureFile], SignatureFile]) -> SignatureFile:
     """Read, change and write a file under a lock, so that no concurrent update is lost. Raises SignatureError."""
     with _faults(), locked(location(path)):
         stored = read_signature(path)

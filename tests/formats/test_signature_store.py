@@ -18,7 +18,7 @@ from cdtool.base.errors import SignatureError
 from cdtool.detectors.momentum import Momentum
 from cdtool.formats.machine_file import fingerprint, machine_parameters
 from cdtool.formats.signature_file import FactorOrigin, LearnedRun, SignatureFile
-from cdtool.formats.signature_store import read_signature, update_signature, write_signature
+from cdtool.formats.signature_store import read_signature, rewrite_signature, write_signature
 from cdtool.thresholds.normal_motion import learn_normal_motion
 from cdtool.thresholds.signature import Signature
 
@@ -185,10 +185,10 @@ WORKER = """
 import sys
 from dataclasses import replace
 from cdtool.formats.signature_file import LearnedRun
-from cdtool.formats.signature_store import update_signature
+from cdtool.formats.signature_store import rewrite_signature
 for k in range(int(sys.argv[3])):
     run = LearnedRun(f"{sys.argv[2]}.{k}", "x")
-    update_signature(sys.argv[1], lambda file: replace(file, runs=(*file.runs, run)))
+    rewrite_signature(sys.argv[1], lambda file: replace(file, runs=(*file.runs, run)))
 """
 
 
@@ -231,7 +231,7 @@ def test_an_update_that_fails_changes_nothing(tmp_path, learned):
         raise SignatureError("no")
 
     with pytest.raises(SignatureError, match="no"):
-        update_signature(path, change)
+        rewrite_signature(path, change)
     assert path.read_bytes() == old
 
 
@@ -290,5 +290,5 @@ def test_an_update_without_a_change_does_not_write_the_file(tmp_path, learned):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     before = path.stat()
-    update_signature(path, lambda file: file)
+    rewrite_signature(path, lambda file: file)
     assert path.stat().st_ino == before.st_ino

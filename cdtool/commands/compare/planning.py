@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Literal
 
 from cdtool.base.errors import UsageError, nearest
-from cdtool.base.notebook.keyword_options import by_keywords
 from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import location
@@ -67,9 +66,18 @@ class Plan:
     __repr__ = short_repr
 
 
-@dataclass(frozen=True, kw_only=True)
-class Questions:
-    """What a test is planned for; at least one of `difference_ms`, `missed_at_most` and `false_alarms_at_most`.
+def plan(  # noqa: PLR0913  # the public function: a keyword for each setting
+    *,
+    difference_ms: float | None = None,
+    std_ms: float | Measured | None = None,
+    unpaired: bool = False,
+    power: float = 0.8,
+    missed_at_most: str = "",
+    false_alarms_at_most: str = "",
+    allowed: int | None = None,
+    significance: float = SIGNIFICANT,
+) -> Plan:
+    """Compute how many impacts, operations or hours a test needs.
 
     Parameters
     ----------
@@ -90,25 +98,6 @@ class Questions:
         Number of misses or false alarms to plan for as well as for none; by default one.
     significance : float, optional
         Chance of a wrong conclusion.
-    """
-
-    difference_ms: float | None = None
-    std_ms: float | Measured | None = None
-    unpaired: bool = False
-    power: float = 0.8
-    missed_at_most: str = ""
-    false_alarms_at_most: str = ""
-    allowed: int | None = None
-    significance: float = SIGNIFICANT
-
-
-def answer(questions: Questions) -> Plan:
-    """Compute how many impacts, operations or hours a test needs.
-
-    Parameters
-    ----------
-    questions : Questions
-        What the test has to show.
 
     Returns
     -------
@@ -131,9 +120,8 @@ def answer(questions: Questions) -> Plan:
     >>> [(need.amount, need.unit, need.allowed) for need in plan.answers[0].needs]
     [(59, 'impacts', 0), (93, 'impacts', 1)]
     """
-    difference_ms, std_ms, allowed = questions.difference_ms, questions.std_ms, questions.allowed
-    check_significance(questions.significance)
-    level = 1.0 - questions.significance
+    check_significance(significance)
+    level = 1.0 - significance
     counts = (0, 1) if allowed is None else tuple(dict.fromkeys((0, allowed)))
     answers: list[Answer] = []
     measured = std_ms if isinstance(std_ms, Measured) or std_ms is None else Measured(std_ms)
@@ -143,20 +131,17 @@ def answer(questions: Questions) -> Plan:
                 f"a difference of {difference_ms:g} ms without a standard deviation",
                 "give --std-ms 8, or --from results.json of an earlier test",
             )
-        answers.append(_difference(difference_ms, measured, questions.unpaired, questions.power, level))
-    if questions.missed_at_most:
-        answers.append(_missed(_share(questions.missed_at_most), counts, level))
-    if questions.false_alarms_at_most:
-        answers.append(_false_alarms(Budget.parse(questions.false_alarms_at_most), counts, level))
+        answers.append(_difference(difference_ms, measured, unpaired, power, level))
+    if missed_at_most:
+        answers.append(_missed(_share(missed_at_most), counts, level))
+    if false_alarms_at_most:
+        answers.append(_false_alarms(Budget.parse(false_alarms_at_most), counts, level))
     if not answers:
         raise UsageError(
             "there is no question",
             "give --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most 1/1000op (or 0.1/h)",
         )
     return Plan(tuple(answers), measured if difference_ms is not None else None)
-
-
-plan = by_keywords(Questions, answer)
 
 
 def measured_std(

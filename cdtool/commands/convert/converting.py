@@ -26,8 +26,6 @@ from cdtool.recordings.log_section import LogSection
 if TYPE_CHECKING:
     from cdtool.execution.workers import Progress
 
-_WHOLE = LogSection()
-
 
 @dataclass(frozen=True)
 class Converted:
@@ -46,7 +44,7 @@ def convert(
     output: str | Path,
     *,
     machine: str | Path | MachineFile | None = None,
-    section: LogSection = _WHOLE,
+    section: LogSection = LogSection(),
     force: bool = False,
     progress: Progress | None = None,
 ) -> Converted:

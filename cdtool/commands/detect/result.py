@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
 from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.keyword_options import by_keywords
 from cdtool.base.notebook.near_attributes import NearAttributes
-from cdtool.base.notebook.presenting import described, presented
+from cdtool.base.notebook.presenting import described
 from cdtool.base.notebook.same_values import equal_by_values, same_values
 from cdtool.base.plain_text import counted
 from cdtool.commands.detect.log_by_name import UnknownLogError, number_of
@@ -23,6 +22,7 @@ from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_
 from cdtool.commands.detecting.detection_options import DetectionOptions
 from cdtool.commands.judging.runs import several_logs
 from cdtool.detectors.detection import Status
+from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.recording import Recording
 from cdtool.results.frames import OUTCOMES, rows_as_frame
 from cdtool.results.results import ContactResult, RecordingFinding, Skipped
@@ -31,7 +31,14 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-_Settings = ParamSpec("_Settings")
+    from cdtool.alarms.activation import ActivationSettings
+    from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
+    from cdtool.commands.judging.scoring_rules import ScoringRules
+    from cdtool.commands.learning.learning import Learned
+    from cdtool.detectors.base import Detector
+    from cdtool.formats.machine_file import MachineFile
+    from cdtool.formats.signature_file import SignatureFile
+
 VERDICTS = ("alarm", "no alarm", "not_assessable")
 
 
@@ -345,8 +352,56 @@ def _html(runs: Sequence[DetectionResult], caption: str, note: str) -> str:
     return html_table(caption, headings, rows, note)
 
 
-def detect_logs(
-    logs: str | Path | Sequence[str | Path], options: DetectionOptions
+@overload
+def detect(  # type: ignore[overload-overlap]  # the public function: a keyword for each setting; a str is one log, not a sequence of them
+    logs: str | Path,
+    machine: str | Path | MachineFile | None = ...,
+    *,
+    benchmark: str | Path | PreparedBenchmark | None = ...,
+    signature: str | Path | Learned | SignatureFile | None = ...,
+    detector: str | Detector | None = ...,
+    limit: Sequence[float] = ...,
+    warm_up: float | None = ...,
+    joints: Sequence[str] = ...,
+    section: LogSection = ...,
+    operations: str = ...,
+    activation: ActivationSettings | None = ...,
+    rules: ScoringRules | None = ...,
+) -> DetectionResult: ...
+
+
+@overload
+def detect(  # the public function: a keyword for each setting
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile | None = ...,
+    *,
+    benchmark: str | Path | PreparedBenchmark | None = ...,
+    signature: str | Path | Learned | SignatureFile | None = ...,
+    detector: str | Detector | None = ...,
+    limit: Sequence[float] = ...,
+    warm_up: float | None = ...,
+    joints: Sequence[str] = ...,
+    section: LogSection = ...,
+    operations: str = ...,
+    activation: ActivationSettings | None = ...,
+    rules: ScoringRules | None = ...,
+) -> DetectionResults: ...
+
+
+def detect(  # noqa: PLR0913  # the public function: a keyword for each setting
+    logs: str | Path | Sequence[str | Path],
+    machine: str | Path | MachineFile | None = None,
+    *,
+    benchmark: str | Path | PreparedBenchmark | None = None,
+    signature: str | Path | Learned | SignatureFile | None = None,
+    detector: str | Detector | None = None,
+    limit: Sequence[float] = (),
+    warm_up: float | None = None,
+    joints: Sequence[str] = (),
+    section: LogSection = LogSection(),
+    operations: str = "whole",
+    activation: ActivationSettings | None = None,
+    rules: ScoringRules | None = None,
 ) -> DetectionResult | DetectionResults:
     """Run one detector over one log or many: with a signature, with limits, or with those of the first seconds.
 
@@ -354,8 +409,33 @@ def detect_logs(
     ----------
     logs : str, Path or sequence of them
         A log, or several.
-    options : DetectionOptions
-        The machine, the detector and its threshold.
+    machine : str, Path or MachineFile, optional
+        The machine file; not with `benchmark`.
+    benchmark : str, Path or PreparedBenchmark, optional
+        A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors, and
+        `signature`, which replaces its threshold.
+    signature : str, Path, Learned or SignatureFile, optional
+        A signature file or what was learned, which contains detector, threshold and activation.
+    detector : str or Detector, optional
+        Name or short name of the detector, or a detector of your own; needed with `limit` or `warm_up`.
+    limit : sequence of float, optional
+        Limit |i| < limit in the signal's unit, one number or one per joint, in place of a signature.
+    warm_up : float, optional
+        Limits from the run's own first seconds in motion (threshold `baseline`), this long [s], in place of a
+        signature.
+    joints : sequence of str, optional
+        With `limit` or `warm_up`, the joints to monitor; all by default. A signature monitors those that it was learned
+        for.
+    section : LogSection, optional
+        The part of the log that is used; the whole log by default.
+    operations : str, optional
+        How the log is cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
+        clock-reset.
+    activation : ActivationSettings, optional
+        Settings of the activation that replace those of the signature, or the default: debounce [samples], rearm [s],
+        hysteresis [share], latch.
+    rules : ScoringRules, optional
+        The onset rule of contacts, and how long after it an alarm belongs to a contact.
 
     Returns
     -------
@@ -383,6 +463,19 @@ def detect_logs(
     >>> found.contacts.latency_ms.between(0.0, 200.0).all().item()
     True
     """
+    options = DetectionOptions(
+        machine,
+        benchmark=benchmark,
+        signature=signature,
+        detector=detector,
+        limit=limit,
+        warm_up=warm_up,
+        joints=joints,
+        section=section,
+        operations=operations,
+        activation=activation,
+        rules=rules,
+    )
     if isinstance(logs, str | Path):
         return DetectionResult(detect_log(logs, options))
     logs = several_logs(logs)
@@ -400,31 +493,3 @@ def detect_logs(
         raise RecordingError(f"none of {counted(len(skipped), 'log')} can be used, the first: {skipped[0].reason}")
     results = DetectionResults.of(*found)
     return DetectionResults(results.runs, [*skipped, *results._skipped], results.findings)
-
-
-class _OneOrMany(Protocol[_Settings]):
-    """A function of one log or several: what it returns depends on that."""
-
-    @overload
-    def __call__(  # type: ignore[overload-overlap]  # a str is one log, not a sequence of them
-        self, logs: str | Path, *values: _Settings.args, **named: _Settings.kwargs
-    ) -> DetectionResult: ...
-
-    @overload
-    def __call__(
-        self, logs: Sequence[str | Path], *values: _Settings.args, **named: _Settings.kwargs
-    ) -> DetectionResults: ...
-
-
-def _typed(_: Callable[_Settings, DetectionOptions], function: Any) -> _OneOrMany[_Settings]:
-    """Return a function of these options with its type."""
-    typed: _OneOrMany[_Settings] = function
-    return typed
-
-
-detect = _typed(DetectionOptions, by_keywords(DetectionOptions, detect_logs))
-detect_runs = presented(
-    by_keywords(DetectionOptions, detect_log_runs),
-    DetectionResults.of,
-    "DetectionResults\n    The result of `detect` for each run, and in `skipped` what was left out.",
-)

@@ -121,7 +121,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     found = detect_log_runs(log, options).runs
     if len(found) > 1:
         ids = f"{found[0].recording.source} to {found[-1].recording.source}"
-        raise UsageError(f"{log}: has {len(found)} runs, {ids}", "name one, as LOG#ID, or call detect_runs")
+        raise UsageError(f"{log}: has {len(found)} runs, {ids}", "name one, as LOG#ID, or give a list of logs")
     return found[0]
 
 
@@ -162,9 +162,8 @@ def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
 
     Examples
     --------
-    >>> import cdtool
-    >>> machine = "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect_runs("sample_logs/gate/stiff/03.csv", machine, detector="momentum", limit=[400.0])
+    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
+    >>> found = detect_log_runs(log, DetectionOptions(machine, detector="momentum", limit=[400.0]))
     >>> [run.detections[0].verdict.outcome for run in found.runs]
     ['alarm']
     """

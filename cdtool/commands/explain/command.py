@@ -28,7 +28,7 @@ from cdtool.commands.console.options import ForceOption, JsonOption, figure_name
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.explain.explaining import Explained
+    from cdtool.commands.explain.explaining import ExplainedRun
     from cdtool.results.explanation.cause import Cause
     from cdtool.results.explanation.explanation import AlarmExplanation, Explanation, MissExplanation
     from cdtool.results.explanation.margin import Moment
@@ -60,12 +60,12 @@ def explain(
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
-    from cdtool.commands.explain.explaining import explain_log_runs
+    from cdtool.commands.explain.explaining import explain_log
     from cdtool.commands.judging.runs import lost
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
     settings = options.settings()
-    explained = explain_log_runs(log, settings)
+    explained = explain_log(log, settings)
     prepared = settings.prepared()
     runs = [(run.found.recording.source if settings.has_runs else str(log), run) for run in explained.runs]
     skipped = [*(prepared.skipped if prepared else ()), *explained.skipped]
@@ -86,7 +86,7 @@ def explain(
     leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))
 
 
-def _draw(runs: Sequence[Explained], plot: Path | None, stem: str, *, force: bool) -> list[Path]:
+def _draw(runs: Sequence[ExplainedRun], plot: Path | None, stem: str, *, force: bool) -> list[Path]:
     """Draw the first event into a file, or each event into a folder; return the files written."""
     if plot is None:
         return []
@@ -100,7 +100,7 @@ def _draw(runs: Sequence[Explained], plot: Path | None, stem: str, *, force: boo
     return paths
 
 
-def _show_explained(explained: Explained) -> None:
+def _show_explained(explained: ExplainedRun) -> None:
     """Print every event of a log, and the operations without one."""
     shown = explained.events[:_SHOWN]
     for _, item in shown:
@@ -148,7 +148,7 @@ def _show_event(item: Explanation) -> None:
     typer.echo()
 
 
-def _as_json_value(log: str, explained: Explained) -> dict[str, Any]:
+def _as_json_value(log: str, explained: ExplainedRun) -> dict[str, Any]:
     """Return the same as JSON values."""
     from cdtool.commands.console.contact_rows import contact_as_json
     from cdtool.results.explanation.explanation import AlarmExplanation

@@ -19,8 +19,6 @@ from cdtool.formats.labels.named_rows import by_recording
 from cdtool.formats.machine_file import MachineFile
 from cdtool.recordings.log_section import MARK_HINT, LogSection, Mark
 
-_WHOLE = LogSection()
-
 
 @dataclass(frozen=True)
 class LogsOf:
@@ -71,7 +69,7 @@ class LogsOf:
         return split_run(log)[0] if self.runs else log
 
 
-def _section(table: Table, common: LogSection = _WHOLE) -> LogSection:
+def _section(table: Table, common: LogSection = LogSection()) -> LogSection:
     """Return `from` and `to` of a table; those of `common` where it has none."""
     begin, end = (_mark(table, name) for name in ("from", "to"))
     try:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from cdtool.alarms.activation import Activation, ActivationSettings
 from cdtool.base.errors import UsageError
 from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.keyword_options import by_keywords
 from cdtool.base.notebook.same_values import equal_by_values
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
-from cdtool.commands.judging.runs import PartOfLog, RunReading, Runs, check_joints, load_runs, several_logs
+from cdtool.commands.judging.runs import RunReading, Runs, check_joints, load_runs, several_logs
 from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.commands.learning.calibration import calibrate, in_fixed_order, kept
 from cdtool.commands.learning.fitting import fitting, for_machine, signals_of, with_left_out
@@ -75,12 +74,29 @@ def signature_of(given: str | Path | Learned | SignatureFile) -> SignatureFile:
     return given if isinstance(given, SignatureFile) else read_signature(given)
 
 
-@dataclass(frozen=True)
-class LearningOptions:
-    """The machine, the detector and how its threshold is learned.
+def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each setting
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile,
+    detector: str | Detector,
+    *,
+    rule: Threshold | None = None,
+    joints: Sequence[str] = (),
+    section: LogSection = LogSection(),
+    guard: float | None = None,
+    operations: str = "whole",
+    activation: ActivationSettings | None = None,
+    false_alarm_budget: str | None = None,
+    onset: OnsetRule | None = None,
+    jobs: int = 1,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> Learned:
+    """Learn the threshold of one detector from impact-free logs.
 
     Parameters
     ----------
+    logs : sequence of str or Path
+        Impact-free logs.
     machine : str, Path or MachineFile
         The machine file.
     detector : str or Detector
@@ -109,33 +125,6 @@ class LearningOptions:
         In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
     progress : callable, optional
         Called after each log with the number done and the total.
-    """
-
-    machine: str | Path | MachineFile
-    detector: str | Detector
-    _: KW_ONLY
-    rule: Threshold | None = None
-    joints: Sequence[str] = ()
-    section: LogSection = field(default_factory=LogSection)
-    guard: float | None = None
-    operations: str = "whole"
-    activation: ActivationSettings | None = None
-    false_alarm_budget: str | None = None
-    onset: OnsetRule | None = None
-    jobs: int = 1
-    workers: Workers | None = None
-    progress: Progress | None = None
-
-
-def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
-    """Learn the threshold of one detector from impact-free logs.
-
-    Parameters
-    ----------
-    logs : sequence of str or Path
-        Impact-free logs.
-    options : LearningOptions
-        The machine, the detector and how its threshold is learned.
 
     Returns
     -------
@@ -162,18 +151,20 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     >>> [(motion.described, runs) for motion, runs in learned.runs]
     [('forward at 0.201 m/s', 10)]
     """
-    machine, joints, operations = options.machine, options.joints, options.operations
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    raised_by = Activation().changed(options.activation or {})  # refuses wrong settings before reading
-    budget = Budget.parse(options.false_alarm_budget) if options.false_alarm_budget is not None else None
+    raised_by = Activation().changed(activation or {})  # refuses wrong settings before reading
+    budget = Budget.parse(false_alarm_budget) if false_alarm_budget is not None else None
     check_joints(joints, machine_file.machine)
-    instance = machine_file.detector(options.detector)
-    wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
+    instance = machine_file.detector(detector)
+    wanted = for_machine(Signature() if rule is None else rule, machine_file.machine)
     _refuse_by_hand(wanted, budget)
     paths = [location(log) for log in several_logs(logs)]
-    part = _part(paths, options)
-    workers = options.workers or Workers(options.jobs)
-    reading = RunReading(operations, onset=options.onset, part=part, workers=workers, progress=options.progress)
+    if guard is not None and not guard >= 0.0:
+        raise UsageError(f"guard is {guard:g} s", "give 0 s or more")
+    part = None
+    if guard is not None or section:
+        part = PartToLearnFrom(ScoringRules(onset or OnsetRule()), dict.fromkeys(paths, section), guard)
+    reading = RunReading(operations, onset=onset, part=part, workers=workers or Workers(jobs), progress=progress)
     runs = load_runs(paths, machine_file, reading)
     return learned_from_runs(
         runs, machine_file, instance, wanted, Setting(joints, operations, raised_by, budget, Split.RECORDING)
@@ -194,7 +185,7 @@ class Setting:
 def learned_from_runs(
     runs: Runs, machine_file: MachineFile, instance: Any, rule: Threshold, setting: Setting
 ) -> Learned:
-    """Learn the threshold of a detector from runs that have been read; raises as `learn`."""
+    """Learn the threshold of a detector from runs that have been read; raises as `learn_signature`."""
     joints, operations, budget = setting.joints, setting.operations, setting.budget
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
     fit = fitting(rule)
@@ -227,19 +218,6 @@ def learned_from_runs(
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
     findings = (*runs.findings, *fitted.findings(rule, instance.name))
     return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), findings)
-
-
-def _part(paths: Sequence[Path], options: LearningOptions) -> PartOfLog | None:
-    """Return which part of a log is learned from; None: the whole of it."""
-    if options.guard is not None and not options.guard >= 0.0:
-        raise UsageError(f"guard is {options.guard:g} s", "give 0 s or more")
-    if options.guard is None and not options.section:
-        return None
-    rules = ScoringRules(options.onset or OnsetRule())
-    return PartToLearnFrom(rules, dict.fromkeys(paths, options.section), options.guard)
-
-
-learn_signature = by_keywords(LearningOptions, learn)
 
 
 def _refuse_by_hand(rule: Threshold, budget: Budget | None) -> None:

@@ -16,8 +16,8 @@ from cdtool.commands.protocol.assessment.assessment import PointAssessment, judg
 from cdtool.commands.protocol.assessment.protocol import ExcludedRecording, FileDigest, Protocol, Role
 from cdtool.commands.protocol.measuring import Assignment, assign, measured_point
 from cdtool.commands.protocol.protocol_file import ProtocolFile, digest_of_file, read_protocol_file
-from cdtool.commands.scoring.benchmark import Benchmark
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.results.results import Results
 
@@ -56,7 +56,7 @@ def protocol(file: str | Path, *, command: str = "") -> Protocol:
     return _made(read, setup, None, command or f"cdtool.protocol({str(file)!r})")
 
 
-def make_protocol(file: ProtocolFile, done: Benchmark, command: str = "") -> Protocol:
+def make_protocol(file: ProtocolFile, done: BenchmarkResult, command: str = "") -> Protocol:
     """Return the protocol of a finished benchmark: its recordings are read again for the whole force-time curves.
 
     Parameters

@@ -11,7 +11,7 @@ from cdtool.base.plain_text import plain
 from cdtool.commands.protocol.assessment.protocol import Protocol
 from cdtool.commands.protocol.document.names import protocol_names
 from cdtool.commands.protocol.protocol_file import has_protocol, read_protocol_file
-from cdtool.commands.scoring.benchmark import Benchmark
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.results.evaluated import Evaluated
 
@@ -42,7 +42,7 @@ class ProtocolOfBenchmark:
         """Raise UsageError for a document that cannot be written."""
         check_outputs(self._documents, force=self._force, subject="protocol")
 
-    def verdict_of(self, done: Benchmark, command: str) -> Evaluated:
+    def verdict_of(self, done: BenchmarkResult, command: str) -> Evaluated:
         """Make the protocol of a finished benchmark, and return its evaluation with the verdict."""
         if not self._documents:
             return done.evaluated

@@ -13,13 +13,13 @@ import numpy as np
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.findings import Finding
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted, first_of
 from cdtool.base.registry import plugin_packages
 from cdtool.base.remote.remote_path import location
 from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import shown_path, to_be_seen
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.scoring.gathering import Gathering
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
@@ -29,10 +29,9 @@ from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.recordings.operations import Operation
-from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import ALL, unchecked
 from cdtool.results.results import RecordingFinding, RecordingResult, Skipped
-from cdtool.results.traces.trace import Trace
 from cdtool.thresholds.normal_choice import NormalMotions
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
@@ -40,17 +39,6 @@ _HELD = 0.5
 _CLOCK_RATE = 1000.0
 _CUT_LOG = "is cut into runs: its rows are left out (name a run, as {name}#1)"
 _NO_RUN = "no such run is scored: its rows are left out"
-
-
-@dataclass(frozen=True)
-class Score:
-    """The results with their statistics, the selected traces, and the files that were read."""
-
-    evaluated: Evaluated
-    traces: tuple[Trace, ...]
-    inputs: tuple[Path, ...] = ()
-
-    __repr__ = short_repr
 
 
 def score(
@@ -62,7 +50,7 @@ def score(
     jobs: int = 1,
     workers: Workers | None = None,
     progress: Progress | None = None,
-) -> Score:
+) -> BenchmarkResult:
     """Score the trigger times of any program against the contacts of a benchmark file's recordings.
 
     Parameters
@@ -85,9 +73,8 @@ def score(
 
     Returns
     -------
-    Score
-        The results and their statistics. Of the file's limits, those on `*` and on detectors of the trigger file are
-        checked.
+    BenchmarkResult
+        As that of `benchmark`. Of the file's limits, those on `*` and on detectors of the trigger file are checked.
 
     Raises
     ------
@@ -116,7 +103,7 @@ def _run(
     clock: str,
     listed_only: bool,
     progress: Progress | None,
-) -> Score:
+) -> BenchmarkResult:
     names = tuple(given.rows)
     setup, measured = with_synchronisation(setup, workers)
     base = setup.path.parent
@@ -145,7 +132,7 @@ def _run(
     gathered.findings += unchecked(setup.limits, names, str(setup.path))
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
-    return Score(evaluate(results, rules), gathered.traces, (given.path, *setup.inputs))
+    return BenchmarkResult(evaluate(results, rules), gathered.traces, (given.path, *setup.inputs))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from cdtool.commands.scoring.benchmark_file import (
     with_detectors,
     with_only,
 )
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.scoring.gathering import Gathering
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
@@ -33,7 +34,6 @@ from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
 from cdtool.commands.scoring.scoring import Detect, Scored, detect_with, score_runs
 from cdtool.commands.scoring.store.stored_learned import StoreOfRun
-from cdtool.commands.scoring.store.stored_outcomes import StoreReport
 from cdtool.detectors.base import Detector
 from cdtool.execution.store.digest import code_version, digest_of
 from cdtool.execution.store.use import StoreUse
@@ -42,33 +42,11 @@ from cdtool.recordings.operations import Operation
 from cdtool.recordings.plausible import LearnedRanges
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.curves.sweep import MULTIPLES
-from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import LimitRule, unchecked
-from cdtool.results.results import RecordingFinding, Results, Skipped
-from cdtool.results.traces.trace import Trace
+from cdtool.results.results import RecordingFinding, Skipped
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.normal_choice import NormalMotions
-
-
-@dataclass(frozen=True)
-class Benchmark:
-    """The results with their statistics, the selected traces, the time per step [s], and the files read.
-
-    `stored` is how much of them was in the store; None without one.
-    """
-
-    evaluated: Evaluated
-    traces: tuple[Trace, ...]
-    seconds: Mapping[str, float]
-    inputs: tuple[Path, ...] = ()
-    stored: StoreReport | None = None
-
-    __repr__ = short_repr
-
-    @property
-    def results(self) -> Results:
-        """Return all verdicts with raw numbers and provenance."""
-        return self.evaluated.results
 
 
 def benchmark(
@@ -80,7 +58,7 @@ def benchmark(
     workers: Workers | None = None,
     store: StoreUse | None = None,
     progress: Progress | None = None,
-) -> Benchmark:
+) -> BenchmarkResult:
     """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
 
     Parameters
@@ -104,9 +82,9 @@ def benchmark(
 
     Returns
     -------
-    Benchmark
-        The results and their statistics. Logs that cannot be read or scored are listed in `results.skipped`; so is a
-        detector without one of its channels, all contacts of which are not assessable.
+    BenchmarkResult
+        DataFrames, figures and reports. Logs that cannot be read or scored are in `skipped`; so is a detector without
+        one of its channels: all its contacts are not assessable.
 
     Raises
     ------
@@ -159,7 +137,7 @@ class BenchmarkWork:
         return cls(setup, limits, list(detectors) == ["all"])
 
 
-def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> Benchmark:
+def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> BenchmarkResult:
     begin = perf_counter()
     setup, measured = with_synchronisation(work.setup, workers)
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
@@ -197,7 +175,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     if stored and found is None:
         stored.add_finished(beside_logs, evaluated, gathered.trace_keys)
     times = {"reading": learned.seconds + gathered.reading, "detecting": seconds - learned.seconds + gathered.detecting}
-    return Benchmark(evaluated, traces, times, setup.inputs, report)
+    return BenchmarkResult(evaluated, traces, setup.inputs, times, report)
 
 
 def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mapping[str, Any], normals: str) -> str:

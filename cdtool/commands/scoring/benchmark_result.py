@@ -15,7 +15,6 @@ from cdtool.base.notebook.presenting import described
 from cdtool.base.notebook.same_values import equal_by_values
 from cdtool.base.plain_text import counted, first_of, shorten
 from cdtool.base.remote.remote_path import location
-from cdtool.commands.scoring.benchmark import Benchmark
 from cdtool.commands.scoring.store.stored_outcomes import StoreReport
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.frames import results_as_frame
@@ -73,11 +72,6 @@ class BenchmarkResult(NearAttributes):
     stored: StoreReport | None = field(default=None, compare=False)
 
     __eq__ = equal_by_values
-
-    @classmethod
-    def of(cls, done: Benchmark) -> BenchmarkResult:
-        """Return the result of a finished benchmark."""
-        return cls(done.evaluated, done.traces, done.inputs, done.seconds, done.stored)
 
     @property
     def results(self) -> Results:

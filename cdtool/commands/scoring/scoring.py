@@ -43,8 +43,6 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.verdict import ForceVerdict, assess_force
 
-_WHOLE = LogSection()
-
 
 @dataclass
 class Scored:
@@ -258,7 +256,7 @@ def _log_to_score(setup: BenchmarkFile, group: str, log: Path, load: _WholeLog |
     """Read a log or one of its runs; `log` is its path in the benchmark file. Raises RecordingError."""
     rules, path = setup.rules_of(group), load.path
     whole = load()
-    section = setup.sections.get(log, _WHOLE)
+    section = setup.sections.get(log, LogSection())
     recording = section.of(whole)
     operations = operations_of(recording, setup.operations)
     if setup.is_impact_free(group):

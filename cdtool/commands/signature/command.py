@@ -190,13 +190,13 @@ def update(
     Example: cdtool signature update gate.feekf.json april/*.csv -m machine.toml --forget 30
     """
     from cdtool.commands.learning.normal_runs import notes_on
-    from cdtool.commands.signature.upkeep import update_with_runs
+    from cdtool.commands.signature.upkeep import update_signature
     from cdtool.execution.workers import Workers
     from cdtool.thresholds.guarded_update import CAP, RESERVE
     from cdtool.truth.onset import OnsetRule
 
     with progress("reading runs", quiet=quiet) as advance:
-        done = update_with_runs(
+        done = update_signature(
             file,
             logs,
             machine,

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
 from cdtool.alarms.pipeline import detect_operation, run_detector
 from cdtool.base.errors import CdtoolError, SignatureError, UsageError
-from cdtool.base.notebook.keyword_options import by_keywords
 from cdtool.base.notebook.same_values import equal_by_values
 from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
-from cdtool.commands.judging.runs import RunReading, Runs, load_runs, several_logs
+from cdtool.commands.judging.runs import RunReading, load_runs, several_logs
 from cdtool.commands.learning.fitting import Pair, signals_of
 from cdtool.commands.learning.learning import learned_run
 from cdtool.commands.learning.normal_runs import with_operation
@@ -26,7 +25,7 @@ from cdtool.commands.signature.drift import audit_drift
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.formats.signature_file import SignatureFile, with_run
-from cdtool.formats.signature_store import read_signature, update_signature
+from cdtool.formats.signature_store import read_signature, rewrite_signature
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.motion.motion_class import MotionClass
 from cdtool.recordings.motion.speed_course import TOLERANCE
@@ -118,16 +117,30 @@ def no_signature_for(motion: MotionClass, signatures: Sequence[FittedSignature])
     return f"no signature for its class: runs {motion.described}"
 
 
-@dataclass(frozen=True)
-class SeasonOptions:
-    """Impact-free logs of a machine, and how they are read.
+def check_signature(  # noqa: PLR0913  # the public function: a keyword for each setting
+    path: str | Path,
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile,
+    *,
+    target: float = TARGET,
+    operations: str | None = None,
+    onset: OnsetRule | None = None,
+    jobs: int = 1,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> Checked:
+    """Check a signature against impact-free logs: do its runs suffice, and has the machine drifted since?
 
     Parameters
     ----------
+    path : str or Path
+        The signature file.
     logs : sequence of str or Path
         Impact-free logs in order of time; those that the signature was learned from are recognised by content.
     machine : str, Path or MachineFile
         The machine file.
+    target : float, optional
+        The chance of a false alarm per operation that the runs have to show.
     operations : str, optional
         How the logs are cut into operations; only the way used for learning is possible, and it is the default.
     onset : OnsetRule, optional
@@ -138,70 +151,6 @@ class SeasonOptions:
         In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
     progress : callable, optional
         Called after each log with the number done and the total.
-    """
-
-    logs: Sequence[str | Path]
-    machine: str | Path | MachineFile
-    _: KW_ONLY
-    operations: str | None = None
-    onset: OnsetRule | None = None
-    jobs: int = 1
-    workers: Workers | None = None
-    progress: Progress | None = None
-
-    def machine_file(self) -> MachineFile:
-        """Return the machine file, read."""
-        return self.machine if isinstance(self.machine, MachineFile) else read_machine_file(self.machine)
-
-    def runs(self, file: SignatureFile, machine_file: MachineFile) -> Runs:
-        """Read the logs for a signature file; SignatureError if they are cut differently than for learning."""
-        operations = _cut(file, self.operations)
-        workers = self.workers or Workers(self.jobs)
-        reading = RunReading(operations, onset=self.onset, workers=workers, progress=self.progress)
-        return load_runs([location(log) for log in several_logs(self.logs)], machine_file, reading, file.plausible)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckOptions(SeasonOptions):
-    """How a signature is checked.
-
-    Parameters
-    ----------
-    target : float, optional
-        The chance of a false alarm per operation that the runs have to show.
-    """
-
-    target: float = TARGET
-
-
-@dataclass(frozen=True, kw_only=True)
-class UpdateOptions(SeasonOptions):
-    """How runs are added to a signature.
-
-    Parameters
-    ----------
-    forget : float, optional
-        Effective number of runs, above 1: older runs are forgotten. By default all runs count equally.
-    cap : float, optional
-        The deviation of a run counts up to this many spreads.
-    reserve : float, optional
-        No run may move a limit further than this many spreads from where it was first learned.
-    """
-
-    forget: float | None = None
-    cap: float = CAP
-    reserve: float = RESERVE
-
-
-def check_by(path: str | Path, options: CheckOptions) -> Checked:
-    """Check a signature against impact-free logs: do its runs suffice, and has the machine drifted since?
-
-    Parameters
-    ----------
-    path : str or Path
-        The signature file.
-    options : CheckOptions
-        The logs, the machine and the target.
 
     Returns
     -------
@@ -229,15 +178,15 @@ def check_by(path: str | Path, options: CheckOptions) -> Checked:
     >>> len(coverage.runs), coverage.alarms, coverage.enough
     (10, 0, True)
     """
-    target = options.target
     if not LEAST_TARGET <= target < 1.0:
         raise UsageError(f"target is {target:g}", f"give a probability from {LEAST_TARGET:g} to below 1")
-    machine_file = options.machine_file()
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     file = read_signature(path)
     signatures = signatures_in(file)
     detector = machine_file.detector(file.detector)
     file.check(machine_file.machine, detector)
-    runs = options.runs(file, machine_file)
+    reading = RunReading(_cut(file, operations), onset=onset, workers=workers or Workers(jobs), progress=progress)
+    runs = load_runs([location(log) for log in several_logs(logs)], machine_file, reading, file.plausible)
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     skipped = [*runs.skipped, *unusable]
     known = {(run.sha256, run.operation) for run in file.runs}
@@ -271,9 +220,6 @@ def check_by(path: str | Path, options: CheckOptions) -> Checked:
     return Checked(file, tuple(classes), tuple(skipped), runs.findings)
 
 
-check_signature = by_keywords(CheckOptions, check_by)
-
-
 def _rule_of(file: SignatureFile, current: FittedSignature) -> Signature:
     """Return the rule as used by the file: with the safety factor set by a budget, and for any number of runs."""
     return replace(cast(Signature, file.rule), safety_factor=current.safety_factor, force=True)
@@ -290,15 +236,46 @@ def _tried(work: Any, pairs: Sequence[Pair], skipped: list[Skipped]) -> Any:
         return None
 
 
-def update_by(path: str | Path, options: UpdateOptions) -> Updated:
+def update_signature(  # noqa: PLR0913  # the public function: a keyword for each setting
+    path: str | Path,
+    logs: Sequence[str | Path],
+    machine: str | Path | MachineFile,
+    *,
+    forget: float | None = None,
+    cap: float = CAP,
+    reserve: float = RESERVE,
+    operations: str | None = None,
+    onset: OnsetRule | None = None,
+    jobs: int = 1,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> Updated:
     """Add impact-free runs to a signature file.
 
     Parameters
     ----------
     path : str or Path
         The signature file; it is replaced.
-    options : UpdateOptions
-        The logs, the machine and how the runs count.
+    logs : sequence of str or Path
+        Impact-free logs in order of time; those that the signature was learned from are recognised by content.
+    machine : str, Path or MachineFile
+        The machine file.
+    forget : float, optional
+        Effective number of runs, above 1: older runs are forgotten. By default all runs count equally.
+    cap : float, optional
+        The deviation of a run counts up to this many spreads.
+    reserve : float, optional
+        No run may move a limit further than this many spreads from where it was first learned.
+    operations : str, optional
+        How the logs are cut into operations; only the way used for learning is possible, and it is the default.
+    onset : OnsetRule, optional
+        The rule by which a contact shows on the load cell; a run with a contact is left out.
+    jobs : int, optional
+        Number of logs read at a time.
+    workers : Workers, optional
+        In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
+    progress : callable, optional
+        Called after each log with the number done and the total.
 
     Returns
     -------
@@ -328,16 +305,16 @@ def update_by(path: str | Path, options: UpdateOptions) -> Updated:
     >>> len(updated.added), [skipped.reason for skipped in updated.refused]
     (1, ['this run is already in the signature'])
     """
-    forget, cap, reserve = options.forget, options.cap, options.reserve
     if forget is not None and not forget > 1.0:
         raise UsageError(f"forget is {forget:g}", "give an effective number of runs above 1, e.g. 20 to 50")
     for name, value in (("cap", cap), ("reserve", reserve)):
         if not value > 0.0:
             raise UsageError(f"{name} is {value:g}", "give a number of spreads above 0")
-    machine_file = options.machine_file()
+    machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
-    runs = options.runs(stored, machine_file)
+    reading = RunReading(_cut(stored, operations), onset=onset, workers=workers or Workers(jobs), progress=progress)
+    runs = load_runs([location(log) for log in several_logs(logs)], machine_file, reading, stored.plausible)
     added: list[str] = []
     refused = list(runs.skipped)
 
@@ -352,10 +329,7 @@ def update_by(path: str | Path, options: UpdateOptions) -> Updated:
                 refused.append(Skipped(operation.name, str(fault)))
         return file
 
-    return Updated(update_signature(path, change), tuple(added), tuple(refused), runs.findings)
-
-
-update_with_runs = by_keywords(UpdateOptions, update_by)
+    return Updated(rewrite_signature(path, change), tuple(added), tuple(refused), runs.findings)
 
 
 def _cut(file: SignatureFile, operations: str | None) -> str:

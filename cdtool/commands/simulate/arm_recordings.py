@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.keyword_options import by_keywords
 from cdtool.commands.simulate.arm_model import ArmRun, Array, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial, require_trial
 from cdtool.commands.simulate.changed_machine import ChangedMachine
@@ -85,12 +83,24 @@ def as_recording(run: ArmRun, name: str) -> Recording:
     return Recording(name, name, _JOINTS, channels)
 
 
-@dataclass(frozen=True)
-class ArmRecordings:
-    """Which recordings of the arm to write.
+def write_arm_recordings(  # noqa: PLR0913  # the public function: a keyword for each setting
+    folder: Path,
+    counts: Mapping[str, int],
+    seed: int,
+    *,
+    trial: Trial = 1,
+    file_format: str = "csv",
+    progress: Callable[[int, int], None] | None = None,
+    parameters: ArmParameters | None = None,
+    references: bool = True,
+    changed: ChangedMachine | None = None,
+) -> int:
+    """Write recordings of a simulated two-link arm to a folder, with a machine file and a benchmark file.
 
     Parameters
     ----------
+    folder : Path
+        An empty or new folder.
     counts : mapping of str to int
         Number of recordings of each group: free, holdout (both impact-free), stiff, soft.
     seed : int
@@ -108,27 +118,6 @@ class ArmRecordings:
         Log reference channels.
     changed : ChangedMachine, optional
         What has changed since the machine file was written; it is that of the unchanged arm.
-    """
-
-    counts: Mapping[str, int]
-    seed: int
-    trial: Trial = 1
-    file_format: str = "csv"
-    progress: Callable[[int, int], None] | None = None
-    parameters: ArmParameters | None = None
-    references: bool = True
-    changed: ChangedMachine | None = None
-
-
-def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
-    """Write recordings of a simulated two-link arm to a folder, with a machine file and a benchmark file.
-
-    Parameters
-    ----------
-    folder : Path
-        An empty or new folder.
-    wanted : ArmRecordings
-        Which recordings to write.
 
     Returns
     -------
@@ -149,16 +138,15 @@ def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
     >>> sorted(path.name for path in Path("myarm/stiff").iterdir())
     ['01.csv']
     """
-    seed, trial, references = wanted.seed, wanted.trial, wanted.references
     require_trial(trial)
-    arm, changed = wanted.parameters or ArmParameters(), wanted.changed or ChangedMachine()
+    arm, machine = parameters or ArmParameters(), changed or ChangedMachine()
     if arm.encoder_counts < 1:
         raise UsageError(f"encoder_counts is {arm.encoder_counts}", "The logs hold counts: 1 or more per revolution.")
 
     def simulate(group: str, number: int) -> ArmRun:
         rng = np.random.default_rng([seed, trial, GROUPS.index(group), number])
-        run = simulate_arm_run(changed.arm(arm), rng, trial, IMPACT_OF[group])
-        return changed.logged_arm(run, arm.torque_constant)
+        run = simulate_arm_run(machine.arm(arm), rng, trial, IMPACT_OF[group])
+        return machine.logged_arm(run, arm.torque_constant)
 
     settings = (
         f"# Made by cdtool simulate arm --trial {trial}. Paths are relative to this file.",
@@ -171,10 +159,7 @@ def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
     log_mcap = partial(_write_mcap, references=references)
     text = _machine_toml(arm, count) if references else without_references(_machine_toml(arm, count))
     bench = Bench(simulate, log_csv, log_mcap, text, settings, _BENCHMARK_RULES)
-    return write_folder(folder, wanted.counts, wanted.file_format, bench, wanted.progress)
-
-
-write_arm_recordings = by_keywords(ArmRecordings, write_recordings_of)
+    return write_folder(folder, counts, file_format, bench, progress)
 
 
 def _write_csv(path: Path, run: ArmRun, count: float, references: bool) -> None:

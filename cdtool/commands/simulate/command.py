@@ -90,7 +90,7 @@ def gate(
     changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
     with progress("simulating", quiet=quiet) as advance:
         written = write_gate_recordings(
-            output, counts, seed, file_format, advance, references=reference, changed=changed
+            output, counts, seed, file_format=file_format, progress=advance, references=reference, changed=changed
         )
     _report(output, written, counts, seed, as_json)
 
@@ -127,7 +127,14 @@ def arm(
     changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
     with progress("simulating", quiet=quiet) as advance:
         written = write_arm_recordings(
-            *(output, counts, seed, 1 if trial == 1 else 2, file_format, advance), references=reference, changed=changed
+            output,
+            counts,
+            seed,
+            trial=1 if trial == 1 else 2,
+            file_format=file_format,
+            progress=advance,
+            references=reference,
+            changed=changed,
         )
     _report(output, written, counts, seed, as_json)
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from cdtool.base.notebook.keyword_options import by_keywords
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.simulate.gate_model import GateParameters, GateRun, simulate_gate_run
 from cdtool.commands.simulate.recording_folder import (
@@ -61,12 +59,23 @@ def as_recording(run: GateRun, name: str, parameters: GateParameters) -> Recordi
     return Recording(name, name, ("gate",), channels)
 
 
-@dataclass(frozen=True)
-class GateRecordings:
-    """Which recordings of the gate to write.
+def write_gate_recordings(  # noqa: PLR0913  # the public function: a keyword for each setting
+    folder: Path,
+    counts: Mapping[str, int],
+    seed: int,
+    *,
+    file_format: str = "csv",
+    progress: Callable[[int, int], None] | None = None,
+    parameters: GateParameters | None = None,
+    references: bool = True,
+    changed: ChangedMachine | None = None,
+) -> int:
+    """Write recordings of a simulated sliding gate to a folder, with a machine file and a benchmark file.
 
     Parameters
     ----------
+    folder : Path
+        An empty or new folder.
     counts : mapping of str to int
         Number of recordings of each group: free, holdout (both impact-free), stiff, soft.
     seed : int
@@ -82,26 +91,6 @@ class GateRecordings:
         Log reference channels.
     changed : ChangedMachine, optional
         What has changed since the machine file was written; it is that of the unchanged gate.
-    """
-
-    counts: Mapping[str, int]
-    seed: int
-    file_format: str = "csv"
-    progress: Callable[[int, int], None] | None = None
-    parameters: GateParameters | None = None
-    references: bool = True
-    changed: ChangedMachine | None = None
-
-
-def write_recordings_of(folder: Path, wanted: GateRecordings) -> int:
-    """Write recordings of a simulated sliding gate to a folder, with a machine file and a benchmark file.
-
-    Parameters
-    ----------
-    folder : Path
-        An empty or new folder.
-    wanted : GateRecordings
-        Which recordings to write.
 
     Returns
     -------
@@ -122,18 +111,15 @@ def write_recordings_of(folder: Path, wanted: GateRecordings) -> int:
     >>> sorted(path.name for path in Path("mygate").iterdir())
     ['contacts.csv', 'machine.toml', 'stiff']
     """
-    new, changed = wanted.parameters or GateParameters(), wanted.changed or ChangedMachine()
+    new, changed = parameters or GateParameters(), changed or ChangedMachine()
     gate = changed.gate(new)
 
     def simulate(group: str, number: int) -> GateRun:
-        rng = np.random.default_rng([wanted.seed, GROUPS.index(group), number])
+        rng = np.random.default_rng([seed, GROUPS.index(group), number])
         return changed.logged_gate(simulate_gate_run(gate, rng, IMPACT_OF[group]), _TORQUE_CONSTANT)
 
-    bench = gate_bench(new, simulate, wanted.references)
-    return write_folder(folder, wanted.counts, wanted.file_format, bench, wanted.progress)
-
-
-write_gate_recordings = by_keywords(GateRecordings, write_recordings_of)
+    bench = gate_bench(new, simulate, references)
+    return write_folder(folder, counts, file_format, bench, progress)
 
 
 def gate_bench(

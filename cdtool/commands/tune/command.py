@@ -16,7 +16,7 @@ from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.tune.tuning import Tuning
+    from cdtool.commands.tune.result import TuningResult
 
 _SHOWN = 110
 
@@ -89,8 +89,9 @@ def tune(
     """
     from cdtool.commands.scoring.benchmark_file import read_benchmark_file
     from cdtool.commands.tune.files import open_folder, write_tuning
+    from cdtool.commands.tune.options import TuningOptions
     from cdtool.commands.tune.tuned_files import tuning_summary
-    from cdtool.commands.tune.tuning import TuningOptions, tune_detectors
+    from cdtool.commands.tune.tuning import tune_detectors
     from cdtool.execution.workers import Workers
     from cdtool.results.results import Skipped
 
@@ -112,7 +113,7 @@ def tune(
     with progress("reading", quiet=quiet) as advance:
         done = tune_detectors(setup, replace(options, journals=searches, progress=advance))
     written = write_tuning(done, output)
-    left_out = [*done.skipped, *(Skipped(name, f"not tuned: {reason}") for name, reason in done.unusable.items())]
+    left_out = [*done.left_out, *(Skipped(name, f"not tuned: {reason}") for name, reason in done.unusable.items())]
     print_skipped(left_out, done.findings)
     if as_json:
         print_json(tuning_summary(done))
@@ -134,7 +135,7 @@ def _unwatched(detector: str, count: int, best: str) -> None:
     pass
 
 
-def _show(done: Tuning, *, quiet: bool) -> None:
+def _show(done: TuningResult, *, quiet: bool) -> None:
     from cdtool.commands.tune.page import injected_words, rejection_words
     from cdtool.commands.tune.tuned_files import described_choice
 
@@ -156,7 +157,7 @@ def _show(done: Tuning, *, quiet: bool) -> None:
         say(_meaning(done) + injected_words(done))
 
 
-def _show_table(done: Tuning) -> None:
+def _show_table(done: TuningResult) -> None:
     from cdtool.commands.tune.page import alarms_words, debounce_words, range_words
 
     rows = []
@@ -191,7 +192,7 @@ def _show_table(done: Tuning) -> None:
     table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} results")
 
 
-def _meaning(done: Tuning) -> str:
+def _meaning(done: TuningResult) -> str:
     from cdtool.commands.tune.page import apparent_words
 
     if done.is_nested:

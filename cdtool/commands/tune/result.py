@@ -9,16 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.base.errors import UsageError, nearest
+from cdtool.base.notebook.html_table import html_table
 from cdtool.base.notebook.near_attributes import NearAttributes
-from cdtool.base.notebook.presenting import described, presented
+from cdtool.base.notebook.presenting import described
 from cdtool.base.notebook.same_values import equal_by_values
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
+from cdtool.commands.judging.runs import Runs
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile
+from cdtool.commands.tune.options import TuningOptions
 from cdtool.commands.tune.search.tuned import TunedDetector
-from cdtool.commands.tune.tuning import Tuning
-from cdtool.commands.tune.tuning import tune as run_tune
+from cdtool.commands.tune.tuned_rows import TunedRow, tuned_rows
+from cdtool.results.conclusion import Severity, Statement, worst_first
 from cdtool.results.frames import rows_as_frame
-from cdtool.results.results import Skipped
+from cdtool.results.results import RecordingFinding, Skipped
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,40 +33,59 @@ if TYPE_CHECKING:
 class TuningResult(NearAttributes):
     """What a tuning chose and gained: a DataFrame, figures, and the files of `cdtool tune`.
 
-    Parameters
-    ----------
-    tuning : Tuning
-        The same as plain values: the benchmark file, the options, the runs.
+    `setup` and `options` say what was tuned, and how; `detectors` are the tuned ones, the best first: the choice, its
+    results, and what was tried around it. `unusable` maps detectors that cannot be tuned to the reason.
+    `is_nested`:
+    there are results on recordings not used for the choice. `runs` are the impact-free runs, `groups` has the number of
+    contacts by group, `left_out` the logs that were not used, and `findings` what was noticed about the others.
     """
 
-    tuning: Tuning
+    setup: BenchmarkFile
+    options: TuningOptions
+    detectors: tuple[TunedDetector, ...]
+    unusable: Mapping[str, str]
+    runs: Runs
+    groups: Mapping[str, int]
+    is_nested: bool
+    left_out: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
 
     __eq__ = equal_by_values
 
     @property
-    def detectors(self) -> tuple[TunedDetector, ...]:
-        """The tuned detectors, the best first: the choice, its results, and what was tried around it."""
-        return self.tuning.detectors
-
-    @property
     def best(self) -> TunedDetector:
         """The best detector; `best.choice` has its gains and its threshold, `best.debounce` its debounce."""
-        return self.tuning.detectors[0]
+        return self.detectors[0]
+
+    @property
+    def verdict(self) -> tuple[str, str]:
+        """Return colour and sentence of the best detector: the worst fact first, as page, screen and Python show it."""
+        best = self.detectors[0]
+        found, groups = best.honest, best.honest.groups
+        means = ", ".join(f"{name} {item.mean_ms:.3g} ms" for name, item in groups.items())
+        words = f"{best.detector} with {best.choice.rule.name} at {self.options.budget}: {means}"
+        statements = [Statement(Severity.MET, f"{words} on recordings not used for the choice")]
+        if best.nested is None:
+            statements = [Statement(Severity.APPARENT, f"apparent, on the recordings used for the choice: {words}")]
+        counts = (
+            (Severity.WITHOUT_LIMIT, "missed", sum(item.missed for item in groups.values())),
+            (Severity.NOT_ASSESSABLE, "not assessable", sum(item.not_assessable for item in groups.values())),
+        )
+        statements += [Statement(kind, f"{counted(count, 'contact')} {what}") for kind, what, count in counts if count]
+        hours = sum(item.recording.duration for item in self.runs.operations) / 3600.0
+        if excess := self.options.budget.excess((found.alarming, found.free), (found.alarming, hours)):
+            statements.append(Statement(Severity.OVER_BUDGET, f"more false alarms than the budget: {excess}"))
+        return worst_first(statements)[:2]
 
     @property
     def headline(self) -> str:
         """The verdict on the best detector in one line, the worst fact first, as the report shows it."""
-        return self.tuning.verdict[1]
-
-    @property
-    def unusable(self) -> Mapping[str, str]:
-        """The detectors that could not be tuned, with the reason."""
-        return self.tuning.unusable
+        return self.verdict[1]
 
     @cached_property
     def skipped(self) -> pd.DataFrame:
         """A row per log that was left out, with the reason."""
-        return rows_as_frame(Skipped, self.tuning.skipped)
+        return rows_as_frame(Skipped, self.left_out)
 
     def summary(self) -> pd.DataFrame:
         """Return a row per detector and group, the best detector first: what was achieved, and what the file has.
@@ -73,7 +96,8 @@ class TuningResult(NearAttributes):
             `mean_ms`, `missed` of `contacts` and `alarming` of `operations` are those of the choice, of recordings
             that chose nothing if `nested`; `default_mean_ms` is that of the benchmark file at the same budget.
         """
-        return self.tuning.summary()
+        order = {"detector": [item.detector for item in self.detectors], "group": list(self.groups)}
+        return rows_as_frame(TunedRow, list(tuned_rows(self.detectors)), order)
 
     @property
     def plot(self) -> TuningPlots:
@@ -106,15 +130,21 @@ class TuningResult(NearAttributes):
         target = location(folder)
         if target.suffix:
             raise UsageError(f"'{folder}' is the name of a file", "give a folder: result.save('tuned')")
-        check_folder(target, self.tuning.setup.inputs, [item.detector for item in self.detectors], force=force)
+        check_folder(target, self.setup.inputs, [item.detector for item in self.detectors], force=force)
         target.mkdir(parents=True, exist_ok=True)
-        return list(write_tuning(self.tuning, target))
+        return list(write_tuning(self, target))
 
     def __repr__(self) -> str:
         return f"TuningResult({counted(len(self.detectors), 'detector')}: {self.headline})"
 
     def _repr_html_(self) -> str:
-        return self.tuning._repr_html_()
+        """Return these results as a table, which a notebook shows."""
+        headings = ("detector", "group", "threshold", "mean [ms]", "default [ms]", "missed", "alarming free runs")
+        rows = []
+        for row in tuned_rows(self.detectors):
+            counts = (f"{row.missed} of {row.contacts}", f"{row.alarming} of {row.operations}")
+            rows.append((row.detector, row.group, row.threshold, row.mean_ms, row.default_mean_ms, *counts))
+        return html_table(f"Tuned: {self.verdict[1]}", headings, rows)
 
 
 @dataclass(frozen=True)
@@ -149,7 +179,7 @@ class TuningPlots(NearAttributes):
             raise UsageError(
                 "a front needs two groups of contacts", "see plot.sensitivity() for the cost around the choice"
             )
-        figure = draw_pareto(tuned, groups, self.result.tuning.options.goal)
+        figure = draw_pareto(tuned, groups, self.result.options.goal)
         return described(figure, f"{tuned.detector}: cost of {groups[1]} against that of {groups[0]} of every choice")
 
     def sensitivity(self, detector: str | None = None) -> Figure:
@@ -185,10 +215,3 @@ class TuningPlots(NearAttributes):
             names = [item.detector for item in self.result.detectors]
             raise UsageError(f"'{detector}' was not tuned", nearest(detector, names))
         return found[detector]
-
-
-tune = presented(
-    run_tune,
-    TuningResult,
-    "TuningResult\n    What was chosen and gained, the best detector first; figures and files.",
-)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,14 +11,8 @@ import numpy as np
 
 from cdtool.alarms.activation import DEBOUNCE_TIME, Activation
 from cdtool.alarms.pipeline import run_detector, signal_of_log
-from cdtool.base.errors import CdtoolError, SignatureError, UsageError, nearest
-from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.keyword_options import by_keywords
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
-from cdtool.base.plain_text import counted
+from cdtool.base.errors import CdtoolError, SignatureError, UsageError
 from cdtool.base.value_words import value_in_words
-from cdtool.commands.judging.runs import Runs
 from cdtool.commands.learning.calibration import kept
 from cdtool.commands.learning.fitting import Fitted, fitting, for_machine
 from cdtool.commands.scoring.benchmark_file import (
@@ -29,7 +23,9 @@ from cdtool.commands.scoring.benchmark_file import (
 )
 from cdtool.commands.scoring.store.determinants import how_logs_are_read
 from cdtool.commands.tune.journal import Journal
+from cdtool.commands.tune.options import TuningOptions, Watch, unwatched
 from cdtool.commands.tune.recordings_to_tune import ReadRecordings, read_recordings, to_check
+from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.search.candidate import Candidate, Measured
 from cdtool.commands.tune.search.coordinate_search import movable_gains
 from cdtool.commands.tune.search.grid import SHORTEST_DEBOUNCE, debounces_to_try, rules_to_try
@@ -50,40 +46,45 @@ from cdtool.commands.tune.search.tuned import (
     steps_of,
     tried_costs_of,
 )
-from cdtool.commands.tune.tuned_rows import TunedRow, tuned_rows
 from cdtool.execution.store.digest import code_version, digest_of
 from cdtool.execution.workers import Progress, Workers, in_order
 from cdtool.recordings.motion.applicable import HOLD
 from cdtool.recordings.operations import Operation
-from cdtool.results.conclusion import Severity, Statement, worst_first
-from cdtool.results.curves.false_alarm_budget import Budget
-from cdtool.results.frames import rows_as_frame
-from cdtool.results.results import RecordingFinding, Skipped
+from cdtool.results.results import Skipped
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.settings import with_context
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
-# Which contacts a detector is tuned on.
-IMPACTS = ("real", "injected", "both")
 # A statistic may be assessable for less time than its signal.
 _SPARE = 1.1
-# Called after each round of a search: the detector, the candidates measured so far, and the best so far in words.
-Watch = Callable[[str, int, str], None]
 
 
-def _unwatched(detector: str, count: int, best: str) -> None:
-    """Ignore a round of a search."""
-
-
-@dataclass(frozen=True)
-class TuningOptions:
-    """How detectors are tuned.
+def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
+    file: str | Path | BenchmarkFile,
+    false_alarm_budget: str,
+    *,
+    detectors: Sequence[str] = (),
+    thresholds: Sequence[str] = (),
+    objective: str = Goal.LATENCY.value,
+    impacts: str | None = None,
+    worse_at_most: float = WORSE_AT_MOST,
+    shortest_debounce: float = SHORTEST_DEBOUNCE,
+    seed: int = 0,
+    journals: Path | None = None,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+    watch: Watch = unwatched,
+) -> TuningResult:
+    """Search gains, threshold and debounce of the detectors of a benchmark file at a false-alarm budget.
 
     Parameters
     ----------
+    file : str, Path or BenchmarkFile
+        The benchmark file: [learn] has the impact-free runs, [impacts] or [inject] the contacts. The hold-out is not
+        used.
     false_alarm_budget : str
         As "1/100op" or "0.1/h", met on average, or "1/100op at 95%".
     detectors : sequence of str, optional
@@ -109,119 +110,11 @@ class TuningOptions:
         Called while logs are read.
     watch : callable, optional
         Called after each round of a search with the detector, the number of candidates and the best one so far.
-    """
-
-    false_alarm_budget: str
-    _: KW_ONLY
-    detectors: Sequence[str] = ()
-    thresholds: Sequence[str] = ()
-    objective: str = Goal.LATENCY.value
-    impacts: str | None = None
-    worse_at_most: float = WORSE_AT_MOST
-    shortest_debounce: float = SHORTEST_DEBOUNCE
-    seed: int = 0
-    journals: Path | None = None
-    workers: Workers | None = None
-    progress: Progress | None = None
-    watch: Watch = _unwatched
-
-    def __post_init__(self) -> None:
-        Budget.parse(self.false_alarm_budget)
-        choices = {
-            "objective": (self.objective, [item.value for item in Goal]),
-            "impacts": (self.impacts or IMPACTS[0], IMPACTS),
-            **{f"threshold {name}": (name, THRESHOLDS.usable_names()) for name in self.thresholds},
-        }
-        for what, (given, known) in choices.items():
-            if given not in known:
-                words = f"unknown threshold '{given}'" if what.startswith("threshold ") else f"{what} is '{given}'"
-                raise UsageError(words, nearest(given, known))
-        for what, value in (("worse_at_most", self.worse_at_most), ("shortest_debounce", self.shortest_debounce)):
-            if not 0.0 <= value < float("inf"):
-                raise UsageError(f"{what} is {value:g}", "give 0 or more")
-
-    @property
-    def budget(self) -> Budget:
-        """Return the false-alarm budget."""
-        return Budget.parse(self.false_alarm_budget)
-
-    @property
-    def goal(self) -> Goal:
-        """Return what is minimised."""
-        return Goal(self.objective)
-
-
-@dataclass(frozen=True)
-class Tuning:
-    """The tuned detectors, the best first; what was left out; and the inputs.
-
-    `unusable` maps detectors that cannot be tuned to the reason. `is_nested`: there are results on recordings not used
-    for the choice. `groups` has the number of contacts by group.
-    """
-
-    setup: BenchmarkFile
-    options: TuningOptions
-    detectors: tuple[TunedDetector, ...]
-    unusable: Mapping[str, str]
-    runs: Runs
-    groups: Mapping[str, int]
-    is_nested: bool
-    skipped: tuple[Skipped, ...]
-    findings: tuple[RecordingFinding, ...]
-
-    __repr__ = short_repr
-    __eq__ = equal_by_values
-
-    @property
-    def verdict(self) -> tuple[str, str]:
-        """Return colour and sentence of the best detector: the worst fact first, as page, screen and Python show it."""
-        best = self.detectors[0]
-        found, groups = best.honest, best.honest.groups
-        means = ", ".join(f"{name} {item.mean_ms:.3g} ms" for name, item in groups.items())
-        words = f"{best.detector} with {best.choice.rule.name} at {self.options.budget}: {means}"
-        statements = [Statement(Severity.MET, f"{words} on recordings not used for the choice")]
-        if best.nested is None:
-            statements = [Statement(Severity.APPARENT, f"apparent, on the recordings used for the choice: {words}")]
-        counts = (
-            (Severity.WITHOUT_LIMIT, "missed", sum(item.missed for item in groups.values())),
-            (Severity.NOT_ASSESSABLE, "not assessable", sum(item.not_assessable for item in groups.values())),
-        )
-        statements += [Statement(kind, f"{counted(count, 'contact')} {what}") for kind, what, count in counts if count]
-        hours = sum(item.recording.duration for item in self.runs.operations) / 3600.0
-        if excess := self.options.budget.excess((found.alarming, found.free), (found.alarming, hours)):
-            statements.append(Statement(Severity.OVER_BUDGET, f"more false alarms than the budget: {excess}"))
-        return worst_first(statements)[:2]
-
-    def summary(self) -> pd.DataFrame:
-        """Return a row per detector and group, the best detector first: what was achieved, and what the file has."""
-        order = {"detector": [item.detector for item in self.detectors], "group": list(self.groups)}
-        return rows_as_frame(TunedRow, list(tuned_rows(self.detectors)), order)
-
-    def _repr_html_(self) -> str:
-        """Return these results as a table, which a notebook shows."""
-        headings = ("detector", "group", "threshold", "mean [ms]", "default [ms]", "missed", "alarming free runs")
-        rows = []
-        for row in tuned_rows(self.detectors):
-            counts = (f"{row.missed} of {row.contacts}", f"{row.alarming} of {row.operations}")
-            rows.append((row.detector, row.group, row.threshold, row.mean_ms, row.default_mean_ms, *counts))
-        return html_table(f"Tuned: {self.verdict[1]}", headings, rows)
-
-
-def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> Tuning:
-    """Search gains, threshold and debounce of the detectors of a benchmark file at a false-alarm budget.
-
-    Parameters
-    ----------
-    file : str, Path or BenchmarkFile
-        The benchmark file: [learn] has the impact-free runs, [impacts] or [inject] the contacts. The hold-out is not
-        used.
-    options : TuningOptions
-        The budget, and what is searched for.
 
     Returns
     -------
-    Tuning
-        The tuned detectors, the best first.
+    TuningResult
+        What was chosen and gained, the best detector first; figures and files.
 
     Raises
     ------
@@ -237,6 +130,25 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
     Traceback (most recent call last):
     cdtool.base.errors.UsageError: 10 impact-free runs for a false-alarm budget of 1/20op: 19 are needed to set...
     """
+    options = TuningOptions(
+        false_alarm_budget,
+        detectors=detectors,
+        thresholds=thresholds,
+        objective=objective,
+        impacts=impacts,
+        worse_at_most=worse_at_most,
+        shortest_debounce=shortest_debounce,
+        seed=seed,
+        journals=journals,
+        workers=workers,
+        progress=progress,
+        watch=watch,
+    )
+    return tune_detectors(file, options)
+
+
+def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> TuningResult:
+    """Search gains, threshold and debounce of the detectors of a benchmark file; `cdtool.tune` states the errors."""
     workers, progress = options.workers or Workers(), options.progress
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=options.detectors)
     setup = with_detectors(setup, options.detectors) if options.detectors else setup
@@ -261,7 +173,7 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
         name, reason = next(iter(unusable.items()))
         raise UsageError(f"no detector can be tuned; {name}: {reason}", "check the logs with cdtool info")
     groups = dict(zip(read.recordings.groups, _counts(read.recordings), strict=True))
-    return Tuning(
+    return TuningResult(
         setup,
         options,
         tuple(sorted(made, key=lambda item: item.honest.score)),
@@ -272,9 +184,6 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
         tuple(dict.fromkeys((*skipped, *setup.not_made))),
         read.findings,
     )
-
-
-tune = by_keywords(TuningOptions, tune_detectors)
 
 
 def _counts(recordings: TuningRecordings) -> list[int]:

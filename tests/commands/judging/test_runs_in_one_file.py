@@ -72,7 +72,7 @@ def benchmark_file(folder: Path, name: str, operations: str, logs: str) -> Path:
 
 
 @pytest.fixture(scope="module")
-def separate(folder) -> cdtool.commands.scoring.benchmark.Benchmark:
+def separate(folder) -> cdtool.BenchmarkResult:
     return cdtool.benchmark(benchmark_file(folder, "separate", "", "{}.csv"))
 
 

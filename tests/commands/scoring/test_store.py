@@ -81,7 +81,7 @@ def write(folder: Path, threshold: str = "signature", learn: str = "", until: st
     return folder / "b.toml"
 
 
-def bytes_of(done: cdtool.commands.scoring.benchmark.Benchmark) -> bytes:
+def bytes_of(done: cdtool.BenchmarkResult) -> bytes:
     return to_json(done.results).encode() + encode_traces(done.traces)
 
 

@@ -23,7 +23,8 @@ from cdtool.commands.tune.page import tuning_html
 from cdtool.commands.tune.recordings_to_tune import read_recordings
 from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.tuned_files import tuning_summary
-from cdtool.commands.tune.tuning import TuningOptions, tune_detectors
+from cdtool.commands.tune.options import TuningOptions
+    from cdtool.commands.tune.tuning import tune_detectors
 from cdtool.execution.workers import Workers
 from cdtool.formats.signature_store import read_signature
 from cdtool.recordings.log_section import LogSection, Mark
