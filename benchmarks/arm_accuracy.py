@@ -40,7 +40,7 @@ from timing import environment, table
 
 from cdtool.commands.simulate.arm_model import simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
-from cdtool.commands.simulate.arm_recordings import as_recording, write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
 from cdtool.commands.simulate.recording_folder import GROUPS, IMPACT_OF
 from cdtool.detectors import DETECTORS
 from cdtool.recordings.recording import Recording
@@ -97,9 +97,7 @@ def main(seeds: tuple[int, ...]) -> int:
     print(f"== latency on the simulated arm [ms], seeds {' '.join(map(str, seeds))}\n{environment()}", flush=True)
     scores: dict[int, Scores] = {}
     for trial in TRIALS:
-        bench = Bench(
-            written_setup(partial(write_arm_recordings, seed=0, trial=trial)), COUNTS, partial(simulate, trial)
-        )
+        bench = Bench(written_setup(partial(simulate_arm, seed=0, trial=trial)), COUNTS, partial(simulate, trial))
         detectors = [DETECTORS.load(name).short_name for name in bench.setup.detectors]
         scores[trial] = {seed: score_seed(bench, seed, detectors) for seed in seeds}
     table(

@@ -151,7 +151,7 @@ def gate_bench(name: str, gate: GateParameters, **kept: Any) -> Bench:
         run = simulate_gate_run(one, np.random.default_rng(seed), impact, added_friction=friction)
         return gate_recordings.as_recording(run, f"{name}/{seed[-1]}", one)
 
-    setup = written_setup(partial(gate_recordings.write_gate_recordings, seed=0, parameters=gate))
+    setup = written_setup(partial(gate_recordings.simulate_gate, seed=0, parameters=gate))
     detectors = ("momentum", "inertial_momentum", "friction_ekf", "pure_inertia", "pure_torque", "kalman_momentum")
     steady = gate.start_time + gate.nominal_speed / gate.ramp_acceleration + 0.5
     return Bench(name, setup, simulate, (), 90.0, steady, detectors, **kept)
@@ -165,7 +165,7 @@ def arm_bench(name: str, trial: Any, arm: ArmParameters, **kept: Any) -> Bench:
         run = simulate_arm_run(one, np.random.default_rng(seed), trial, impact, added_friction=friction)
         return arm_recordings.as_recording(run, f"{name}/{seed[-1]}")
 
-    setup = written_setup(partial(arm_recordings.write_arm_recordings, seed=0, trial=trial, parameters=arm))
+    setup = written_setup(partial(arm_recordings.simulate_arm, seed=0, trial=trial, parameters=arm))
     detectors = ("momentum", "inertial_momentum", "friction_ekf", "kalman_momentum", "direct")
     steady = arm.start_time + arm.nominal_speed / arm.ramp_acceleration + 0.25
     return Bench(name, setup, simulate, ("arm",) if trial == 1 else (), 1.0, steady, detectors, **kept)

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 
 # What is simulated; each scored one is copied with another last digit, since recordings of equal content are refused.
 _SIMULATED = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
@@ -24,7 +24,7 @@ def write_fleet(folder: Path, recordings: int, seed: int = SEED) -> Path:
     """Write a benchmark file with so many scored recordings and 14 impact-free ones; return the benchmark file."""
     with tempfile.TemporaryDirectory() as name:
         base = Path(name)
-        write_gate_recordings(base, _SIMULATED, seed, file_format="csv")
+        simulate_gate(base, _SIMULATED, seed, file_format="csv")
         folder.mkdir(parents=True, exist_ok=True)
         for file in ("benchmark.toml", "machine.toml"):
             (folder / file).write_bytes((base / file).read_bytes())

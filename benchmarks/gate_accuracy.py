@@ -35,7 +35,7 @@ from accuracy import (
 from timing import environment, table
 
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import GROUPS, as_recording, write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import GROUPS, as_recording, simulate_gate
 from cdtool.commands.simulate.recording_folder import IMPACT_OF
 from cdtool.detectors import DETECTORS
 from cdtool.recordings.recording import Recording
@@ -62,7 +62,7 @@ def main(seeds: tuple[int, ...]) -> int:
     print(f"== latency on the simulated gate [ms], seeds {' '.join(map(str, seeds))}\n{environment()}", flush=True)
     known = [DETECTORS.load(name).short_name for name in DETECTORS.names()]
     detectors = [*ASKED, *(name for name in known if name not in ASKED)]
-    bench = Bench(written_setup(partial(write_gate_recordings, seed=0)), COUNTS, simulate)
+    bench = Bench(written_setup(partial(simulate_gate, seed=0)), COUNTS, simulate)
     scores = {seed: score_seed(bench, seed, detectors) for seed in seeds}
     table(("", *map(str, seeds), "mean +- std", *HEADS), [row for cell in CELLS for row in rows(cell, scores)])
     print("false: alarms over all hold-out and impact runs of all seeds, so the same in both cells; std over")

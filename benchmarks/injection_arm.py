@@ -36,7 +36,7 @@ from cdtool.commands.learning.fitting import fit_operations  # noqa: E402
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile  # noqa: E402
 from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run  # noqa: E402
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial  # noqa: E402
-from cdtool.commands.simulate.arm_recordings import as_recording, write_arm_recordings  # noqa: E402
+from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402
 from cdtool.detectors.base import Detector  # noqa: E402
 from cdtool.machines.axis_model.axis_run import axis_run  # noqa: E402
@@ -91,7 +91,7 @@ class Latencies:
 
 def setup_of(trial: Trial) -> BenchmarkFile:
     """Return machine and rules as `cdtool simulate arm` writes them."""
-    return written_setup(partial(write_arm_recordings, seed=0, trial=trial))
+    return written_setup(partial(simulate_arm, seed=0, trial=trial))
 
 
 def simulated(trial: Trial, seed: tuple[int, ...], impact: Impact) -> tuple[Recording, float | None]:

@@ -43,8 +43,8 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.learning.fitting import Fit, Pair, fitting
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.operations import Operation, operations_of
@@ -60,9 +60,9 @@ from cdtool.truth.onset import find_contacts
 
 SEED, FAULTS, SIGNIFICANT = 1501, 10, 0.05
 MACHINES: Mapping[str, tuple[Any, Any]] = {
-    "gate": (partial(write_gate_recordings, seed=0), gate_accuracy.simulate),
-    "T1": (partial(write_arm_recordings, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
-    "T2": (partial(write_arm_recordings, seed=0, trial=2), partial(arm_accuracy.simulate, 2)),
+    "gate": (partial(simulate_gate, seed=0), gate_accuracy.simulate),
+    "T1": (partial(simulate_arm, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
+    "T2": (partial(simulate_arm, seed=0, trial=2), partial(arm_accuracy.simulate, 2)),
 }
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from mcap_logs import FLAT, JOINTS, write_log
 from timing import Spread, main, ratio, table, verdict
 
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 
 HERE = Path(__file__).resolve().parent
 SAMPLES = HERE.parent / "sample_logs" / "gate"
@@ -115,7 +115,7 @@ def measure(before: str | None) -> bool:
             print("skip  what is compared with an earlier cdtool: name its Python by --before")
             return all(held)
         held += [_memory(log, logs[log], before) for log in LARGE]
-        write_gate_recordings(folder / "gate", COUNTS, seed=1, file_format="csv")
+        simulate_gate(folder / "gate", COUNTS, seed=1, file_format="csv")
         whole = ["benchmark", str(folder / "gate" / "benchmark.toml"), "--json"]
         first = ["benchmark", str(SAMPLES / "benchmark.toml"), "--json"]
         held.append(_commands("benchmark of 200 recordings", whole, before, BENCHMARK_AT_MOST))

@@ -28,8 +28,8 @@ from cdtool.alarms.pipeline import judge, run_detector
 from cdtool.commands.learning.fitting import Pair
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.signature.coverage import check_coverage
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Recording
 from cdtool.results.curves.sweep import critical_factor
@@ -46,8 +46,8 @@ ASKED = (1 / 100, 1 / 300)
 ONE_CELL = 2.0
 
 BENCHES = {
-    "gate": (partial(write_gate_recordings, seed=0), gate_accuracy.simulate),
-    "arm, trial 1": (partial(write_arm_recordings, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
+    "gate": (partial(simulate_gate, seed=0), gate_accuracy.simulate),
+    "arm, trial 1": (partial(simulate_arm, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
 }
 
 

@@ -22,7 +22,7 @@ from typing import Any
 from timing import Spread, interleaved, main, ratio, table, verdict
 
 import cdtool
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 
 HELP_ROUNDS = 25
 COMMAND_ROUNDS = 7
@@ -142,7 +142,7 @@ def _times(task: Callable[[], object]) -> tuple[float, float]:
 
 def _detect(folder: Path, environment: dict[str, str]) -> bool:
     logs = folder / "gate"
-    write_gate_recordings(logs, {"free": 10, "stiff": 1}, seed=1, file_format="csv")
+    simulate_gate(logs, {"free": 10, "stiff": 1}, seed=1, file_format="csv")
     command = str(folder / "cdtool_command.py")
     machine = ["--machine", str(logs / "machine.toml")]
     signature, plot = logs / "feekf.json", folder / "plot.png"

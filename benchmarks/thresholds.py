@@ -31,8 +31,8 @@ from timing import environment, table
 from cdtool.alarms.pipeline import detect_operation
 from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.commands.scoring.learned_thresholds import learn_thresholds
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording
@@ -48,9 +48,9 @@ COUNTS = {"free": 1000, HOLDOUT: 300, "stiff": 100, "soft": 100}
 BUDGET = Budget(1 / 100, "operation")
 LEAST_P = 0.01
 BENCHES: Mapping[str, tuple[Any, Any]] = {
-    "gate": (partial(write_gate_recordings, seed=0), gate_accuracy.simulate),
-    "T1": (partial(write_arm_recordings, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
-    "T2": (partial(write_arm_recordings, seed=0, trial=2), partial(arm_accuracy.simulate, 2)),
+    "gate": (partial(simulate_gate, seed=0), gate_accuracy.simulate),
+    "T1": (partial(simulate_arm, seed=0, trial=1), partial(arm_accuracy.simulate, 1)),
+    "T2": (partial(simulate_arm, seed=0, trial=2), partial(arm_accuracy.simulate, 2)),
 }
 # Thresholds with the same whitening: the same signature, the same order.
 WHITENING = ("innovation", "cusum", "glr")

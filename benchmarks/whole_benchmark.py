@@ -26,7 +26,7 @@ from time import perf_counter, process_time
 from timing import Spread, main, ratio, table, verdict
 
 from cdtool.commands.scoring.benchmark import benchmark
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 
 COUNTS = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
 COPIES = 10
@@ -84,7 +84,7 @@ def _logs(folder: Path) -> tuple[list[Path], list[Path]]:
 def measure() -> bool:
     with tempfile.TemporaryDirectory() as name:
         few, many = Path(name) / "200", Path(name) / "2000"
-        write_gate_recordings(few, COUNTS, SEED, file_format="csv")
+        simulate_gate(few, COUNTS, SEED, file_format="csv")
         _multiply(few, many)
         found: dict[str, list[dict[str, float]]] = {"200, 1 job": [], "2000, 1 job": [], "2000, 2 jobs": []}
         peers, together = [], []
@@ -170,7 +170,7 @@ def guard() -> bool:
     """Compare with the bare script in this process, in turns: the ratio of two costs, whatever the machine's speed."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_gate_recordings(folder, GUARD_COUNTS, SEED, file_format="csv")
+        simulate_gate(folder, GUARD_COUNTS, SEED, file_format="csv")
         pairs = [(run(str(folder), 1)["cpu"], bare(str(folder))) for _ in range(1 + GUARD_ROUNDS)][1:]
     ours, theirs = (min(each) for each in zip(*pairs, strict=True))
     smallest = Spread.of([ours / theirs])

@@ -21,9 +21,9 @@ from functools import partial
 from pathlib import Path
 
 from cdtool.commands.scoring.benchmark import benchmark
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.commands.simulate.gate_model import GateParameters
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 from cdtool.results.results import Results
 
 DETECTORS = ("pi", "feekf", "gm", "igm", "pt", "vo", "eo", "dd", "kmo")
@@ -56,9 +56,9 @@ def other_speed(results: Results) -> Iterator[str]:
 def compare(name: str, seed: int, impacts: int, folder: Path) -> list[str]:
     """What differs between the two ways to log."""
     writers = {
-        "gate": write_gate_recordings,
-        "arm, trial 1": partial(write_arm_recordings, trial=1),
-        "arm, trial 2": partial(write_arm_recordings, trial=2),
+        "gate": simulate_gate,
+        "arm, trial 1": partial(simulate_arm, trial=1),
+        "arm, trial 2": partial(simulate_arm, trial=2),
     }
     counts = {"free": 14, "holdout": 0, "stiff": impacts, "soft": impacts}
     both = []
@@ -90,7 +90,7 @@ def early(seed: int, folder: Path) -> list[str]:
     for place in EARLY:
         gate = replace(base, obstacle_position=place, obstacle_scatter=0.002)
         target = folder / f"{place}"
-        write_gate_recordings(target, {"free": 14, "stiff": 2, "soft": 2}, seed, parameters=gate, references=False)
+        simulate_gate(target, {"free": 14, "stiff": 2, "soft": 2}, seed, parameters=gate, references=False)
         results = results_of(target)
         counts = dict.fromkeys(("detected", "missed", "not_assessable"), 0)
         for item in results.contacts:

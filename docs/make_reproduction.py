@@ -18,8 +18,8 @@ import cdtool
 from cdtool.alarms.activation import ActivationSettings
 from cdtool.commands.detect.plot import plot_detected
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.signature_store import write_signature
 from cdtool.recordings.recording import Recording
@@ -65,9 +65,9 @@ MACHINES = {"gate": "gate", "arm1": "arm, trial 1", "arm2": "arm, trial 2"}
 
 def simulate(work: Path) -> None:
     """The three folders of recordings, with the detectors that the thesis compares."""
-    write_gate_recordings(work / "gate", COUNTS, SEED)
-    write_arm_recordings(work / "arm1", COUNTS, SEED, 1)
-    write_arm_recordings(work / "arm2", COUNTS, SEED, 2)
+    simulate_gate(work / "gate", COUNTS, SEED)
+    simulate_arm(work / "arm1", COUNTS, SEED, 1)
+    simulate_arm(work / "arm2", COUNTS, SEED, 2)
     setup = work / "gate" / "benchmark.toml"
     text = re.sub(r"^detectors = .*$", 'detectors = ["pi", "feekf", "gm", "pt"]', setup.read_text(), flags=re.M)
     setup.write_text(text, encoding="utf-8")

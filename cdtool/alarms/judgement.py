@@ -14,7 +14,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.kernels import kernel
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Band, Signal, Status, StatusArray, contiguous
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.motion.applicable import HOLD, Motion, judging_classes, speed_is_recent
@@ -41,8 +40,6 @@ class _Share:
     signal: Signal
     rows: slice
     judges: BoolArray
-
-    __repr__ = short_repr
 
     @cached_property
     def evaluated(self) -> tuple[Signal, Band]:
@@ -73,8 +70,6 @@ class Judgement:
     thresholds: tuple[FittedThreshold, ...]
     strokes: tuple[Stroke, ...]
     hold: float = HOLD
-
-    __repr__ = short_repr
 
     @property
     def classes(self) -> tuple[MotionClass, ...]:

@@ -12,7 +12,6 @@ import numpy.typing as npt
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.judgement import Judgement, judged
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
 from cdtool.detectors.detection import REASONS, Alarm, Band, Signal, Status, Verdict
@@ -59,8 +58,6 @@ class Detection:
     threshold: FittedThreshold | None = None
     judgement: Judgement | None = None
     rows: slice = field(default_factory=lambda: slice(None))
-
-    __repr__ = short_repr
 
     def exceedance(self) -> FloatArray:
         """Return for each sample (n, J) the safety factor at which its limit would be met; -inf without a threshold."""

@@ -11,7 +11,6 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.base.kernels import kernel
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Signal, Status, StatusArray
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.recordings.clock import previous_value
@@ -305,8 +304,6 @@ class Drive:
     missing: BoolArray
     speed_missing: BoolArray
     coupled: bool = False
-
-    __repr__ = short_repr
 
     @property
     def interrupted(self) -> BoolArray:

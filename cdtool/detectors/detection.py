@@ -13,8 +13,6 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import ConfigurationError, nearest
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
 
 StatusArray = npt.NDArray[np.uint8]
 
@@ -44,7 +42,7 @@ REASONS: Mapping[int, str] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Signal:
     """Collision detection signal: `time` (n,) s, `values` and `status` (n, J), `unit`.
 
@@ -64,8 +62,8 @@ class Signal:
     notes: tuple[str, ...] = ()
     lost: BoolArray | None = None
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Signal({len(self.time)} samples of {', '.join(self.joints)}, unit={self.unit!r})"
 
     @property
     def valid(self) -> BoolArray:
@@ -136,15 +134,15 @@ class Signal:
         return ", ".join(f"{text} {100.0 * share:.0f} %" for text, share in shares.items()) or "no samples"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Band:
     """Lower and upper limit of a statistic, both (n, J); infinite = not limited, NaN = no limit known."""
 
     lower: FloatArray
     upper: FloatArray
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Band({len(self.lower)} samples)"
 
     def part(self, rows: slice) -> Band:
         """Return these rows of the band; the band itself for all rows."""
@@ -226,5 +224,3 @@ class Verdict:
     reason: str = ""
     crossings: tuple[Alarm, ...] = ()
     rearmed: tuple[float, ...] = ()
-
-    __repr__ = short_repr

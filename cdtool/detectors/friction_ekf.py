@@ -10,7 +10,6 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.kernels import read_only
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.base import (
     drive_of,
     for_every_joint,
@@ -52,8 +51,6 @@ class JointMeasurements:
     missing: StatusArray
     acceleration_time: FloatArray
     acceleration: FloatArray
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

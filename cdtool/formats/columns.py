@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 
 # Codes are integers from -2^52 down by less than 2^48: float64 represents integers down to -2^53 exactly.
 _FIRST_CODE, _CODE_BYTES = 2**52, 6
@@ -39,8 +38,6 @@ class Column:
     time: FloatArray | None = None
     unit: str | None = None
     words: Mapping[float, str] = field(default_factory=dict)
-
-    __repr__ = short_repr
 
 
 class Categories:
@@ -81,5 +78,3 @@ class Piece:
     values: Mapping[str, FloatArray]
     rows: int
     origin: float = 0.0
-
-    __repr__ = short_repr

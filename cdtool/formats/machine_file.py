@@ -15,7 +15,6 @@ from typing import Any
 
 from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import location
 from cdtool.base.tables import Table, read_toml
@@ -23,7 +22,7 @@ from cdtool.formats.channels.channel_map import ChannelMap, TablePins, read_chan
 from cdtool.machines.dynamics import Gain, Machine
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MachineFile(StoresDerived):
     """A validated machine file: the machine, its channels, and gains that differ from the defaults.
 
@@ -38,7 +37,8 @@ class MachineFile(StoresDerived):
     digest: str
     model: Any = None
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return f"MachineFile({str(self.path)!r}: {self.machine.name}, joints {', '.join(self.machine.joints)})"
 
     @property
     def force_reduction(self) -> str:

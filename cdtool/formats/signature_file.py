@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import SignatureError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted, digits, first_of
 from cdtool.base.value_words import value_in_words
 from cdtool.formats.machine_file import fingerprint, machine_parameters
@@ -48,7 +47,7 @@ class FactorOrigin:
         return f"{set_on}, before {counted(self.added, 'more run')}" if self.added else set_on
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SignatureFile:
     """The thresholds of one machine and one detector with its gains: for a signature, one per class of motion.
 
@@ -77,7 +76,8 @@ class SignatureFile:
     normal: tuple[NormalMotion, ...] | None = ()
     machine_parameters: Mapping[str, Any] | None = None
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return f"SignatureFile({self.machine}, {self.detector}, {self.threshold} of {len(self.runs)} runs)"
 
     @property
     def threshold(self) -> str:

@@ -14,7 +14,6 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.base import ContactLaw, KeepsIndentation, StoresEnergy
@@ -43,8 +42,6 @@ class _Stretch:
     start: float
     end: float
     event: int | None
-
-    __repr__ = short_repr
 
     def forces(self, times: FloatArray) -> FloatArray:
         """Force [N] at times (n,)."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.restitution import Restitution, newton, poisson, stronge
 
 
@@ -37,8 +36,6 @@ class Impact:
     turn: int
     peak_force: float
     separated: bool
-
-    __repr__ = short_repr
 
     @property
     def duration(self) -> float:

@@ -14,7 +14,6 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError, nearest
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import SpeedController
@@ -41,8 +40,6 @@ class ImpactCase:
     obstacle: HuntCrossley
     speed: float
     window: float = 0.5
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         require_positive("speed", self.speed, "m/s")
@@ -85,8 +82,6 @@ class SensorResponse:
     remedy: str
     saving: float | None
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class Ranking:
@@ -103,8 +98,6 @@ class Ranking:
     contact_force: FloatArray
     swing_duration: float
     rigidity: Rigidity
-
-    __repr__ = short_repr
 
     @property
     def peak_force(self) -> float:

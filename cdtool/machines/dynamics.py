@@ -10,7 +10,6 @@ from dataclasses import Field, dataclass
 from typing import Any, ClassVar, Protocol, TypeGuard
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Recording
 
 # A gain: one number for all joints, or one per joint (the thesis's diagonal gain matrix, 2.13 and 2.19).
@@ -31,8 +30,6 @@ class Pendulum:
     other_speed: FloatArray
     other_acceleration: FloatArray
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class JointEquation:
@@ -46,8 +43,6 @@ class JointEquation:
     force: FloatArray
     viscous: float
     pendulum: Pendulum | None = None
-
-    __repr__ = short_repr
 
 
 class Machine(Protocol):

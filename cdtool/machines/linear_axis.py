@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.machines.axis import Axis
 from cdtool.machines.joint_machine import LINEAR_UNITS
 
@@ -20,8 +19,6 @@ class LinearAxis(Axis):
 
     inertia_key: ClassVar[str] = "load_mass"
     ratio_unit: ClassVar[str] = "m/rad"
-
-    __repr__ = short_repr
 
     @property
     def load_units(self) -> dict[str, str]:

@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError, UsageError, nearest
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.motion import MotionClass, leading_joint, motion_class
 from cdtool.recordings.recording import Recording
 
@@ -50,8 +49,6 @@ class Operation:
     number: int = 0
     log: Recording | None = None
     cut: str = "whole"
-
-    __repr__ = short_repr
 
     @property
     def whole(self) -> Recording:

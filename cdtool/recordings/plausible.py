@@ -18,7 +18,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.findings import Finding
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import MEASURED, REFERENCES, Recording, Series
 
 # No channel of a machine reaches this value in SI: 1e9 N m, rad/s or rad.
@@ -77,8 +76,6 @@ class PlausibleRanges:
 
     channels: Mapping[str, ChannelRange]
     contradicted: tuple[Finding, ...] = ()
-
-    __repr__ = short_repr
 
     @classmethod
     def learned(cls, recordings: Sequence[Recording]) -> Self:

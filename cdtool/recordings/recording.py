@@ -15,9 +15,7 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import RecordingError, nearest
 from cdtool.base.findings import Finding
-from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.plain_text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +39,7 @@ CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
 _MOST_AXES = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Series(StoresDerived):
     """One channel: `time` (n,) s strictly increasing, `values` (n, J) float64 in `unit`; NaN = no sample.
 
@@ -51,9 +49,6 @@ class Series(StoresDerived):
     time: FloatArray
     values: FloatArray
     unit: str
-
-    __repr__ = short_repr
-    __eq__ = equal_by_values
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -81,6 +76,9 @@ class Series(StoresDerived):
             state[name].flags.writeable = False
         self.__dict__.update(state)
 
+    def __repr__(self) -> str:
+        return f"Series({len(self)} samples, {counted(self.joint_count, 'column')}, unit={self.unit!r})"
+
     def __len__(self) -> int:
         return len(self.time)
 
@@ -101,15 +99,12 @@ class Series(StoresDerived):
         return self._with(self.time[first:last], self.values[first:last], self.unit)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TableRows:
     """The rows of a table on its clock: `time` (n,) [s] of those that are kept; `kept` (m,), None if all are."""
 
     time: FloatArray
     kept: BoolArray | None = None
-
-    __repr__ = short_repr
-    __eq__ = equal_by_values
 
     @property
     def count(self) -> int:
@@ -134,7 +129,7 @@ class TableRows:
 _IN_2001, _IN_2100 = 1e9, 4.1e9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording(StoresDerived):
     """One log: its channels as Series, on the load side, each at its own rate.
 
@@ -156,9 +151,6 @@ class Recording(StoresDerived):
     truth_clock: float = 0.0
     label_kinds: tuple[tuple[float, str], ...] = ()
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
-
     def __post_init__(self) -> None:
         for name, series in self.channels.items():
             if name not in CHANNELS:
@@ -175,6 +167,10 @@ class Recording(StoresDerived):
         """Raise AttributeError, which says how to read a channel."""
         hint = f"; use recording['{name}']" if name in vars(self).get("channels", ()) else ""
         raise AttributeError(f"Recording has no attribute '{name}'{hint}")
+
+    def __repr__(self) -> str:
+        channels = ", ".join(self.channels)
+        return f"Recording({self.name!r}, {self.duration:.3g} s, joints {', '.join(self.joints)}: {channels})"
 
     def __contains__(self, channel: str) -> bool:
         return channel in self.channels
@@ -262,21 +258,6 @@ class Recording(StoresDerived):
         parts = self.joints if of_joints else [str(number) for number in range(1, series.joint_count + 1)]
         for part in parts:
             yield f"{name} {part}{unit}" if series.joint_count > 1 else f"{name}{unit}"
-
-    def _repr_html_(self) -> str:
-        """Return the channels as a table, which a notebook shows."""
-        rows = [
-            (
-                name,
-                series.unit or "–",
-                series.joint_count,
-                len(series),
-                1.0 / series.period if len(series) > 1 else None,
-            )
-            for name, series in self.channels.items()
-        ]
-        caption = f"{self.name}: {self.duration:.3g} s, joints: {', '.join(self.joints)}"
-        return html_table(caption, ("channel", "unit", "columns", "samples", "rate [Hz]"), rows)
 
     def own_clock(self, clock: FloatArray) -> FloatArray | None:
         """Return the times of the first channel whose times equal those of `clock` [s]; None without such a channel.

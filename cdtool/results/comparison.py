@@ -9,7 +9,6 @@ from itertools import combinations
 from typing import NamedTuple
 
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.results.results import ContactResult, Results
 from cdtool.results.rows import grouped, values_of
 from cdtool.results.summary import campaigns
@@ -74,8 +73,6 @@ class Comparison:
     only_first_missed: int
     only_second_missed: int
     missed_p: float
-
-    __repr__ = short_repr
 
     @property
     def faster(self) -> str | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.results.comparison import Comparison, compare_detectors
 from cdtool.results.conclusion import conclude
 from cdtool.results.limits import LimitRule, check_limits
@@ -26,8 +25,6 @@ class Evaluated:
     comparisons: tuple[Comparison, ...]
     kinds: tuple[Summary, ...] = ()
     conditions: tuple[Summary, ...] = ()
-
-    __repr__ = short_repr
 
     def with_protocol(self, *protocol: str) -> Evaluated:
         """Return it with the verdict of a test protocol in its conclusion: outcome, sentence, and the reasons."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from html import escape
 from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 from cdtool.results.files.results_folder import tables
@@ -58,6 +59,14 @@ def rows_as_frame(
         else:
             columns[item.name] = pd.Series(values, dtype=_dtype_of(hints[item.name]))
     return pd.DataFrame(columns)
+
+
+def notebook_table(caption: str, frame: pd.DataFrame) -> str:
+    """Return a frame as HTML below a caption, which a notebook shows; of many rows the first and the last ten."""
+    table = frame.to_html(
+        index=False, na_rep="–", float_format="{:.4g}".format, max_rows=20, show_dimensions=len(frame) > 20
+    )
+    return f"<p>{escape(caption)}</p>{table}"
 
 
 def results_as_frame(results: Results, table: str) -> pd.DataFrame:

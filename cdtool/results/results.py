@@ -12,7 +12,6 @@ from pathlib import PureWindowsPath
 from typing import Any, Self
 
 from cdtool.base.findings import Finding
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.results.rows import picked, values_of
 
 SCHEMA_VERSION = 4
@@ -145,8 +144,6 @@ class ExposureResult:
     not_assessable: int = meant("operations without an assessable sample", default=0)
     not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class ConditionResult:
@@ -266,8 +263,6 @@ class ConclusionResult:
         default=(),
     )
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class Skipped:
@@ -321,8 +316,6 @@ class Results:
         default_factory=ConclusionResult, metadata={"meaning": "the conclusion from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
-
-    __repr__ = short_repr
 
     @property
     def every_group(self) -> tuple[str, ...]:

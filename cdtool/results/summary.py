@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted
 from cdtool.results.results import ContactResult, ExposureResult, ForceResult, Results
 from cdtool.results.rows import Rows, grouped, values_of
@@ -71,8 +70,6 @@ class Summary:
     later_ms: float = 0.0
     force_holes: int = 0
     alarming: int = 0
-
-    __repr__ = short_repr
 
     @property
     def watched(self) -> bool:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Contact
 from cdtool.results.results import ForceResult, Results
 from cdtool.results.traces.trace import Trace
@@ -37,8 +36,6 @@ class TracedForce:
     force: FloatArray
     verdict: ForceVerdict
     alarms: Mapping[str, float]
-
-    __repr__ = short_repr
 
 
 def force_profiles(results: Results) -> dict[str, ForceProfile]:

@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 
 IntArray = npt.NDArray[np.intp]
 # More clusters than this are put together before they are resampled, flipped or exchanged.
@@ -38,8 +37,6 @@ class Clusters:
     values: FloatArray
     number: IntArray
     counts: IntArray
-
-    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.counts)

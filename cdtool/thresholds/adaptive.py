@@ -10,7 +10,6 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import NothingValidError, SignatureError, UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Band, Signal
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.recording import Recording, Series
@@ -37,8 +36,6 @@ class FittedAdaptive:
     spread: FloatArray
     signed: bool
     safety_factor: float
-
-    __repr__ = short_repr
 
     def with_safety_factor(self, factor: float) -> FittedAdaptive:
         """Return the threshold with its limits `factor` standard deviations beyond what the references explain."""

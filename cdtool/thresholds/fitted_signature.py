@@ -15,7 +15,6 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.derived import SendsFields
 from cdtool.base.errors import SignatureError, UsageError, nearest
 from cdtool.base.kernels import READ_ONLY, fields_of, kernel, read_only
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.value_words import value_in_words
 from cdtool.detectors.detection import Band, Signal, Status, StatusArray
 from cdtool.recordings.motion import MotionClass
@@ -68,8 +67,6 @@ class FittedSignature(SendsFields):
     by_position: Curve
     adaptive_level: float = 0.0
     speed_range: bool = False
-
-    __repr__ = short_repr
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
         """Return the signal and its band on the signal's clock; raises RecordingError without speed and position.

@@ -8,7 +8,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import SignatureError, UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion.progress import Progress
 from cdtool.recordings.recording import Recording
@@ -114,8 +113,6 @@ class _Part:
     first: tuple[FloatArray, FloatArray]
     updated: tuple[FloatArray, FloatArray]
     spread: FloatArray
-
-    __repr__ = short_repr
 
     def check(self, reserve: float, unit: str) -> None:
         """Raise SignatureError if a limit is lost, or further than `reserve` spreads from the first one."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Band, Signal
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.recording import Recording
@@ -40,8 +39,6 @@ class FittedTrendTable:
     limits: tuple[FittedLimit, ...]
     time_constant: float
     motion: MotionClass | None
-
-    __repr__ = short_repr
 
     @property
     def safety_factor(self) -> float:

@@ -8,7 +8,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.normal_motion import Comparison, NormalMotion
 
@@ -36,8 +35,6 @@ class NormalMotions:
 
     motions: tuple[NormalMotion, ...] = ()
     absent: Absence = Absence.BY_HAND
-
-    __repr__ = short_repr
 
     def for_one_operation(self) -> NormalMotions:
         """Return a copy for the alarms of several detectors in one operation: it compares each channel only once."""

@@ -16,7 +16,6 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.derived import SendsFields, StoresDerived
 from cdtool.base.kernels import READ_ONLY, kernel
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
@@ -55,8 +54,6 @@ class NormalChannel:
     samples: NormalCurves
     level: NormalCurves
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class Comparison(StoresDerived):
@@ -79,8 +76,6 @@ class Comparison(StoresDerived):
     reach: FloatArray
     level_reach: FloatArray
 
-    __repr__ = short_repr
-
     @cached_property
     def distance(self) -> FloatArray:
         """Return the distance of the values from the mean (n, J) [spreads]; NaN if unknown."""
@@ -100,8 +95,6 @@ class NormalMotion:
     joints: tuple[str, ...]
     runs: int
     channels: Mapping[str, NormalChannel]
-
-    __repr__ = short_repr
 
     def compare(
         self, recording: Recording, channel: str, start: float = -math.inf, end: float = math.inf
@@ -412,8 +405,6 @@ class NormalCurves(SendsFields):
     by_travel: Curve | None
     farthest_by_time: FloatArray
     farthest_by_travel: FloatArray
-
-    __repr__ = short_repr
 
     def at(self, where: Progress, least: float) -> tuple[FloatArray, FloatArray]:
         """Return mean and spread (n, J) at each location of a run; NaN where there are too few runs.

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Signal, Status
 
 # (values, steps) -> output, all (m,); step: time since the previous sample [s], infinite where a section begins.
@@ -27,8 +26,6 @@ class Sections:
     index: npt.NDArray[np.intp]
     step: FloatArray
     elapsed: FloatArray
-
-    __repr__ = short_repr
 
 
 def section_bounds(step: FloatArray) -> list[tuple[int, int]]:

@@ -13,7 +13,6 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.derived import SendsFields
 from cdtool.base.kernels import READ_ONLY, kernel, read_only
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion.progress import Progress
 from cdtool.recordings.motion.smoothing import moving_mean
@@ -41,8 +40,6 @@ class Curve(SendsFields):
     count: FloatArray
     mean: FloatArray
     squares: FloatArray
-
-    __repr__ = short_repr
 
     @classmethod
     def empty(cls, step: float, window: float, end: float, joints: int) -> Self:

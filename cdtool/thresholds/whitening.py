@@ -16,7 +16,6 @@ import numpy.typing as npt
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import NothingValidError
 from cdtool.base.kernels import READ_ONLY, kernel
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.clock.lost_samples import lost_samples
 from cdtool.recordings.recording import Recording
@@ -52,8 +51,6 @@ class Whitening:
     coefficients: FloatArray
     spread: FloatArray
     period: float
-
-    __repr__ = short_repr
 
     @classmethod
     def learned(cls, rule: Signature, order: int, pairs: Sequence[tuple[Recording, Signal]]) -> Self:

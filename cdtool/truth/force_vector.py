@@ -18,7 +18,6 @@ from functools import cached_property
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.truth.load_cell import BEFORE_ONSET, BURST, ROUNDING, ContactSearch, reading_step
 from cdtool.truth.missing_samples import CellClock, CellSamples
@@ -45,8 +44,6 @@ class ForceMagnitude(Series):
     noise: float
     step: float
     pressed_until: float
-
-    __repr__ = short_repr
 
     @property
     def rest(self) -> FloatArray:

@@ -17,7 +17,6 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Alarm, Signal, Verdict
 from cdtool.recordings.recording import Contact
 
@@ -46,8 +45,6 @@ class Match:
     watched: float = float("nan")
     reason: str = ""
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class Matching:
@@ -55,8 +52,6 @@ class Matching:
 
     matches: tuple[Match, ...]
     false_alarms: tuple[Alarm, ...]
-
-    __repr__ = short_repr
 
 
 def windows(contacts: Sequence[Contact], window: float) -> list[tuple[Contact, float, float]]:

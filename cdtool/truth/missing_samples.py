@@ -15,7 +15,6 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Series
 
 CLOSE_ENOUGH = 5e-3
@@ -30,8 +29,6 @@ class CellClock:
     """The times of the samples of a load cell, `time` (n,) [s], and what its steps are like."""
 
     time: FloatArray
-
-    __repr__ = short_repr
 
     @property
     def period(self) -> float:
@@ -79,8 +76,6 @@ class CellSamples:
 
     clock: CellClock
     force: FloatArray
-
-    __repr__ = short_repr
 
     @property
     def time(self) -> FloatArray:

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 import cdtool
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.results.summary import summarise
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -31,7 +31,7 @@ def test_every_table_and_number_of_the_script_is_on_the_page():
 
 def test_the_tables_of_the_arms_first_trial_match_the_script(tmp_path):
     make, page = script(), (DOCS / "reproduction.md").read_text(encoding="utf-8")
-    write_arm_recordings(tmp_path / "arm1", make.COUNTS, make.SEED, 1)
+    simulate_arm(tmp_path / "arm1", make.COUNTS, make.SEED, 1)
     rows = summarise(cdtool.benchmark(tmp_path / "arm1" / "benchmark.toml", jobs=2).results)
     for name in ("6.1, trial 1", "6.2, trial 1"):
         assert f"<!-- made: {name} -->\n\n{make.latencies(name, rows)}\n" in page

@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 
 import cdtool
-from cdtool import _API
 from cdtool.commands.app import COMMANDS
 from tests.project.pages import DOCS, PAGES, ROOT
 
@@ -106,7 +105,7 @@ def test_every_function_and_field_is_on_a_generated_page(pages):
     python = {name: text for name, text in pages.items() if name.startswith("reference/python/")}
     classes = [place for text in python.values() for place in re.findall(r"autoclass:: (\S+)", text)]
     assert len(classes) == len(set(classes))
-    for name in (name for name in _API if not name.startswith("__")):
+    for name in (name for name in cdtool.__all__ if not name.startswith("__")):
         item = getattr(cdtool, name)
         if inspect.isclass(item):
             assert f"{item.__module__}.{item.__qualname__}" in classes, name

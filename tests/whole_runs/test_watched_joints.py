@@ -9,7 +9,7 @@ import pytest
 
 import cdtool as api
 from cdtool.base.errors import ConfigurationError, NothingValidError, UsageError
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.detectors import DETECTORS
 from tests.command import cdtool
 
@@ -18,7 +18,7 @@ from tests.command import cdtool
 def forearm(tmp_path_factory) -> Path:
     """Trial 2: the forearm is hit while it keeps its direction, and the arm leads the motion."""
     folder = tmp_path_factory.mktemp("forearm") / "logs"
-    write_arm_recordings(folder, {"free": 10, "holdout": 2, "stiff": 2, "soft": 1}, seed=5, trial=2)
+    simulate_arm(folder, {"free": 10, "holdout": 2, "stiff": 2, "soft": 1}, seed=5, trial=2)
     return folder
 
 

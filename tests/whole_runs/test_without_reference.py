@@ -8,9 +8,9 @@ import pytest
 
 import cdtool
 from cdtool.commands.scoring.benchmark import benchmark
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.commands.simulate.gate_model import GateParameters
-from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 from tests.command import cdtool as command
 
 DETECTORS = ["igm", "gm"]
@@ -39,7 +39,7 @@ def test_the_arm_without_references_shows_the_latencies_that_it_shows_with_them(
     found = {}
     for folder, references in (("with", True), ("without", False)):
         counts = {"free": 10, "holdout": 0, "stiff": 1, "soft": 1}
-        write_arm_recordings(tmp_path / folder, counts, 3, trial=2, references=references)
+        simulate_arm(tmp_path / folder, counts, 3, trial=2, references=references)
         results = benchmark(tmp_path / folder / "benchmark.toml", detectors=DETECTORS).results
         found[folder] = [(row.recording, row.detector, row.outcome, row.latency_ms) for row in results.contacts]
         assert not results.skipped
@@ -50,6 +50,6 @@ def test_the_arm_without_references_shows_the_latencies_that_it_shows_with_them(
 def test_a_gate_that_is_hit_while_it_accelerates_is_assessable_without_references(tmp_path):
     for place in (0.05, 0.3):
         gate = replace(GateParameters(), obstacle_position=place, obstacle_scatter=0.002)
-        write_gate_recordings(tmp_path / f"{place}", {"free": 10, "stiff": 1}, 8, parameters=gate, references=False)
+        simulate_gate(tmp_path / f"{place}", {"free": 10, "stiff": 1}, 8, parameters=gate, references=False)
         results = benchmark(tmp_path / f"{place}" / "benchmark.toml").results
         assert [row.outcome for row in results.contacts] == ["detected"] * 5

@@ -8,7 +8,6 @@ from typing import Any
 
 from cdtool.base.findings.kinds import Severity, kind_of
 from cdtool.base.findings.words import FindingWords
-from cdtool.base.notebook.short_repr import short_repr
 
 _SEVERITIES: tuple[Severity, ...] = ("loss", "warning", "note")
 # Of lines so many numbers are kept.
@@ -39,8 +38,6 @@ class Finding:
     numbers: Mapping[str, Any] = field(default_factory=dict)
     severity: Severity = ""  # type: ignore[assignment]  # completed below
     file: str = ""
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Raise ValueError for an unknown kind or other numbers than its own, where it is made."""

@@ -18,8 +18,6 @@ from typing import Any
 from cdtool.alarms.activation import DEBOUNCE_TIME
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.exit_status import Fact
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted, shorten
 from cdtool.commands.compare.pairs import pair_recordings
 from cdtool.commands.compare.rows import (
@@ -77,7 +75,7 @@ _HASH = re.compile(r"[0-9a-f]{64}")
 _Leaf = tuple[str, Any, Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BuildComparison:
     """All tests of two builds, the verdict over them, and other differences.
 
@@ -101,8 +99,8 @@ class BuildComparison:
     notes: tuple[str, ...]
     later: int = 0
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"BuildComparison({self.words})"
 
     @property
     def facts(self) -> tuple[Fact, ...]:

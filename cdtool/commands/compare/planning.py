@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Literal
 
 from cdtool.base.errors import UsageError, nearest
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import location
 from cdtool.results.comparison import SIGNIFICANT, check_significance
@@ -44,8 +43,6 @@ class Answer:
     words: str
     needs: tuple[Need, ...]
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class Measured:
@@ -56,14 +53,15 @@ class Measured:
     spreads: tuple[Spread, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Plan:
     """The answers in the order of the questions; `measured` if a difference was given."""
 
     answers: tuple[Answer, ...]
     measured: Measured | None = None
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return f"Plan({'; '.join(item.words for item in self.answers)})"
 
 
 def plan(  # noqa: PLR0913  # the public function: a keyword for each setting

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.compare.pairs import Pairing, pairs_of_contacts
 from cdtool.commands.compare.questions import (
     LEAST_CHANGE,
@@ -67,8 +66,6 @@ class Question:
     complete_change_p: float
     ranges: Ranges | None = None
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class BuildRow:
@@ -97,8 +94,6 @@ class BuildRow:
     earlier_ms: tuple[float, float] | None = None
     newly_missed: int = 0
     newly_detected: int = 0
-
-    __repr__ = short_repr
 
     @property
     def outcome(self) -> Outcome:

@@ -12,10 +12,6 @@ import numpy as np
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
-from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.near_attributes import NearAttributes
-from cdtool.base.notebook.presenting import described
-from cdtool.base.notebook.same_values import equal_by_values, same_values
 from cdtool.base.plain_text import counted
 from cdtool.commands.detect.log_by_name import UnknownLogError, number_of
 from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of, detect_log, detect_log_runs
@@ -24,7 +20,8 @@ from cdtool.commands.judging.runs import several_logs
 from cdtool.detectors.detection import Status
 from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.recording import Recording
-from cdtool.results.frames import OUTCOMES, rows_as_frame
+from cdtool.report.plots.figures import described
+from cdtool.results.frames import OUTCOMES, notebook_table, rows_as_frame
 from cdtool.results.results import ContactResult, RecordingFinding, Skipped
 
 if TYPE_CHECKING:
@@ -40,6 +37,7 @@ if TYPE_CHECKING:
     from cdtool.formats.signature_file import SignatureFile
 
 VERDICTS = ("alarm", "no alarm", "not_assessable")
+_SHOWN = ["operation", "verdict", "alarms", "first_alarm_s", "contacts", "latency_ms"]
 
 
 @dataclass(frozen=True)
@@ -59,20 +57,22 @@ class AlarmRow:
 
 @dataclass(frozen=True)
 class OperationRow:
-    """The verdict on one operation: a row of `DetectionResult.summary()`."""
+    """The verdict on one operation, its first alarm, its first latency: a row of `DetectionResult.summary()`."""
 
     recording: str
     operation: str
     detector: str
     verdict: str
     alarms: int
+    first_alarm_s: float | None
     contacts: int
+    latency_ms: float | None
     assessed_s: float
     reason: str | None
 
 
 @dataclass(frozen=True, repr=False)
-class DetectionResult(NearAttributes):
+class DetectionResult:
     """What a detector says about one log: alarms and contacts as DataFrames, its signal, its figure.
 
     Parameters
@@ -92,8 +92,6 @@ class DetectionResult(NearAttributes):
     """
 
     detected: Detected
-
-    __eq__ = equal_by_values
 
     @property
     def recording(self) -> Recording:
@@ -178,10 +176,11 @@ class DetectionResult(NearAttributes):
 
     def _repr_html_(self) -> str:
         """Return the verdict on each operation as a table, which a notebook shows."""
-        return _html([self], f"{self._detector} on {self.recording.name}", self.detected.threshold)
+        caption = f"{self._detector} on {self.recording.name}: {self.detected.threshold}"
+        return notebook_table(caption, self.summary()[_SHOWN])
 
 
-class DetectionResults(NearAttributes, Sequence[DetectionResult]):
+class DetectionResults(Sequence[DetectionResult]):
     """What a detector says about several logs: a sequence of `DetectionResult`, with the same frames over all of them.
 
     A log is found by its number or its name: `found[0]`, `found["03.csv"]`.
@@ -224,13 +223,6 @@ class DetectionResults(NearAttributes, Sequence[DetectionResult]):
         return cls(
             runs, [item for log in found for item in log.skipped], [item for log in found for item in log.findings]
         )
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, DetectionResults):
-            return NotImplemented
-        return same_values((self.runs, self._skipped), (other.runs, other._skipped))
-
-    __hash__ = None  # type: ignore[assignment]
 
     @cached_property
     def alarms(self) -> pd.DataFrame:
@@ -297,8 +289,7 @@ class DetectionResults(NearAttributes, Sequence[DetectionResult]):
 
     def _repr_html_(self) -> str:
         """Return the verdict on each operation as a table, which a notebook shows."""
-        note = f"{len(self._skipped)} left out: see skipped" if self._skipped else ""
-        return _html(self.runs, f"{self._detector} on {counted(len(self), 'log')}", note)
+        return notebook_table(repr(self), self.summary()[["recording", *_SHOWN]])
 
 
 def alarms_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
@@ -328,28 +319,19 @@ def summary_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
 def _operations(run: DetectionResult) -> Iterator[OperationRow]:
     for detection, matching in zip(run.detections, run.detected.matchings, strict=True):
         verdict = detection.verdict
+        latencies = [1e3 * item.latency for item in matching.matches if item.alarm]
         yield OperationRow(
             run.recording.name,
             detection.operation.name,
             detection.detector,
             verdict.outcome,
             len(verdict.alarms),
+            verdict.alarms[0].time if verdict.alarms else None,
             len(matching.matches),
+            latencies[0] if latencies else None,
             detection.assessed_seconds,
             verdict.reason or None,
         )
-
-
-def _html(runs: Sequence[DetectionResult], caption: str, note: str) -> str:
-    rows = []
-    for run in runs:
-        for row, detection, matching in zip(_operations(run), run.detections, run.detected.matchings, strict=True):
-            first = detection.verdict.alarms[0] if detection.verdict.alarms else None
-            latency = next((1e3 * item.latency for item in matching.matches if item.alarm), None)
-            alarm = (first.joint, f"{first.time:.3f}") if first else (None, None)
-            rows.append((row.operation, row.verdict.replace("_", " "), row.alarms, *alarm, row.contacts, latency))
-    headings = ("operation", "verdict", "alarms", "joint", "first alarm [s]", "contacts", "latency [ms]")
-    return html_table(caption, headings, rows, note)
 
 
 @overload

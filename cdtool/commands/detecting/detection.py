@@ -11,7 +11,6 @@ import numpy as np
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection, detect_operations
 from cdtool.base.errors import RecordingError, UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.detecting.detection_options import DetectionOptions
@@ -76,8 +75,6 @@ class Detected:
     normals: NormalMotions = field(default_factory=NormalMotions)
     onset: str = ""
 
-    __repr__ = short_repr
-
     @property
     def joints(self) -> tuple[str, ...]:
         """Return the names of the signal's columns: the monitored joints."""
@@ -132,8 +129,6 @@ class DetectedRuns:
     runs: tuple[Detected, ...]
     skipped: tuple[Skipped, ...] = ()
     findings: tuple[RecordingFinding, ...] = ()
-
-    __repr__ = short_repr
 
 
 def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.alarms.pipeline import Detection
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.plain_text import counted
 from cdtool.commands.detecting.detection import Detected, detect_log_runs
 from cdtool.commands.detecting.detection_options import DetectionOptions
 from cdtool.commands.scoring.detector_inputs import inputs_of
@@ -34,8 +33,6 @@ class ExplainedRun:
     found: Detected
     explanations: tuple[tuple[Explanation, ...], ...]
 
-    __repr__ = short_repr
-
     @property
     def events(self) -> list[tuple[Detection, Explanation]]:
         """Return every explanation with its detection."""
@@ -43,7 +40,7 @@ class ExplainedRun:
         return [(detection, item) for detection, items in pairs for item in items]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Explained:
     """The explanations for the runs of a log, in its order; `skipped` are runs left out, `findings` concern the log."""
 
@@ -51,8 +48,8 @@ class Explained:
     skipped: tuple[Skipped, ...] = ()
     findings: tuple[RecordingFinding, ...] = ()
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Explained({counted(len(self.runs), 'run')}, {counted(len(self.events), 'event')})"
 
     @property
     def events(self) -> list[tuple[Detection, Explanation]]:

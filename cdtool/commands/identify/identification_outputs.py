@@ -15,7 +15,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import CdtoolError, RecordingError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.axis.excitation import PlannedMotion, plan_motions
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, identify_rigid_axis, low_passed_force, predict_force
 from cdtool.commands.identify.axis.speed_controller import ControllerFit
@@ -73,8 +72,6 @@ class UnseenRun:
     moving: BoolArray
     of_runs: int
 
-    __repr__ = short_repr
-
     @property
     def residual(self) -> FloatArray:
         """Return measured minus predicted force (n,) [N, N m]."""
@@ -103,8 +100,6 @@ class StartComparison:
     deviation: Mapping[str, FloatArray]
     modelled: Mapping[str, FloatArray]
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class ControllerComparison:
@@ -115,8 +110,6 @@ class ControllerComparison:
     measured: FloatArray
     computed: FloatArray
     is_command: bool
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,6 @@ import numpy as np
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
 from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.files.writing import replaced
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.base.tables import read_toml
@@ -176,7 +174,7 @@ class JointIdentification:
         return tuple(found.values())
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class IdentifiedMachine:
     """The identification of a machine: by joint, the changes of its file, and the text of the updated file.
 
@@ -194,8 +192,8 @@ class IdentifiedMachine:
     robot: RobotIdentification | None = None
     source: Path | None = None
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"IdentifiedMachine({self.machine}, {counted(len(self.changes), 'change')})"
 
     def files_for(self, target: Path) -> tuple[tuple[Path, str], ...]:
         """Return the files of an updated machine file `target`, and their texts; none if nothing changes.

@@ -13,7 +13,6 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.base.files.bounded_loading import read_text
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.remote.remote_path import joined
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Identified, Method, NotIdentifiable
 from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
@@ -104,8 +103,6 @@ class RobotIdentification:
     repeated: RepeatedRuns
     unexplained_share: float
     urdf: str = ""
-
-    __repr__ = short_repr
 
     @property
     def summary(self) -> dict[str, Any]:

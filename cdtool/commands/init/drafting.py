@@ -13,7 +13,6 @@ from cdtool.base.errors import CdtoolError, RecordingError, UsageError
 from cdtool.base.files.writing import write_text
 from cdtool.base.findings import Finding, worst_first
 from cdtool.base.log_names import log_stem
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.remote.remote_path import location
 from cdtool.base.tables import Table
 from cdtool.commands.init.benchmark_draft import draft_benchmark
@@ -50,7 +49,7 @@ _REVERSED, _ANOTHER = ("friction", "sign"), ("place", "course", "still", "joints
 _MOST_WORDS = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Drafted:
     """The draft's text, the channels it maps, those written as comments, warnings, and the columns not mapped."""
 
@@ -61,7 +60,8 @@ class Drafted:
     findings: tuple[Finding, ...]
     unmapped: tuple[Unmapped, ...] = ()
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return f"Drafted({self.path!r}, channels {', '.join(self.channels)})"
 
 
 def init(
@@ -118,7 +118,7 @@ def _written(logs: Sequence[Path], target: Path, csv: Mapping[str, Any]) -> Draf
     return drafted
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DraftedStudy:
     """A machine file and a benchmark file in one folder: their paths, the benchmark's text, and logs left out.
 
@@ -135,7 +135,8 @@ class DraftedStudy:
     has_detectors: bool = True
     kept: tuple[str, ...] = ()
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return f"DraftedStudy({self.path!r})"
 
 
 def init_study(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -25,8 +24,6 @@ class Stream:
     topic: str = ""
     field: str = ""
     joints: tuple[str, ...] = ()
-
-    __repr__ = short_repr
 
     @property
     def width(self) -> int:

@@ -9,8 +9,6 @@ from typing import Any
 
 from cdtool.base.files.writing import replaced_folder
 from cdtool.base.log_names import log_stem
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.remote.remote_path import location
 from cdtool.base.tables import read_toml
 from cdtool.base.version import __version__
@@ -31,7 +29,7 @@ _OF_LOGS = ("inject", "impacts", "conditions", "learn", "holdout", "limits", "ca
 _OF_LEARNING = ("until", "guard_s")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Injected:
     """The folder that was written, its cases, and what was left out."""
 
@@ -39,8 +37,8 @@ class Injected:
     logs: InjectedLogs
     copied: int
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Injected({self.folder!r}, {self.copied} copied)"
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:

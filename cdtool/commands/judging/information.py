@@ -13,8 +13,7 @@ import numpy as np
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding, worst_first
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
+from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.log_findings import before_contact, log_findings
 from cdtool.commands.judging.placeholders import placeholder_findings
@@ -52,7 +51,7 @@ class ChannelInfo:
     maximum: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Info:
     """A log: its columns as they are in the file, or with a machine file its channels on the load side.
 
@@ -69,8 +68,8 @@ class Info:
     latencies: tuple[ChannelLatency, ...] = ()
     origin: float = 0.0
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Info({self.source!r}, {self.format}, {counted(len(self.channels), 'channel')})"
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:

@@ -9,9 +9,6 @@ from typing import Any
 
 from cdtool.alarms.activation import Activation, ActivationSettings
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
@@ -45,8 +42,6 @@ class Learned:
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
 
-    __eq__ = equal_by_values
-
     def __repr__(self) -> str:
         classes = ", ".join(
             f"{motion.described if motion else 'any motion'} from {runs} runs" for motion, runs in self.runs
@@ -57,14 +52,6 @@ class Learned:
     def save(self, path: str | Path) -> None:
         """Write the signature file, as `cdtool learn-signature -o` does; raises SignatureError."""
         write_signature(path, self.signature)
-
-    def _repr_html_(self) -> str:
-        """Return the classes of motion as a table, which a notebook shows."""
-        signature = self.signature
-        rows = [("all motions" if motion is None else motion.described, runs) for motion, runs in self.runs]
-        caption = f"{signature.detector} on {signature.machine}: {signature.described}"
-        left_out = f"{counted(len(self.skipped), 'entry')} left out: see skipped" if self.skipped else ""
-        return html_table(caption, ("class of motion", "runs"), rows, left_out)
 
 
 def signature_of(given: str | Path | Learned | SignatureFile) -> SignatureFile:

@@ -12,7 +12,6 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.registry import plugin_packages
 from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import to_be_seen
@@ -211,8 +210,6 @@ class _LogScoring:
     ranges: LearnedRanges
     normals: NormalMotions
     runs: tuple[Operation, ...]
-
-    __repr__ = short_repr
 
     def __call__(
         self, group: str, path: Path, wanted: Wanted | None, detectors: tuple[str, ...] | None

@@ -9,15 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.base.errors import UsageError, nearest
-from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.near_attributes import NearAttributes
-from cdtool.base.notebook.presenting import described
-from cdtool.base.notebook.same_values import equal_by_values
 from cdtool.base.plain_text import counted, first_of, shorten
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.scoring.store.stored_outcomes import StoreReport
+from cdtool.report.plots.figures import described
 from cdtool.results.evaluated import Evaluated
-from cdtool.results.frames import results_as_frame
+from cdtool.results.frames import notebook_table, results_as_frame
 from cdtool.results.results import Results
 from cdtool.results.summary import FIGURES
 from cdtool.results.traces.trace import Trace
@@ -29,11 +26,11 @@ if TYPE_CHECKING:
 # A repr is one line.
 _LONGEST_HEADLINE = 100
 _COUNTS = ("contacts", "detected", "missed", "not_assessable", "false_alarms", "operations", "hours")
-_SHOWN = ("group", "detector", "detected", "missed", "not assessable", "median [ms]", "mean [ms]", "false alarms")
+_SHOWN = ["group", "detector", "detected", "missed", "not_assessable", "median_ms", "mean_ms", "false_alarms"]
 
 
 @dataclass(frozen=True, repr=False)
-class BenchmarkResult(NearAttributes):
+class BenchmarkResult:
     """What a benchmark measured: DataFrames, figures and reports.
 
     `contacts`, `false_alarms` and the other frames have a column per field of `results.json`, under the same names,
@@ -70,8 +67,6 @@ class BenchmarkResult(NearAttributes):
     inputs: tuple[Path, ...] = field(default=(), compare=False)
     seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
     stored: StoreReport | None = field(default=None, compare=False)
-
-    __eq__ = equal_by_values
 
     @property
     def results(self) -> Results:
@@ -207,24 +202,11 @@ class BenchmarkResult(NearAttributes):
 
     def _repr_html_(self) -> str:
         """Return the statistics as a table, which a notebook shows."""
-        rows = [
-            (
-                item.group,
-                item.detector,
-                item.detected if item.contacts else None,
-                item.missed if item.contacts else None,
-                item.not_assessable if item.contacts else None,
-                item.median_ms,
-                item.mean_ms,
-                item.false_alarms if item.watched else None,
-            )
-            for item in self.evaluated.summaries
-        ]
-        return html_table(f"Benchmark: {self.headline}", _SHOWN, rows)
+        return notebook_table(f"Benchmark: {self.headline}", self.summary().reset_index()[_SHOWN])
 
 
 @dataclass(frozen=True)
-class BenchmarkPlots(NearAttributes):
+class BenchmarkPlots:
     """The plots of a benchmark's reports: each a `matplotlib.figure.Figure`, which Jupyter shows without pyplot."""
 
     result: BenchmarkResult

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.scoring.log_outcome import OperationOutcome
 from cdtool.results.results import ExposureResult, SweepResult
 
@@ -54,8 +53,6 @@ class SweepRows:
     # By detector and group: of each contact the latency with every factor, one contact after the other.
     _latency: dict[tuple[str, str], array[float]] = field(default_factory=dict)
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
-
-    __repr__ = short_repr
 
     def add(self, group: str, name: str, outcome: OperationOutcome) -> None:
         """Add one operation of the detector `name`."""

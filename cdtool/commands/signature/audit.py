@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.signature.deviation import Axis
 from cdtool.recordings.motion import MotionClass
 from cdtool.statistics.interval import Interval
@@ -66,8 +65,6 @@ class JointDrift:
     overall: Shown | None
     local: Shown | None
 
-    __repr__ = short_repr
-
     @property
     def shown(self) -> tuple[Shown, ...]:
         """The changes shown, a location first: it must be inspected before anything is learned."""
@@ -99,8 +96,6 @@ class DriftAudit:
     places: FloatArray
     joints: tuple[JointDrift, ...]
     not_assessable: tuple[tuple[str, str], ...]
-
-    __repr__ = short_repr
 
     @property
     def names(self) -> tuple[str, ...]:

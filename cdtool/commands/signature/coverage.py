@@ -11,7 +11,6 @@ import numpy as np
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import judge
 from cdtool.base.errors import SignatureError, UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted, digits
 from cdtool.commands.signature.deviation import Axis
 from cdtool.detectors.detection import Signal
@@ -53,8 +52,6 @@ class Coverage:
     runs_needed: int | None
     factor_needed: float
     gaps: tuple[NoLimit, ...]
-
-    __repr__ = short_repr
 
     @property
     def alarms(self) -> int:

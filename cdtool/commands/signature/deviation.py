@@ -16,7 +16,6 @@ import numpy as np
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Status
 from cdtool.results.curves.sweep import critical_factor
 from cdtool.thresholds.fitted_signature import FittedSignature
@@ -42,8 +41,6 @@ class Deviations:
     overall: FloatArray
     pooled: FloatArray
     beyond: FloatArray
-
-    __repr__ = short_repr
 
 
 def axis_of(signature: FittedSignature) -> Axis:

@@ -10,8 +10,6 @@ from typing import Any, cast
 
 from cdtool.alarms.pipeline import detect_operation, run_detector
 from cdtool.base.errors import CdtoolError, SignatureError, UsageError
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.runs import RunReading, load_runs, several_logs
@@ -53,15 +51,13 @@ class CheckedClass:
     coverage: Coverage | None
     drift: DriftAudit | None
 
-    __repr__ = short_repr
-
     @property
     def advice(self) -> str:
         """Return what to do, in one line."""
         return advice(self.coverage, self.drift)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Checked:
     """The result of checking a signature, per class, and what was left out."""
 
@@ -70,11 +66,11 @@ class Checked:
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Checked({self.file!r}: {'; '.join(item.advice for item in self.classes)})"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Updated:
     """A signature file after an update, the runs added, those refused with the reason, and warnings about the logs."""
 
@@ -83,8 +79,8 @@ class Updated:
     refused: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...] = ()
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Updated({self.file!r}: {len(self.added)} added, {len(self.refused)} refused)"
 
 
 def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:

@@ -83,7 +83,7 @@ def as_recording(run: ArmRun, name: str) -> Recording:
     return Recording(name, name, _JOINTS, channels)
 
 
-def write_arm_recordings(  # noqa: PLR0913  # the public function: a keyword for each setting
+def simulate_arm(  # noqa: PLR0913  # the public function: a keyword for each setting
     folder: Path,
     counts: Mapping[str, int],
     seed: int,

@@ -84,12 +84,12 @@ def gate(
     """
     _check_format(file_format)
     from cdtool.commands.simulate.changed_machine import ChangedMachine
-    from cdtool.commands.simulate.gate_recordings import write_gate_recordings
+    from cdtool.commands.simulate.gate_recordings import simulate_gate
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
     with progress("simulating", quiet=quiet) as advance:
-        written = write_gate_recordings(
+        written = simulate_gate(
             output, counts, seed, file_format=file_format, progress=advance, references=reference, changed=changed
         )
     _report(output, written, counts, seed, as_json)
@@ -120,13 +120,13 @@ def arm(
     Example: cdtool simulate arm --trial 2 --free 14 --holdout 40 --stiff 30 --soft 30 --seed 1 -o forearm
     """
     _check_format(file_format)
-    from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+    from cdtool.commands.simulate.arm_recordings import simulate_arm
     from cdtool.commands.simulate.changed_machine import ChangedMachine
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
     with progress("simulating", quiet=quiet) as advance:
-        written = write_arm_recordings(
+        written = simulate_arm(
             output,
             counts,
             seed,

@@ -21,7 +21,7 @@ from cdtool.commands.simulate.recording_folder import (
 from cdtool.recordings.recording import Recording, Series
 from cdtool.recordings.units import UNITS
 
-__all__ = ["GROUPS", "as_recording", "gate_bench", "write_gate_recordings"]
+__all__ = ["GROUPS", "as_recording", "gate_bench", "simulate_gate"]
 
 # What the fictitious drive and sensors log: motor current, revolutions, an accelerometer mounted backward.
 _TORQUE_CONSTANT = 0.56  # N m/A
@@ -59,7 +59,7 @@ def as_recording(run: GateRun, name: str, parameters: GateParameters) -> Recordi
     return Recording(name, name, ("gate",), channels)
 
 
-def write_gate_recordings(  # noqa: PLR0913  # the public function: a keyword for each setting
+def simulate_gate(  # noqa: PLR0913  # the public function: a keyword for each setting
     folder: Path,
     counts: Mapping[str, int],
     seed: int,

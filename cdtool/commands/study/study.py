@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.study.study_file import read_study
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.impact.sensor_ranking import Ranking, rank_sensors
 from cdtool.impact.waves import WaveCheck, check_waves
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SensorStudy:
     """The ranking for one joint of a machine, and the assumptions made for values that were not given.
 
@@ -28,8 +26,8 @@ class SensorStudy:
     waves: WaveCheck | None
     assumptions: tuple[str, ...]
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"SensorStudy({self.machine}, joint {self.joint})"
 
 
 def study_sensors(

@@ -9,10 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.base.errors import UsageError, nearest
-from cdtool.base.notebook.html_table import html_table
-from cdtool.base.notebook.near_attributes import NearAttributes
-from cdtool.base.notebook.presenting import described
-from cdtool.base.notebook.same_values import equal_by_values
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.runs import Runs
@@ -20,8 +16,9 @@ from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.tune.options import TuningOptions
 from cdtool.commands.tune.search.tuned import TunedDetector
 from cdtool.commands.tune.tuned_rows import TunedRow, tuned_rows
+from cdtool.report.plots.figures import described
 from cdtool.results.conclusion import Severity, Statement, worst_first
-from cdtool.results.frames import rows_as_frame
+from cdtool.results.frames import notebook_table, rows_as_frame
 from cdtool.results.results import RecordingFinding, Skipped
 
 if TYPE_CHECKING:
@@ -29,8 +26,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_SHOWN = [
+    "detector",
+    "group",
+    "threshold",
+    "mean_ms",
+    "default_mean_ms",
+    "missed",
+    "contacts",
+    "alarming",
+    "operations",
+]
+
+
 @dataclass(frozen=True, repr=False)
-class TuningResult(NearAttributes):
+class TuningResult:
     """What a tuning chose and gained: a DataFrame, figures, and the files of `cdtool tune`.
 
     `setup` and `options` say what was tuned, and how; `detectors` are the tuned ones, the best first: the choice, its
@@ -49,8 +59,6 @@ class TuningResult(NearAttributes):
     is_nested: bool
     left_out: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
-
-    __eq__ = equal_by_values
 
     @property
     def best(self) -> TunedDetector:
@@ -139,16 +147,11 @@ class TuningResult(NearAttributes):
 
     def _repr_html_(self) -> str:
         """Return these results as a table, which a notebook shows."""
-        headings = ("detector", "group", "threshold", "mean [ms]", "default [ms]", "missed", "alarming free runs")
-        rows = []
-        for row in tuned_rows(self.detectors):
-            counts = (f"{row.missed} of {row.contacts}", f"{row.alarming} of {row.operations}")
-            rows.append((row.detector, row.group, row.threshold, row.mean_ms, row.default_mean_ms, *counts))
-        return html_table(f"Tuned: {self.verdict[1]}", headings, rows)
+        return notebook_table(f"Tuned: {self.headline}", self.summary()[_SHOWN])
 
 
 @dataclass(frozen=True)
-class TuningPlots(NearAttributes):
+class TuningPlots:
     """The plots of a tuning's report: each a `matplotlib.figure.Figure`, which Jupyter shows without pyplot."""
 
     result: TuningResult

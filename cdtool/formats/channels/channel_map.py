@@ -11,7 +11,6 @@ from typing import Literal, TypeVar
 
 from cdtool.base.errors import ConfigurationError, nearest
 from cdtool.base.log_names import log_stem
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.tables import Table
 from cdtool.base.value_words import value_in_words
 from cdtool.recordings.recording import CHANNELS, CHECKED, GROUND_TRUTH, RIG_UNITS, TRIGGER, UNITLESS
@@ -102,8 +101,6 @@ class ChannelSource:
     unit_confirmed: bool | None = None
     confirmed: bool = False
 
-    __repr__ = short_repr
-
     @property
     def described(self) -> str:
         """Return its name in the machine file, for messages."""
@@ -193,8 +190,6 @@ class ChannelMap:
     pins: TablePins = TablePins()
     named: bool = True
     beside: tuple[ChannelSource, ...] = ()
-
-    __repr__ = short_repr
 
     @property
     def worded(self) -> frozenset[str | int]:

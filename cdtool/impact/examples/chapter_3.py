@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.base import ContactLaw
@@ -38,8 +37,6 @@ class RestitutionCurve:
     exact: FloatArray
     hunt_crossley: FloatArray
     lankarani_nikravesh: FloatArray
-
-    __repr__ = short_repr
 
 
 def two_bodies() -> Impact:

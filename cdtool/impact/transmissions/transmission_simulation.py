@@ -9,7 +9,6 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.impact.checks import require_positive
 from cdtool.impact.contact_laws.base import ContactLaw
 from cdtool.impact.drives import Drive
@@ -64,8 +63,6 @@ class SimulatedMotion:
     motor_torque: FloatArray
     drive_force: FloatArray
     contacts: tuple[SimulatedContact, ...]
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Recording, Series
 
 # A step longer than this many usual steps of a channel is a gap: nothing is interpolated across it.
@@ -44,8 +43,6 @@ class AxisRun:
     reference_speed: FloatArray | None = None
     reference_torque: FloatArray | None = None
     derived: frozenset[str] = field(default_factory=frozenset)
-
-    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.torque)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Recording, Series
 
 # A window has the first number of samples of the slowest channel and lasts 0.05 s, or the next share of a log that is
@@ -28,8 +27,6 @@ class Windows:
     length: FloatArray
     log: FloatArray
     means: dict[str, FloatArray]
-
-    __repr__ = short_repr
 
     def changes(self, channel: str, *, integrated: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return the change of a channel, or of its integral, over four windows (k, J), and its noise (J,)."""

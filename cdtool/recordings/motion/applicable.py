@@ -14,7 +14,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.kernels import READ_ONLY, kernel
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.motion.motion_class import MotionClass
 from cdtool.recordings.motion.speed_range import SpeedRange
 from cdtool.recordings.motion.strokes import Stroke
@@ -35,8 +34,6 @@ class Judging:
     stroke: int
     motion: int
     where: BoolArray
-
-    __repr__ = short_repr
 
 
 def judging_classes(

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.recording import Recording
 
@@ -31,8 +30,6 @@ class Progress:
     elapsed: FloatArray
     travel: FloatArray
     running: BoolArray
-
-    __repr__ = short_repr
 
     def part(self, rows: slice) -> Progress:
         """Return the progress at some of the samples."""

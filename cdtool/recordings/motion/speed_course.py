@@ -13,7 +13,6 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.derived import SendsFields
 from cdtool.base.kernels import READ_ONLY, fields_of, kernel, read_only
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.clock import integrate
 from cdtool.recordings.motion.progress import ALIGNMENTS, CONFIRM, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.recordings.motion.smoothing import moving_mean
@@ -67,8 +66,6 @@ class SpeedCurve(SendsFields):
     mean: FloatArray
     spread: FloatArray
 
-    __repr__ = short_repr
-
     @property
     def last(self) -> float:
         """The last grid point but one."""
@@ -90,8 +87,6 @@ class SpeedCourse(SendsFields):
     alignment: str
     by_time: SpeedCurve
     by_travel: SpeedCurve
-
-    __repr__ = short_repr
 
     @cached_property
     def content(self) -> tuple[object, ...]:

@@ -231,3 +231,9 @@ def png(figure: Figure) -> bytes:
     with drawing():
         canvas.print_png(drawn, metadata={"Software": "cdtool"})
     return drawn.getvalue()
+
+
+def described(figure: Figure, description: str) -> Figure:
+    """Return a figure with a description for readers who do not see it."""
+    figure.description = description  # type: ignore[attr-defined]
+    return figure

@@ -16,7 +16,6 @@ from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted, digits
 from cdtool.results.curves.sweep import critical_factors, sweep
 
@@ -152,8 +151,6 @@ class MonitoredRun:
     critical: float
     seconds: float
     alarms: Callable[[FloatArray], npt.NDArray[np.int64]]
-
-    __repr__ = short_repr
 
     @classmethod
     def of_each(cls, detection: Detection, activations: Sequence[Activation]) -> list[MonitoredRun]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.results.results import ContactResult, Results
 from cdtool.results.rows import grouped
 from cdtool.results.summary import latencies
@@ -31,8 +30,6 @@ class SurvivalCurve:
     curve: Survival
     missed: FloatArray
     end: float
-
-    __repr__ = short_repr
 
 
 def survival_curves(results: Results) -> tuple[SurvivalCurve, ...]:

@@ -15,7 +15,6 @@ from cdtool.alarms.activation import Activation, begins_at
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.kernels import READ_ONLY, kernel
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Status, StatusArray
 from cdtool.recordings.recording import Contact
 from cdtool.truth.matching import windows
@@ -34,8 +33,6 @@ class Swept:
 
     false_alarms: npt.NDArray[np.int64]
     latency: FloatArray
-
-    __repr__ = short_repr
 
 
 def sweep(

@@ -22,7 +22,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.recording import Recording
 from cdtool.results.explanation.departure import Track
@@ -76,8 +75,6 @@ class Cause:
     shifts: tuple[Shift, ...] = ()
     transient: Transient | None = None
     loss: Loss | None = None
-
-    __repr__ = short_repr
 
     @property
     def channel(self) -> str:

@@ -17,7 +17,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.kernels import READ_ONLY, fields_of, kernel
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.recording import Recording, Series
 from cdtool.results.explanation.movement import Movement
 from cdtool.results.explanation.transient import Transient
@@ -87,8 +86,6 @@ class ComparedChannel:
     raw_level: FloatArray
     running: BoolArray
     limits: Limits
-
-    __repr__ = short_repr
 
     @classmethod
     def of(cls, channel: str, joint: str, compared: Comparison, j: int) -> Self:

@@ -12,7 +12,6 @@ import numpy as np
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import Alarm
 from cdtool.recordings.recording import SHOWS_CONTACTS, Contact
 from cdtool.results.explanation.cause import Cause, Event
@@ -61,8 +60,6 @@ class AlarmExplanation:
     runs: int = 0
     absent: Absence | None = None
 
-    __repr__ = short_repr
-
     @property
     def zero(self) -> float:
         """Return the time from which others count [s]: the contact's onset, else the alarm."""
@@ -94,8 +91,6 @@ class MissExplanation:
     inputs: tuple[str, ...]
     runs: int = 0
     absent: Absence | None = None
-
-    __repr__ = short_repr
 
     @property
     def zero(self) -> float:

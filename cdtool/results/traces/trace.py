@@ -11,7 +11,6 @@ import numpy as np
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.detection import StatusArray
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.recording import Contact
@@ -34,8 +33,6 @@ class StatisticCurve:
     lower: FloatArray
     upper: FloatArray
     status: StatusArray
-
-    __repr__ = short_repr
 
     @classmethod
     def of(cls, detection: Detection, joint: int) -> Self:
@@ -99,8 +96,6 @@ class Panel:
     why: tuple[str, ...] = ()
     rearmed: tuple[float, ...] = ()
 
-    __repr__ = short_repr
-
     @property
     def is_not_assessable(self) -> bool:
         """Whether no sample was assessable."""
@@ -127,8 +122,6 @@ class Trace:
     panels: tuple[Panel, ...]
     joints: int = 1
     chosen: str = ""
-
-    __repr__ = short_repr
 
     @property
     def shown(self) -> Contact | None:

@@ -13,7 +13,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError, UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.recordings.motion import leading_joint
 from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.truth.force_vector import ForceMagnitude
@@ -56,8 +55,6 @@ class ForceTimeCurve:
     before: float = float("nan")
     hole: float = 0.0
     uncertainty: float = 0.0
-
-    __repr__ = short_repr
 
     @property
     def saturated(self) -> bool:

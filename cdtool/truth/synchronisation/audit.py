@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.recording import Contact, Recording, Series
@@ -59,8 +58,6 @@ class _Part:
     values: FloatArray
     order: int
     factor: float
-
-    __repr__ = short_repr
 
     @cached_property
     def period(self) -> float:

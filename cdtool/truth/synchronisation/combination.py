@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.statistics.interval import Interval
 from cdtool.truth.synchronisation.delay import EventDelay
 
@@ -121,8 +120,6 @@ class _RobustLine:
     design: FloatArray
     residual: FloatArray
     bound: float
-
-    __repr__ = short_repr
 
     @property
     def scatter(self) -> float:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.truth.synchronisation.smoothing import Grid
 
 # Steps of Gauss and Newton; they end when the delay changes by less than this share of the grid's step.
@@ -61,8 +60,6 @@ class SmoothSignal:
 
     grid: Grid
     values: FloatArray
-
-    __repr__ = short_repr
 
 
 def delay_of(

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted
 from cdtool.statistics.interval import Interval
 from cdtool.truth.synchronisation.combination import clock_line
@@ -91,8 +90,6 @@ class ChannelLatency:
     stiff: Interval = _UNKNOWN
     soft: Interval = _UNKNOWN
     reason: str = ""
-
-    __repr__ = short_repr
 
     @property
     def assessable(self) -> bool:

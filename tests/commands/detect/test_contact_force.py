@@ -12,7 +12,7 @@ from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import detect_operation
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.commands.detect.contact_force import ContactPoint, contact_force, summarise_force
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
 from cdtool.detectors.pure_torque import PureTorque
@@ -94,7 +94,7 @@ def test_an_invalid_point_is_refused(text):
 
 
 def test_detect_shows_the_force_with_its_alarms(tmp_path):
-    write_arm_recordings(tmp_path / "logs", {"free": 1, "holdout": 0, "stiff": 1, "soft": 0}, seed=1)
+    simulate_arm(tmp_path / "logs", {"free": 1, "holdout": 0, "stiff": 1, "soft": 0}, seed=1)
     command = ("detect", tmp_path / "logs/stiff/01.csv", "-m", tmp_path / "logs/machine.toml", "-d", "gm")
     done = cdtool(*command, "--limit", "6,inf", "--contact-at", "arm:0.28,0,0")
     assert done.status == 0 and "estimated force at arm (0.28, 0, 0) m" in done.out

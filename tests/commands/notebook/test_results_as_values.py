@@ -1,17 +1,13 @@
-"""Results as a notebook handles them: found by name, compared, copied, pickled; typos are answered."""
+"""Results as a notebook handles them: found by name, copied, pickled; typos are answered."""
 
 from __future__ import annotations
 
 import copy
 import pickle
-from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import cdtool
-from cdtool.base.notebook.same_values import same_values
-from cdtool.recordings.recording import Series
 from tests.commands.notebook.values import GATE, LOG, MACHINE
 
 LOGS = [LOG, GATE / "stiff" / "04.csv", GATE / "holdout" / "03.csv"]
@@ -46,26 +42,6 @@ def test_an_unknown_name_is_answered_with_the_nearest(found):
         found["morning.mcap"]
 
 
-def test_results_and_recordings_are_equal_after_pickling_and_copying(found):
-    recording = cdtool.read(LOG, MACHINE)
-    for value in (found, found[0], recording, recording["speed"], found[0].detections[0].statistic):
-        assert pickle.loads(pickle.dumps(value)) == value == copy.deepcopy(value)
-    assert found[0] != found[1] and found != found[:2] and recording != "recording"
-    assert found == cdtool.detect(LOGS, MACHINE, detector="gm", limit=[400.0])
-
-
-def test_a_check_and_an_identification_are_compared_by_their_contents(tmp_path):
-    free = sorted((GATE / "free").iterdir())
-    cdtool.learn_signature(free, MACHINE, "gm").save(tmp_path / "gm.json")
-    values = (
-        cdtool.check_signature(tmp_path / "gm.json", free, MACHINE),
-        cdtool.identify(free, MACHINE, tmp_path / "identified.toml"),
-    )
-    for value in values:
-        assert pickle.loads(pickle.dumps(value)) == value == copy.deepcopy(value)
-    assert values[0] != replace(values[0], skipped=("one",))
-
-
 def test_a_log_that_was_left_out_is_answered_with_the_reason(tmp_path):
     broken = tmp_path / "broken.csv"
     broken.write_text("a,b\n", encoding="utf-8")
@@ -78,63 +54,6 @@ def test_a_log_that_was_left_out_is_answered_with_the_reason(tmp_path):
 def test_a_name_in_results_without_a_log_is_answered_in_words(found):
     with pytest.raises(KeyError, match=r"no log '03\.csv' in these results \(they are empty\)"):
         found[:0]["03.csv"]
-
-
-def test_one_changed_sample_makes_two_channels_different():
-    series = Series(np.arange(3.0), np.array([[1.0], [np.nan], [2.0]]), "m")
-    assert series == Series(series.time.copy(), series.values.copy(), "m")
-    assert series != replace(series, values=series.values + 1e-9)
-    assert series != replace(series, unit="mm")
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "same"),
-    [
-        (float("nan"), float("nan"), True),
-        (np.float32("nan"), np.float32("nan"), True),
-        (complex("nan"), complex("nan"), True),
-        (float("nan"), 1.0, False),
-        ([1, 2], (1, 2), False),
-        ({"a": [1]}, {"a": [1]}, True),
-        ({"a": 1}, {"b": 1}, False),
-        (np.zeros(2), [0.0, 0.0], False),
-        (np.zeros(2), np.zeros(2, dtype=int), False),
-        ("ab", "ab", True),
-    ],
-)
-def test_values_are_the_same_if_kind_and_content_are(first, second, same):
-    assert same_values(first, second) is same
-
-
-def test_a_benchmark_is_equal_to_its_repetition_whatever_time_it_took():
-    first, second = (cdtool.benchmark(GATE / "benchmark.toml", detectors=["momentum"]) for _ in range(2))
-    assert first == second == pickle.loads(pickle.dumps(first))
-    with pytest.raises(AttributeError, match=r"no attribute 'contact' \(did you mean contacts\?\)"):
-        first.contact  # noqa: B018
-    with pytest.raises(AttributeError, match="did you mean latency"):
-        first.plot.latencies  # noqa: B018
-
-
-def test_typos_in_attributes_and_options_are_answered_with_the_nearest(found):
-    with pytest.raises(AttributeError, match=r"DetectionResult has no attribute 'alarm' \(did you mean alarms\?\)"):
-        found[0].alarm  # noqa: B018
-    with pytest.raises(AttributeError, match=r"known: alarms, contacts"):
-        found[0].xyz  # noqa: B018
-    with pytest.raises(AttributeError, match="did you mean read"):
-        cdtool.reed  # noqa: B018
-    with pytest.raises(TypeError, match=r"no parameter 'detektor' \(did you mean detector"):
-        cdtool.detect(LOG, MACHINE, detektor="gm")
-    with pytest.raises(AttributeError, match=r"use recording\['speed'\]"):
-        found[0].recording.speed  # noqa: B018
-
-
-def test_an_error_inside_a_property_is_not_reported_as_a_typo(found, monkeypatch):
-    def fails(runs):
-        raise AttributeError("inside")
-
-    monkeypatch.setattr("cdtool.commands.detect.result.alarms_frame", fails)
-    with pytest.raises(AttributeError, match="inside"):
-        copy.copy(found[1]).alarms  # noqa: B018
 
 
 def test_reading_without_a_machine_file_says_what_to_pass_and_how_to_get_one():
@@ -153,3 +72,27 @@ def test_an_unknown_detector_is_answered_with_the_nearest_and_where_the_list_is(
     with pytest.raises(cdtool.CdtoolError) as caught:
         cdtool.detect(LOG, MACHINE, detector="xyz", limit=[400.0])
     assert caught.value.hint == "cdtool list detectors shows all"
+
+
+def test_results_and_recordings_are_pickled_and_copied(found):
+    recording = cdtool.read(LOG, MACHINE)
+    for copied in (pickle.loads(pickle.dumps((found, recording))), copy.deepcopy((found, recording))):
+        assert copied[0].summary().equals(found.summary()) and copied[0].contacts.equals(found.contacts)
+        assert copied[1].to_frame().equals(recording.to_frame())
+
+
+def test_typos_are_answered_by_python_with_the_nearest_name(found):
+    """Python proposes names when it prints the error: the error must know the name and the object."""
+    for value, typo in ((found[0], "alarm"), (cdtool, "reed")):
+        with pytest.raises(AttributeError) as caught:
+            getattr(value, typo)
+        assert (caught.value.name, caught.value.obj) == (typo, value)
+    with pytest.raises(TypeError, match="'detektor'"):
+        cdtool.detect(LOG, MACHINE, detektor="gm")
+    with pytest.raises(AttributeError, match=r"use recording\['speed'\]"):
+        found[0].recording.speed  # noqa: B018
+
+
+def test_the_names_of_the_package_are_the_api():
+    assert dir(cdtool) == sorted(cdtool.__all__)
+    assert not [name for name in cdtool.__all__ if name.startswith("_") and name != "__version__"]

@@ -1,9 +1,7 @@
-"""The values that the functions of the Python API return for the sample gate, and everything in them. No tests."""
+"""The values that the functions of the Python API return for the sample gate. No tests."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +27,6 @@ def returned_values(folder: Path) -> dict[str, Any]:
         "check_signature": cdtool.check_signature(folder / "gate.json", FREE, MACHINE),
         "detect": cdtool.detect(LOG, MACHINE, signature=learned),
         "detect of many": cdtool.detect([LOG, GATE / "holdout" / "03.csv"], MACHINE, signature=learned),
-        "detect_runs": cdtool.detect_runs(LOG, MACHINE, signature=learned),
         "explain": cdtool.explain(LOG, MACHINE, signature=learned),
         "benchmark": result,
         "score": cdtool.score(ROOT / "docs" / "examples" / "triggers.csv", GATE / "benchmark.toml"),
@@ -38,26 +35,3 @@ def returned_values(folder: Path) -> dict[str, Any]:
         "init": cdtool.init(LOG, folder / "draft.toml"),
         "study_sensors": cdtool.study_sensors(MACHINE),
     }
-
-
-def values_in(value: Any, seen: dict[int, Any]) -> Iterator[Any]:
-    """Every dataclass instance in a value, in its fields and in what they contain, each once, and the value itself."""
-    if id(value) in seen:
-        return
-    seen[id(value)] = value
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        yield value
-        for item in dataclasses.fields(value):
-            yield from values_in(getattr(value, item.name), seen)
-    elif isinstance(value, Mapping):
-        for item in value.values():
-            yield from values_in(item, seen)
-    elif isinstance(value, Sequence) and not isinstance(value, str):
-        for item in value[:200]:
-            yield from values_in(item, seen)
-
-
-def is_plain_row(value: Any) -> bool:
-    """Whether a value has only texts and numbers: a row of a table, which is shown with all its fields."""
-    held = [getattr(value, item.name) for item in dataclasses.fields(value)]
-    return all(item is None or isinstance(item, str | int | float | Path) for item in held)

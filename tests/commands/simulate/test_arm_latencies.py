@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import cdtool
-from cdtool.commands.simulate.arm_recordings import write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.results.summary import Summary, summarise
 
 COUNTS = {"free": 14, "holdout": 10, "stiff": 15, "soft": 15}
@@ -28,7 +28,7 @@ def rows(tmp_path_factory) -> dict[tuple[int, str, str], Summary]:
     found = {}
     for trial in (1, 2):
         folder: Path = tmp_path_factory.mktemp("arm") / f"trial_{trial}"
-        write_arm_recordings(folder, COUNTS, SEED, 1 if trial == 1 else 2)
+        simulate_arm(folder, COUNTS, SEED, 1 if trial == 1 else 2)
         for row in summarise(cdtool.benchmark(folder / "benchmark.toml").results):
             found[trial, row.group, row.detector] = row
     return found

@@ -15,7 +15,7 @@ import cdtool
 from cdtool.base.errors import UsageError
 from cdtool.commands.simulate.arm_model import ArmRun, Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
-from cdtool.commands.simulate.arm_recordings import as_recording, write_arm_recordings
+from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.recording import Recording
 from tests.command import cdtool as command
@@ -28,7 +28,7 @@ COUNTS = {"free": 1, "holdout": 1, "stiff": 3, "soft": 1}
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Trial 1 with three stiff impacts: two as MCAP, the third as CSV."""
     made = tmp_path_factory.mktemp("arm") / "logs"
-    assert write_arm_recordings(made, COUNTS, seed=6, trial=1, file_format="mixed") == 6
+    assert simulate_arm(made, COUNTS, seed=6, trial=1, file_format="mixed") == 6
     return made
 
 
@@ -92,7 +92,7 @@ def test_the_machine_file_describes_the_simulated_arm(folder: Path) -> None:
 
 @pytest.mark.parametrize(("trial", "watched"), [(1, "arm"), (2, "forearm")])
 def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: Trial, watched: str) -> None:
-    write_arm_recordings(tmp_path / "logs", {"free": 2, "soft": 1}, seed=6, trial=trial)
+    simulate_arm(tmp_path / "logs", {"free": 2, "soft": 1}, seed=6, trial=trial)
     values = tomllib.loads((tmp_path / "logs" / "benchmark.toml").read_text())
     assert values["joints"] == [watched]
     assert values["learn"]["logs"] == ["free/*.csv"]
@@ -140,13 +140,13 @@ def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> N
 
 def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no recording is requested"):
-        write_arm_recordings(tmp_path / "none", {}, seed=1)
+        simulate_arm(tmp_path / "none", {}, seed=1)
     with pytest.raises(UsageError, match="not an empty folder"):
-        write_arm_recordings(folder, COUNTS, seed=1)
+        simulate_arm(folder, COUNTS, seed=1)
     with pytest.raises(UsageError, match="encoder_counts is 0"):
-        write_arm_recordings(tmp_path / "ideal", COUNTS, seed=1, parameters=replace(ARM, encoder_counts=0))
+        simulate_arm(tmp_path / "ideal", COUNTS, seed=1, parameters=replace(ARM, encoder_counts=0))
     with pytest.raises(UsageError, match="unknown trial 3"):
-        write_arm_recordings(tmp_path / "third", COUNTS, seed=1, trial=3)  # type: ignore[arg-type]
+        simulate_arm(tmp_path / "third", COUNTS, seed=1, trial=3)  # type: ignore[arg-type]
     assert command("simulate", "arm", "--trial", 3, "-o", tmp_path / "third").status == 2
     assert command("simulate", "arm", "--format", "cvs", "-o", tmp_path / "third").status == 2
     assert not any(tmp_path.iterdir())

@@ -19,12 +19,12 @@ from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark
 from cdtool.commands.tune import tuning as module
 from cdtool.commands.tune.command import _show
 from cdtool.commands.tune.files import open_folder, write_tuning
+from cdtool.commands.tune.options import TuningOptions
 from cdtool.commands.tune.page import tuning_html
 from cdtool.commands.tune.recordings_to_tune import read_recordings
 from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.tuned_files import tuning_summary
-from cdtool.commands.tune.options import TuningOptions
-    from cdtool.commands.tune.tuning import tune_detectors
+from cdtool.commands.tune.tuning import tune_detectors
 from cdtool.execution.workers import Workers
 from cdtool.formats.signature_store import read_signature
 from cdtool.recordings.log_section import LogSection, Mark

@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.machines.axis_model.axis_run import AxisRun
 
@@ -224,8 +223,6 @@ class FilteredRun:
     acceleration_noise: float
     unknown_speed: float = 0.0
 
-    __repr__ = short_repr
-
     @cached_property
     def sign(self) -> FloatArray:
         """Return the sign of the inner speed (n,), straight through the speeds at which it is unknown."""
@@ -411,8 +408,6 @@ class LinearFit:
     condition_number: float
     regressors: FloatArray = field(repr=False)
     instruments: FloatArray = field(repr=False)
-
-    __repr__ = short_repr
 
     @cached_property
     def influence(self) -> FloatArray:

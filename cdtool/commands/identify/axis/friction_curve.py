@@ -10,7 +10,6 @@ from enum import Enum
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.axis.filtered_regression import FilteredRun, IntArray
 
 # Knots of the friction spline: shares of the highest speed, closer together where the friction changes fast.
@@ -75,8 +74,6 @@ class FrictionCurve:
     mean: FloatArray
     standard_error: FloatArray
     count: IntArray
-
-    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.abscissa)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.axis.start_ensemble import StartEnsemble, motor_speed
 from cdtool.machines.axis_model.axis_run import AxisRun
 
@@ -44,8 +43,6 @@ class FrictionProfile:
     parts: FloatArray
     level_deviation: float
     shares: FloatArray = field(default_factory=lambda: np.eye(4)[0])
-
-    __repr__ = short_repr
 
     @property
     def force(self) -> FloatArray:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.excitation import SAME_SPEED, SPEEDS_NEEDED, Excitation, measure_excitation
 from cdtool.commands.identify.axis.filtered_regression import (
@@ -113,8 +112,6 @@ class Residuals:
     friction: FloatArray
     residual: FloatArray
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True)
 class ForceError:
@@ -171,8 +168,6 @@ class PredictionModel:
     shape: FrictionShape
     mass: float
     coefficients: FloatArray
-
-    __repr__ = short_repr
 
     def force(self, run: FilteredRun) -> FloatArray:
         """Return the low-passed force (n,); NaN where the run is incomplete or moves in a direction not learned."""
@@ -361,8 +356,6 @@ class _Equations:
     rows: Sequence[IntArray]
     is_delayed: bool
 
-    __repr__ = short_repr
-
     @property
     def block(self) -> IntArray:
         """Return the strokes as blocks (m,); they are cut where a direction has fewer than 3."""
@@ -489,8 +482,6 @@ class _Solution:
     names: tuple[str, ...]
     method: Method
     levels: tuple[FrictionLevel, ...] = ()
-
-    __repr__ = short_repr
 
     def value(self, **shares: float) -> tuple[float, float]:
         """Return a combination of named coefficients with its standard error."""
@@ -740,8 +731,6 @@ class _Samples:
     is_fast: BoolArray
     fold: IntArray
     columns: dict[FrictionShape, FloatArray]
-
-    __repr__ = short_repr
 
     def fitted(self, form: FrictionForm, chosen: BoolArray, loss: Loss) -> PredictionModel | None:
         """Return the model of a form with the smallest residual in the chosen rows; None with too few of them."""

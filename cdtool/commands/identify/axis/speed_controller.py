@@ -21,7 +21,6 @@ from enum import Enum
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.axis.observed_slope import observed_slope
 from cdtool.commands.identify.axis.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.commands.identify.estimate import (
@@ -148,8 +147,6 @@ class _Sections:
     demand: FloatArray
     commands: FloatArray
 
-    __repr__ = short_repr
-
     def __len__(self) -> int:
         return len(self.output)
 
@@ -210,8 +207,6 @@ class _Fit:
     model: _Model
     residual: FloatArray
     jacobian: FloatArray
-
-    __repr__ = short_repr
 
     @property
     def cost(self) -> float:
@@ -391,8 +386,6 @@ class _Uncertainty:
 
     statistical: FloatArray
     systematic: FloatArray
-
-    __repr__ = short_repr
 
     @property
     def total(self) -> FloatArray:

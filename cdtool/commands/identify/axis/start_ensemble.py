@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.machines.axis_model.axis_run import AxisRun
 
 # What is averaged: the rest before the start and the motion after it [s].
@@ -46,8 +45,6 @@ class StartEnsemble:
     nominal_speed: float
     members: tuple[tuple[int, int], ...]
 
-    __repr__ = short_repr
-
     def __len__(self) -> int:
         return len(self.mean["torque"])
 
@@ -59,8 +56,6 @@ class _Start:
     direction: int
     speed: float
     member: tuple[int, int]
-
-    __repr__ = short_repr
 
 
 def start_ensembles(runs: Sequence[AxisRun], before: float = BEFORE, after: float = AFTER) -> tuple[StartEnsemble, ...]:

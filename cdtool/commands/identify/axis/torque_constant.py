@@ -20,7 +20,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.contact.load_cell_contact import contact_force
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
@@ -65,8 +64,6 @@ class _PressAndRelease:
     force: FloatArray
     sign: FloatArray
     period: float
-
-    __repr__ = short_repr
 
 
 def identify_torque_scale(

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.axis.filtered_regression import (
     FilteredRun,
     IntArray,
@@ -45,8 +44,6 @@ class MotionColumns:
     run: FilteredRun
     columns: FloatArray
     rows: IntArray
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

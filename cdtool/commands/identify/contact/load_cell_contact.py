@@ -13,7 +13,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.axis_model.parameters import AxisModel, Sensors
 from cdtool.recordings.recording import Contact, Recording
@@ -58,8 +57,6 @@ class LoadCellContact:
     level: float
     noise: tuple[float, float]
     is_motion_exact: bool = True
-
-    __repr__ = short_repr
 
     @property
     def margin(self) -> int:

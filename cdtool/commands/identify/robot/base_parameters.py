@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.robot.robot_regressor import Column, Regressor, stacked_torque
 
 # A column whose rest, after the projection on the others, is below this share of it is dependent on them; a factor
@@ -44,8 +43,6 @@ class Grouping:
     base: tuple[int, ...]
     combination: FloatArray
     absent: tuple[int, ...]
-
-    __repr__ = short_repr
 
     @property
     def grouped(self) -> tuple[int, ...]:
@@ -84,8 +81,6 @@ class BaseParameterSet:
     excitation: FloatArray
     uncertainty: FloatArray
     identifiable: tuple[bool, ...]
-
-    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.names)

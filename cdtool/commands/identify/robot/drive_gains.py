@@ -20,7 +20,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.estimate import (
     Estimate,
     IdentificationError,
@@ -118,8 +117,6 @@ class _PayloadColumns:
     shifts: FloatArray
     free: FloatArray
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class _Part:
@@ -131,8 +128,6 @@ class _Part:
     times: FloatArray
     index: FloatArray
     is_loaded: bool
-
-    __repr__ = short_repr
 
 
 def _part(run: RobotRun, index: int, regressor: Regressor, is_loaded: bool) -> _Part:
@@ -156,8 +151,6 @@ class _Joint:
     load: FloatArray
     shifts: FloatArray
     equations: Equations
-
-    __repr__ = short_repr
 
     @classmethod
     def of(cls, joint: int, parts: Sequence[_Part], regressor: Regressor, columns: _PayloadColumns) -> _Joint:

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.robot.robot_dynamics import Window
 from cdtool.commands.identify.robot.robot_run import RobotRun
 
@@ -24,8 +23,6 @@ class RepeatedRuns:
 
     floor: FloatArray
     pairs: int
-
-    __repr__ = short_repr
 
 
 def repeated_runs(runs: Sequence[RobotRun], half_width: float) -> RepeatedRuns:

@@ -21,7 +21,6 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.estimate import (
     Estimate,
     IdentificationError,
@@ -128,8 +127,6 @@ class TorqueError:
     cross_validated: FloatArray
     previous: FloatArray
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
@@ -144,8 +141,6 @@ class LeftOut:
     previous: FloatArray
     joints: Index
     blocks: Index
-
-    __repr__ = short_repr
 
     def of_joint(self, joint: int, is_previous: bool = False) -> FloatArray:
         """Return the residuals of a joint."""
@@ -190,8 +185,6 @@ class Equations:
     runs: FloatArray
     rigid: FloatArray
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class RobotFit:
@@ -212,8 +205,6 @@ class RobotFit:
     left_out: LeftOut
     condition_number: float
     equations: Equations
-
-    __repr__ = short_repr
 
 
 def identify_robot(runs: Sequence[RobotRun], machine: CoupledMachine, what: RobotParameters | None = None) -> RobotFit:
@@ -307,8 +298,6 @@ class Window:
     weights: FloatArray
     slope: FloatArray
     step: int
-
-    __repr__ = short_repr
 
     @classmethod
     def of(cls, half_width: float, period: float) -> Window:
@@ -428,8 +417,6 @@ class _Solution:
     unbounded: FloatArray
     covariance: FloatArray
     blocks: Index
-
-    __repr__ = short_repr
 
     @property
     def block_count(self) -> int:
@@ -576,8 +563,6 @@ class _Transfer:
     excitation: FloatArray
     uncertainty: FloatArray
     together: float
-
-    __repr__ = short_repr
 
     @classmethod
     def of(cls, runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, solution: _Solution) -> _Transfer:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve, friction_curve, speed_edges
 from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.commands.identify.identifying import IdentifiedMachine
@@ -95,8 +94,6 @@ class UnseenTorque:
     predicted: FloatArray
     previous: FloatArray
 
-    __repr__ = short_repr
-
     @property
     def summary(self) -> dict[str, Any]:
         """Return the run, and the RMS of its residuals [N m, N], as JSON values."""
@@ -122,8 +119,6 @@ class JointFrictionCurve:
     speed: FloatArray
     new: FloatArray
     previous: FloatArray
-
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,8 +246,6 @@ class _Joint:
     form: FrictionForm
     fit: RobotFit
     runs: Sequence[RobotRun]
-
-    __repr__ = short_repr
 
     def unseen(self) -> UnseenTorque | None:
         """Return the torque along the run that is predicted worst, relative to the torque of all runs."""

@@ -14,7 +14,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.recordings.recording import Recording
 
@@ -41,8 +40,6 @@ class RobotRun:
     position: FloatArray
     speed: FloatArray
     derived: frozenset[str] = field(default_factory=frozenset)
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         shape = np.shape(self.torque)

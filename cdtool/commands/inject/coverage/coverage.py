@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.notebook.same_values import equal_by_values
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.inject.coverage.coverage_map import (
     CellKey,
     CoverageMap,
@@ -34,7 +32,7 @@ _MOST_TRACES = 200
 _ALL_TRACES_KEPT = min(2 * MOST_SAMPLED, MOST_SAMPLED + MOST_SLOW)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Coverage:
     """The map of a machine with its name, what was left out, and the files read.
 
@@ -48,8 +46,8 @@ class Coverage:
     traces: Mapping[str, Trace] = field(default_factory=dict)
     inputs: tuple[Path, ...] = ()
 
-    __repr__ = short_repr
-    __eq__ = equal_by_values
+    def __repr__(self) -> str:
+        return f"Coverage({self.machine}, {len(self.skipped)} left out)"
 
 
 def coverage(

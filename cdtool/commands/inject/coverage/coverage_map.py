@@ -9,7 +9,6 @@ from enum import Enum
 
 import numpy as np
 
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.results.agreement import with_model_error
 from cdtool.results.limits import ALL, LimitRule
 from cdtool.results.results import ContactResult
@@ -154,8 +153,6 @@ class CoverageMap:
     cells: Mapping[str, Mapping[CellKey, Cell]]
     speeds: tuple[SpeedClass, ...] = (SpeedClass(None, math.nan, math.nan),)
     speed_unit: str = "m/s"
-
-    __repr__ = short_repr
 
     def most_telling(self, count: int = 5) -> list[TellingCell]:
         """Return the cells that a test at the rig would tell most about: missed in part, near a limit, uncertain."""

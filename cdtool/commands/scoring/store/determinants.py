@@ -14,7 +14,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, ImpactGroup
 from cdtool.commands.scoring.learned import Learned
@@ -41,8 +40,6 @@ class Determinants:
     learned: Learned
     runs: Mapping[Path, Sources]
     factors: Mapping[str, FloatArray]
-
-    __repr__ = short_repr
 
     def log_key(self, group: str, path: Path, sources: Sources) -> str:
         """Return the key of the rows of a log that do not depend on the detectors."""

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.detectors.base import Detector
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.stored import rule_to_dict
@@ -68,8 +67,6 @@ class Measured:
     assessable: BoolArray
     alarming: npt.NDArray[np.int64]
     reason: str = ""
-
-    __repr__ = short_repr
 
     @classmethod
     def unusable(cls, reason: str) -> Measured:

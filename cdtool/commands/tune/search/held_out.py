@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.results.curves.false_alarm_budget import Budget
 
 # The multiples of a limit for which latencies are known: up to four times, in steps of 3 %.
@@ -36,8 +35,6 @@ class HeldOut:
     ratios: FloatArray
     seconds: float
     reason: str = ""
-
-    __repr__ = short_repr
 
     @classmethod
     def unusable(cls, reason: str) -> HeldOut:
@@ -74,8 +71,6 @@ class Pooled:
     alarming: int
     free: int
     multiplier: float
-
-    __repr__ = short_repr
 
 
 def pooled(budget: Budget, folds: Sequence[HeldOut], contacts: int, *, corrects: bool) -> Pooled | None:

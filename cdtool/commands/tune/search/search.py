@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.tune.search.candidate import Candidate, Measured
 from cdtool.commands.tune.search.coordinate_search import CoordinateSearch
 from cdtool.commands.tune.search.objective import Objective
@@ -35,8 +34,6 @@ class Scored:
     debounce: int
     costs: FloatArray
     score: float
-
-    __repr__ = short_repr
 
 
 @dataclass

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.notebook.short_repr import short_repr
 from cdtool.commands.tune.search.candidate import Candidate
 from cdtool.commands.tune.search.held_out import Pooled
 from cdtool.commands.tune.search.objective import Goal, Objective
@@ -51,8 +50,6 @@ class ChoiceResults:
     free: int
     score: float
     costs: FloatArray
-
-    __repr__ = short_repr
 
     @property
     def alarm_share(self) -> Interval:
@@ -176,8 +173,6 @@ class TunedDetector:
     rejected: tuple[Rejection, ...] = ()
     tried_costs: tuple[tuple[float, ...], ...] = ()
     why_not_nested: str = ""
-
-    __repr__ = short_repr
 
     @property
     def honest(self) -> ChoiceResults:
