@@ -62,7 +62,27 @@ def rows_as_frame(
 
 
 def notebook_table(caption: str, frame: pd.DataFrame) -> str:
-    """Return a frame as HTML below a caption, which a notebook shows; of many rows the first and the last ten."""
+    """Return a frame as HTML below a caption, which a notebook shows; of many rows the first and the last ten.
+
+    Parameters
+    ----------
+    caption : str
+        One line above the table.
+    frame : DataFrame
+        The rows; texts in them are escaped.
+
+    Returns
+    -------
+    str
+        HTML; NaN is a dash, and a number has four digits.
+
+    Examples
+    --------
+    >>> from cdtool.results.results import Skipped
+    >>> text = notebook_table("Left out", rows_as_frame(Skipped, [Skipped("<a>.csv", "empty")]))
+    >>> text.startswith("<p>Left out</p><table"), "&lt;a&gt;.csv" in text
+    (True, True)
+    """
     table = frame.to_html(
         index=False, na_rep="–", float_format="{:.4g}".format, max_rows=20, show_dimensions=len(frame) > 20
     )

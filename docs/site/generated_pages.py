@@ -13,7 +13,7 @@ from typing import Any, get_args, get_origin
 
 from typer.main import get_command
 
-from cdtool import _API
+import cdtool
 from cdtool.base.exit_status import STATUSES, STATUSES_OF
 from cdtool.commands.app import COMMANDS, app
 from cdtool.detectors import DETECTORS
@@ -136,7 +136,7 @@ def _value(item: Any) -> str:
 
 
 def _python_pages() -> dict[str, str]:
-    exported = {name: _exported(place) for name, place in _API.items() if not name.startswith("__")}
+    exported = {name: getattr(cdtool, name) for name in cdtool.__all__ if not name.startswith("__")}
     functions = {name: item for name, item in exported.items() if not inspect.isclass(item)}
     pages, rows, returned = {}, [], dict[str, Any]()
     for name, function in functions.items():
@@ -188,11 +188,6 @@ def _parts(result: Any) -> list[Any]:
     getters = (item.fget for item in vars(result).values() if isinstance(item, property))
     found = [known.get(str(getter.__annotations__.get("return"))) for getter in getters]
     return [item for item in found if inspect.isclass(item) and item.__module__ == result.__module__]
-
-
-def _exported(place: str) -> Any:
-    module, _, attribute = place.partition(":")
-    return getattr(import_module(module), attribute)
 
 
 def _place(item: Any) -> str:

@@ -16,7 +16,7 @@ from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.tune.result import TuningResult
+    from cdtool.commands.tune.tuned_rows import Tuning
 
 _SHOWN = 110
 
@@ -135,7 +135,7 @@ def _unwatched(detector: str, count: int, best: str) -> None:
     pass
 
 
-def _show(done: TuningResult, *, quiet: bool) -> None:
+def _show(done: Tuning, *, quiet: bool) -> None:
     from cdtool.commands.tune.page import injected_words, rejection_words
     from cdtool.commands.tune.tuned_files import described_choice
 
@@ -157,7 +157,7 @@ def _show(done: TuningResult, *, quiet: bool) -> None:
         say(_meaning(done) + injected_words(done))
 
 
-def _show_table(done: TuningResult) -> None:
+def _show_table(done: Tuning) -> None:
     from cdtool.commands.tune.page import alarms_words, debounce_words, range_words
 
     rows = []
@@ -192,7 +192,7 @@ def _show_table(done: TuningResult) -> None:
     table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} results")
 
 
-def _meaning(done: TuningResult) -> str:
+def _meaning(done: Tuning) -> str:
     from cdtool.commands.tune.page import apparent_words
 
     if done.is_nested:

@@ -8,10 +8,10 @@ from functools import partial
 
 from cdtool.base.plain_text import counted
 from cdtool.commands.tune.plots import draw_pareto, draw_sensitivity
-from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.search.objective import Goal
 from cdtool.commands.tune.search.tuned import ChoiceResults, GroupResults, ParetoPoint, Sensitivity, TunedDetector
 from cdtool.commands.tune.tuned_files import described_choice
+from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
 from cdtool.report.model import NO_CERTIFICATE
@@ -34,7 +34,7 @@ APPARENT_NOTE = (
 )
 
 
-def tuning_html(tuning: TuningResult) -> str:
+def tuning_html(tuning: Tuning) -> str:
     """Return the page: the same text for the same input."""
     tone, headline = tuning.verdict
     sections = [
@@ -64,7 +64,7 @@ def tuning_html(tuning: TuningResult) -> str:
     ).html()
 
 
-def injected_words(tuning: TuningResult) -> str:
+def injected_words(tuning: Tuning) -> str:
     """Return a sentence about injected contacts; empty if all are real."""
     names = [name for name, group in tuning.setup.impacts.items() if group.injected is not None]
     if not names:
@@ -72,7 +72,7 @@ def injected_words(tuning: TuningResult) -> str:
     return f"The contacts of {', '.join(map(visible, names))} were computed (injected), not measured. "
 
 
-def _detectors_table(tuning: TuningResult) -> Table:
+def _detectors_table(tuning: Tuning) -> Table:
     groups = list(tuning.groups)
 
     def mean(name: str, item: TunedDetector) -> Cell:
@@ -123,7 +123,7 @@ def debounce_words(tuned: TunedDetector) -> str:
     return "9 ms" if tuned.debounce is None else counted(tuned.debounce, "sample")
 
 
-def apparent_words(tuning: TuningResult) -> list[str]:
+def apparent_words(tuning: Tuning) -> list[str]:
     """Return a sentence per detector without nested results: the reason."""
     return [
         f"{visible(item.detector)}: no nested results: {visible(item.why_not_nested)}."
@@ -141,7 +141,7 @@ def rejection_words(tuned: TunedDetector) -> list[str]:
     ]
 
 
-def _sections_of(tuning: TuningResult, tuned: TunedDetector) -> list[PageSection]:
+def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
     name, groups = visible(tuned.detector), list(tuned.apparent.groups)
     tables = [_results_table(tuned)]
     if tuned.steps:

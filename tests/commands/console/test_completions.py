@@ -11,8 +11,8 @@ from typer.main import get_command
 
 from cdtool.commands.app import app
 from cdtool.commands.console import completions
+from cdtool.commands.tune.options import IMPACTS
 from cdtool.commands.tune.search.objective import Goal
-from cdtool.commands.tune.tuning import IMPACTS
 from cdtool.detectors import DETECTORS
 from cdtool.formats.written_files import WRITERS
 from cdtool.recordings.operations import HOW_TO_CUT

@@ -22,7 +22,6 @@ from cdtool.commands.tune.files import open_folder, write_tuning
 from cdtool.commands.tune.options import TuningOptions
 from cdtool.commands.tune.page import tuning_html
 from cdtool.commands.tune.recordings_to_tune import read_recordings
-from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.tuned_files import tuning_summary
 from cdtool.commands.tune.tuning import tune_detectors
 from cdtool.execution.workers import Workers
@@ -113,8 +112,8 @@ def test_every_surface_opens_with_the_worst_fact_of_a_tuning(name, done, capsys)
     assert " ".join(capsys.readouterr().out.split()).startswith(made.verdict[1])
     assert f'<p class="verdict {tone}"><strong>{made.verdict[1]}</strong>' in tuning_html(made)
     assert tuning_summary(made)["verdict"] == made.verdict[1]
-    assert repr(TuningResult(made)) == f"TuningResult(1 detector: {made.verdict[1]})"
-    assert f"<caption>Tuned: {made.verdict[1]}</caption>" in TuningResult(made)._repr_html_()
+    assert repr(made) == f"TuningResult(1 detector: {made.verdict[1]})"
+    assert f"<p>Tuned: {made.verdict[1]}</p>" in made._repr_html_()
 
 
 def test_too_few_contacts_have_a_range_and_no_interval(done):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-from dataclasses import replace
 
 import pytest
 
@@ -20,13 +19,13 @@ def tuned():
 def test_it_is_one_line_and_a_frame_with_a_row_per_detector_and_group(tuned):
     assert repr(tuned).startswith("TuningResult(1 detector: ") and "momentum with limit at 1/2op: stiff " in repr(tuned)
     assert tuned.summary().group.tolist() == ["stiff", "soft"] and tuned.best.detector == "momentum"
-    assert "<caption>Tuned: " in tuned._repr_html_()
+    assert "<p>Tuned: " in tuned._repr_html_()
     assert tuned.skipped.columns.tolist() == ["recording", "reason"] and dict(tuned.unusable) == {}
 
 
-def test_it_is_equal_to_its_copies(tuned):
-    assert pickle.loads(pickle.dumps(tuned)) == tuned == copy.deepcopy(tuned)
-    assert tuned != replace(tuned, tuning=replace(tuned.tuning, skipped=("one",)))
+def test_it_is_pickled_and_copied(tuned):
+    for copied in (pickle.loads(pickle.dumps(tuned)), copy.deepcopy(tuned)):
+        assert copied.summary().equals(tuned.summary())
 
 
 def test_its_figures_are_drawn_as_in_the_report(tuned):
