@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PureWindowsPath
+from typing import Any
 
 from cdtool.base.plain_text import counted, shorten
 from cdtool.base.registry import Registry
@@ -32,7 +34,7 @@ from cdtool.report.tables.results import (
 )
 from cdtool.report.tables.worst_cases import worst_cases_table
 from cdtool.results.evaluated import Evaluated
-from cdtool.results.results import ContactResult, Results, onset_words
+from cdtool.results.results import ContactResult, Results
 from cdtool.results.rows import picked, values_of
 
 # The tables of a command's own section of a benchmark file, and their lines on a terminal: `table` and `lines`.
@@ -306,3 +308,26 @@ def _profiles(results: Results) -> dict[str, ProfileText]:
         for group, profile in part_of(results.provenance, "force_profiles").items()
         if isinstance(profile, Mapping)
     }
+
+
+def onset_words(provenance: Mapping[str, Any]) -> str:
+    """Return the rule of the onset in words, with the name of the label file where there is one.
+
+    Parameters
+    ----------
+    provenance : mapping of str to any
+        The provenance of results.
+
+    Returns
+    -------
+    str
+        For example "load cell above 20 N for 3 ms; label file labels.csv".
+
+    Examples
+    --------
+    >>> onset_words({"onset": "load cell above 20 N for 3 ms", "label_file": "gate/labels.csv"})
+    'load cell above 20 N for 3 ms; label file labels.csv'
+    """
+    rule, labels = provenance.get("onset") or "rule not stated", provenance.get("label_file")
+    rule = f"{rule}; force: {provenance['force']}" if provenance.get("force") else rule
+    return f"{rule}; label file {PureWindowsPath(str(labels)).name}" if labels else str(rule)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import PureWindowsPath
 from typing import Any, Self
 
 from cdtool.base.findings import Finding
@@ -23,29 +22,6 @@ _LOSS, _IN_PROGRESS = "loss", "in_progress"
 def meant(meaning: str, **default: Any) -> Any:
     """A dataclass field with its meaning."""
     return field(metadata={"meaning": meaning}, **default)
-
-
-def onset_words(provenance: Mapping[str, Any]) -> str:
-    """Return the rule of the onset in words, with the name of the label file where there is one.
-
-    Parameters
-    ----------
-    provenance : mapping of str to any
-        The provenance of results.
-
-    Returns
-    -------
-    str
-        For example "load cell above 20 N for 3 ms; label file labels.csv".
-
-    Examples
-    --------
-    >>> onset_words({"onset": "load cell above 20 N for 3 ms", "label_file": "gate/labels.csv"})
-    'load cell above 20 N for 3 ms; label file labels.csv'
-    """
-    rule, labels = provenance.get("onset") or "rule not stated", provenance.get("label_file")
-    rule = f"{rule}; force: {provenance['force']}" if provenance.get("force") else rule
-    return f"{rule}; label file {PureWindowsPath(str(labels)).name}" if labels else str(rule)
 
 
 @dataclass(frozen=True)

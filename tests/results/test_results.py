@@ -12,8 +12,9 @@ import pytest
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.files.strict_json import strict_json
+from cdtool.report.model import onset_words
 from cdtool.results.files.results_file import json_pieces, read_results, to_json
-from cdtool.results.results import SCHEMA_VERSION, RecordingFinding, Skipped, onset_words
+from cdtool.results.results import SCHEMA_VERSION, RecordingFinding, Skipped
 from cdtool.results.rows import Rows
 from cdtool.results.summary import summarise
 from tests.report.html.html_case import case

@@ -80,7 +80,7 @@ def print_skipped(skipped: Sequence[Skipped], findings: Sequence[RecordingFindin
 def _print_alike(word: str, every: Sequence[Skipped | RecordingFinding]) -> None:
     if not every:
         return
-    from cdtool.results.alike import alike
+    from cdtool.report.alike import alike
 
     items = alike([replace(item, reason=_bare(item)) for item in dict.fromkeys(every)])
     for item in items[:_SHOWN]:

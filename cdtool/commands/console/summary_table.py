@@ -42,9 +42,9 @@ _UNCHANGED = "; unchanged "
 def show_table(evaluated: Evaluated) -> None:
     """Print the thesis's table 5.1 for each group, with the notes needed to read its numbers."""
     from cdtool.report.few_contacts import explained, latency_columns
+    from cdtool.report.model import onset_words
     from cdtool.report.tables.results import part_of
     from cdtool.results.conclusion import partly_unassessed
-    from cdtool.results.results import onset_words
 
     shown = latency_columns(evaluated.summaries)
     bounded = any(item.few and not math.isnan(item.median.low) for item in evaluated.summaries)

@@ -121,8 +121,8 @@ def _show_explained(explained: ExplainedRun) -> None:
 
 def _show_event(item: Explanation) -> None:
     """Print the headline, the sentences, and the margin over time."""
+    from cdtool.report.explanation_words import words
     from cdtool.results.explanation.explanation import AlarmExplanation
-    from cdtool.results.explanation.words import words
 
     headline, *sentences = words(item)
     say(f"{item.operation}, {item.detector}: {headline}")
@@ -217,7 +217,7 @@ def _miss_as_json(item: MissExplanation) -> dict[str, Any]:
 
 
 def _common(item: Explanation) -> dict[str, Any]:
-    from cdtool.results.explanation.words import words
+    from cdtool.report.explanation_words import words
 
     return {
         "operation": item.operation,

@@ -13,13 +13,13 @@ from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.recordings.recording import Recording
+from cdtool.report.explanation_words import words
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import Legend, count_from, draw_alarm, draw_force, draw_onset, draw_signal, frame_signal
 from cdtool.report.plots.style import BAND, look_of
 from cdtool.results.explanation.explanation import AlarmExplanation, Explanation
 from cdtool.results.explanation.margin import joint_margins
 from cdtool.results.explanation.movement import Movement
-from cdtool.results.explanation.words import words
 from cdtool.results.traces.decimation import decimate
 from cdtool.results.traces.trace import Span, StatisticCurve
 

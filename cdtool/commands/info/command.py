@@ -60,7 +60,7 @@ def info(
 
 
 def _show(item: Info) -> None:
-    from cdtool.results.alike import grouped_findings
+    from cdtool.report.alike import grouped_findings
 
     details = ", ".join(f"{plain(key)} {plain(value)}" for key, value in item.details.items())
     typer.echo(f"{plain(item.source)}: {item.format}{' (' + details + ')' if details else ''}")

@@ -18,9 +18,9 @@ from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.detector_inputs import inputs_of
 from cdtool.commands.scoring.left_out import LeftOut
 from cdtool.commands.scoring.scoring import Scored
+from cdtool.report.explanation_words import words
 from cdtool.results.curves.sweep import Swept
 from cdtool.results.explanation.explanation import explain_operation
-from cdtool.results.explanation.words import words
 from cdtool.results.results import (
     ContactResult,
     FalseAlarmResult,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from cdtool.base.plain_text import counted
+from cdtool.report.alike import Reason, alike
 from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number, percent
 from cdtool.report.table import (
@@ -24,7 +25,6 @@ from cdtool.report.table import (
     tabulate,
 )
 from cdtool.report.tables.results import detector_cell, part_of
-from cdtool.results.alike import Reason, alike
 from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
 from cdtool.results.rows import grouped
 from cdtool.results.summary import later_ms

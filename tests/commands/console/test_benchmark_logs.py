@@ -8,7 +8,7 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.results.results import onset_words
+from cdtool.report.model import onset_words
 from tests.command import cdtool
 
 PROFILE = '[force]\nprofile = "en_12453_reducing_gap"\n'

@@ -202,7 +202,7 @@ def test_names_from_files_cannot_control_the_terminal(explain, gate_folder, tmp_
 
 
 def test_the_same_explanation_comes_from_python(gate_folder, feekf_signature, explain):
-    from cdtool.results.explanation.words import words
+    from cdtool.report.explanation_words import words
 
     explained = api.explain(gate_folder / "stiff/01.csv", gate_folder / "machine.toml", signature=feekf_signature)
     ((_, event),) = explained.events

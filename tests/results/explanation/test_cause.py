@@ -18,10 +18,10 @@ from cdtool.commands.learning.normal_runs import normal_motions
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording
+from cdtool.report.explanation_words import words
 from cdtool.results.explanation.cause import CauseKind
 from cdtool.results.explanation.departure import _began
 from cdtool.results.explanation.explanation import AlarmExplanation, explain_alarm
-from cdtool.results.explanation.words import words
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.normal_choice import Absence, NormalMotions
 from tests.bits import every_value

@@ -18,10 +18,10 @@ from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.report.explanation_words import words
 from cdtool.results.explanation.explanation import AlarmExplanation, MissExplanation, explain_alarm, explain_miss
 from cdtool.results.explanation.explanation import explain_operation as explain
 from cdtool.results.explanation.margin import joint_margins
-from cdtool.results.explanation.words import words
 from cdtool.thresholds.limit import Limit
 from cdtool.truth.matching import Matching, match
 

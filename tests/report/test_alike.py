@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cdtool.base.findings import Finding, remark
-from cdtool.results.alike import Reason, alike, grouped_findings
+from cdtool.report.alike import Reason, alike, grouped_findings
 from cdtool.results.results import RecordingFinding, Skipped
 
 
