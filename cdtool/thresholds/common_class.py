@@ -19,7 +19,7 @@ SPEED_TOLERANCE = 0.1
 def common_class(recordings: Sequence[Recording], alignment: str = "time_then_position") -> MotionClass:
     """Return direction, leading joint, median speed and speed curve of runs of one class.
 
-    Raises SignatureError if one is of another class: `workflows.fitting` groups the runs before.
+    Raises SignatureError if one is of another class: `commands.learning.fitting` groups the runs before.
     """
     classes = [measured_class(recording) for recording in recordings]
     nominal = float(np.median([item.nominal_speed for item in classes]))
