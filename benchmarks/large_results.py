@@ -31,7 +31,8 @@ from timing import environment, table  # noqa: E402
 
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file  # noqa: E402
 from cdtool.commands.scoring.gathering import Gathering  # noqa: E402
-from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, LogRows, OperationOutcome, Wanted  # noqa: E402
+from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, OperationOutcome, Wanted  # noqa: E402
+from cdtool.commands.scoring.scoring import LogRows  # noqa: E402
 from cdtool.report.outputs import write_outputs  # noqa: E402
 from cdtool.report.writers.base import Report  # noqa: E402
 from cdtool.results.curves.sweep import MULTIPLES, Swept  # noqa: E402

@@ -110,10 +110,10 @@ class _Run:
 
     def add(self, log: Path) -> None:
         """Run detection on one log, or on each of its runs, and draw the plots; raises CdtoolError."""
-        from cdtool.commands.detecting.detection import detect_log_runs
+        from cdtool.commands.detecting.detection import detect_log
         from cdtool.commands.judging.runs import lost
 
-        detected = detect_log_runs(log, self.settings)
+        detected = detect_log(log, self.settings)
         self.skipped += detected.skipped
         self.findings += detected.findings
         plots = self._plots(log, len(detected.runs))

@@ -14,7 +14,7 @@ from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.detect.log_by_name import UnknownLogError, number_of
-from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of, detect_log, detect_log_runs
+from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of, detect_log
 from cdtool.commands.detecting.detection_options import DetectionOptions
 from cdtool.commands.judging.runs import several_logs
 from cdtool.detectors.detection import Status
@@ -459,14 +459,18 @@ def detect(  # noqa: PLR0913  # the public function: a keyword for each setting
         rules=rules,
     )
     if isinstance(logs, str | Path):
-        return DetectionResult(detect_log(logs, options))
+        runs = detect_log(logs, options).runs
+        if len(runs) > 1:
+            ids = f"{runs[0].recording.source} to {runs[-1].recording.source}"
+            raise UsageError(f"{logs}: has {len(runs)} runs, {ids}", "name one, as LOG#ID, or give a list of logs")
+        return DetectionResult(runs[0])
     logs = several_logs(logs)
     options = replace(options, benchmark=options.prepared())  # learned once for all logs
     found: list[DetectedRuns] = []
     skipped: list[Skipped] = []
     for log in logs:
         try:
-            found.append(detect_log_runs(log, options))
+            found.append(detect_log(log, options))
         except (UsageError, SignatureError, OutputError):  # an error in the settings affects every log
             raise
         except CdtoolError as fault:

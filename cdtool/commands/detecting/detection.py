@@ -45,7 +45,7 @@ from cdtool.truth.missing_samples import longest_step
 
 if TYPE_CHECKING:
     from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
-    from cdtool.commands.scoring.scoring import Scored
+    from cdtool.commands.scoring.scoring import ScoredLog
 
 
 @dataclass(frozen=True)
@@ -81,47 +81,6 @@ class Detected:
         return self.detections[0].statistic.joints if self.detections else self.recording.joints
 
 
-def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
-    """Run one detector over a log: with a signature, with fixed limits, or with those of its first seconds in motion.
-
-    Parameters
-    ----------
-    log : str or Path
-        The log.
-    options : DetectionOptions
-        The machine, the detector and its threshold.
-
-    Returns
-    -------
-    Detected
-        The recording, the signal, band and alarms of each operation, and the contacts if the log has a ground truth.
-
-    Raises
-    ------
-    UsageError
-        No threshold is given, or more than one.
-    SignatureError
-        The signature belongs to another machine or to other gains.
-    RecordingError
-        The log cannot be read, or has no channel that the detector needs.
-
-    Examples
-    --------
-    >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = detect_log(log, DetectionOptions(machine, detector="momentum", limit=[400.0]))
-    >>> found.detections[0].verdict.outcome, found.detections[0].statistic.unit
-    ('alarm', 'N')
-    >>> latency = found.detections[0].verdict.alarms[0].time - found.contacts[0].start
-    >>> 0.0 < latency < 0.2                                             # s
-    True
-    """
-    found = detect_log_runs(log, options).runs
-    if len(found) > 1:
-        ids = f"{found[0].recording.source} to {found[-1].recording.source}"
-        raise UsageError(f"{log}: has {len(found)} runs, {ids}", "name one, as LOG#ID, or give a list of logs")
-    return found[0]
-
-
 @dataclass(frozen=True)
 class DetectedRuns:
     """The results for the runs of a log, in its order; `skipped` are runs left out, `findings` concern the log."""
@@ -131,7 +90,7 @@ class DetectedRuns:
     findings: tuple[RecordingFinding, ...] = ()
 
 
-def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
+def detect_log(log: str | Path, options: DetectionOptions) -> DetectedRuns:
     """Run one detector over each run of a log; a log that is not cut into runs is one.
 
     Parameters
@@ -158,7 +117,7 @@ def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
     Examples
     --------
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = detect_log_runs(log, DetectionOptions(machine, detector="momentum", limit=[400.0]))
+    >>> found = detect_log(log, DetectionOptions(machine, detector="momentum", limit=[400.0]))
     >>> [run.detections[0].verdict.outcome for run in found.runs]
     ['alarm']
     """
@@ -303,7 +262,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> DetectedRuns:
     every = benchmark.score(log)
     skipped, findings, found = list[Skipped](), list[RecordingFinding](), list[Detected]()
     if benchmark.setup.has_runs:
-        skipped, findings, every = every[0].skipped, every[0].findings, every[1:]
+        skipped, findings, every = list(every[0].rows.skipped), list(every[0].rows.findings), every[1:]
     for scored in every:
         detected = _detected(scored, log, benchmark)
         if detected is None:
@@ -316,7 +275,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> DetectedRuns:
     return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
 
 
-def _detected(scored: Scored, log: Path, benchmark: PreparedBenchmark) -> Detected | None:
+def _detected(scored: ScoredLog, log: Path, benchmark: PreparedBenchmark) -> Detected | None:
     """Return the detection in a scored recording; None if it was left out."""
     matched = scored.matched
     judged = (
@@ -324,21 +283,21 @@ def _detected(scored: Scored, log: Path, benchmark: PreparedBenchmark) -> Detect
         if matched
         else []
     )
-    if scored.log is None or matched is None or not judged:
+    if scored.recording is None or matched is None or not judged:
         return None
     return Detected(
-        scored.log,
+        scored.recording,
         tuple(item.detections[0] for item, _ in judged),
-        scored.truth,
+        scored.contacts,
         tuple(item.matchings[0] for item, _ in judged),
         benchmark.described,
         benchmark.setup.activation,
-        benchmark.has_judged_itself(scored.log),
+        benchmark.has_judged_itself(scored.recording),
         benchmark.window(log),
         tuple(rows for _, rows in judged),
         matched.not_scored,
         (*matched.findings, *benchmark.setup.rules_of("").findings, *benchmark.notes),
-        benchmark.normals_for(scored.log),
+        benchmark.normals_for(scored.recording),
         benchmark.setup.onset.described,
     )
 

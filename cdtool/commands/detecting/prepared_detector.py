@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -16,7 +16,7 @@ from cdtool.commands.learning.normal_runs import normals_for, normals_of, notes_
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog, learn_thresholds
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
-from cdtool.commands.scoring.scoring import Detect, DetectionOf, Scored, detect_with, score_runs
+from cdtool.commands.scoring.scoring import Detect, ScoredLog, detect_with, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.signature_file import SignatureFile
@@ -42,7 +42,7 @@ class PreparedBenchmark:
     detector: str
     described: str
     learned: Mapping[str, str]
-    run: DetectionOf
+    run: Detect
     ranges: LearnedRanges | None
     normals: NormalMotions
     notes: tuple[RecordingFinding, ...] = ()
@@ -50,7 +50,7 @@ class PreparedBenchmark:
     losses: tuple[RecordingFinding, ...] = ()
     runs: tuple[Operation, ...] = ()
 
-    def score(self, log: Path) -> list[Scored]:
+    def score(self, log: Path) -> list[ScoredLog]:
         """Return the rows of a log, or of each of its runs, as in a benchmark: with the window of its group, if any.
 
         If the log is cut into runs, the first entry is about the log itself. Raises nothing.
@@ -107,7 +107,7 @@ def prepare_benchmark(
             raise UsageError(f"the signature monitors {names[0]}, {file} {names[1]}", "learn it for the same joints")
         thresholds: Mapping[str, Any] = {instance.name: stored.current}
         learned = {run.sha256: "" for run in stored.runs}
-        run = _running(ThresholdsByLog(setup, thresholds), instance, {})
+        run = detect_with(setup, [instance], ThresholdsByLog(setup, thresholds).without, {})
         return PreparedBenchmark(
             setup,
             instance.name,
@@ -130,7 +130,7 @@ def prepare_benchmark(
     origin = "set by hand" if setup.limits_by_hand else origin
     described = f"threshold '{setup.rule.name}' of {setup.path.name}, {origin}"
     hashes = {item.recording.digest: item.whole.name for item in used}
-    run = _running(ThresholdsByLog.of(setup, fitted), instance, fitted.unusable)
+    run = detect_with(setup, [instance], ThresholdsByLog.of(setup, fitted).without, fitted.unusable)
     normals = normals_for(used, setup.rule)
     return PreparedBenchmark(
         setup,
@@ -145,16 +145,6 @@ def prepare_benchmark(
         losses=tuple(item for item in runs.findings if item.is_loss),
         runs=tuple(used),
     )
-
-
-def _running(thresholds: ThresholdsByLog, detector: Any, unusable: Mapping[str, str]) -> DetectionOf:
-    """Return how a log is detected: with thresholds that it did not teach."""
-
-    def detection_of(log: Path) -> tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]:
-        own, findings = thresholds.without(log)
-        return detect_with(thresholds.setup, [detector], own, unusable), findings
-
-    return detection_of
 
 
 def _has_run(listed: Path, log: Path) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.plain_text import counted
-from cdtool.commands.detecting.detection import Detected, detect_log_runs
+from cdtool.commands.detecting.detection import Detected, detect_log
 from cdtool.commands.detecting.detection_options import DetectionOptions
 from cdtool.commands.scoring.detector_inputs import inputs_of
 from cdtool.formats.machine_file import MachineFile
@@ -126,7 +126,7 @@ def explain_log(log: str | Path, options: DetectionOptions) -> Explained:
     else:
         machine_file = options.machine_file()
         options = replace(options, machine=machine_file)
-    detected = detect_log_runs(log, options)
+    detected = detect_log(log, options)
     runs = tuple(_explained(found, machine_file) for found in detected.runs)
     return Explained(runs, detected.skipped, detected.findings)
 

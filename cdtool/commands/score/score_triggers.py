@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,7 +23,7 @@ from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.scoring.gathering import Gathering
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
-from cdtool.commands.scoring.scoring import Scored, score_runs
+from cdtool.commands.scoring.scoring import Detections, ScoredLog, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.channels.run_reading import split_run
@@ -146,30 +146,31 @@ class _TriggerScoring:
     listed_only: bool
 
     def __call__(self, group: str, path: Path, wanted: Wanted | None, _: object = None) -> list[LogOutcome]:
-        found = score_runs(self.setup, group, path, lambda _: (self._detect, {}), {})
+        found = score_runs(self.setup, group, path, self._detect, {})
         if self.setup.has_runs:
             found = self._listed_runs(found)
-        for scored in found:
-            for name, said in self.said.items():
-                scored.skipped += _beside(scored, name, said, self.clock)
-        return [outcome_of(scored, self.setup, NormalMotions(), wanted) for scored in found]
+        outcomes = []
+        for log in found:
+            beside = [row for name, said in self.said.items() for row in _beside(log, name, said, self.clock)]
+            rows = replace(log.rows, skipped=(*log.rows.skipped, *beside))
+            outcomes.append(outcome_of(replace(log, rows=rows), self.setup, NormalMotions(), wanted))
+        return outcomes
 
-    def _listed_runs(self, found: list[Scored]) -> list[Scored]:
+    def _listed_runs(self, found: list[ScoredLog]) -> list[ScoredLog]:
         """Return the runs of a log that are scored, and report those without a row."""
         about_log, *runs = found
-        known = {scored.recording.recording for scored in runs if scored.recording is not None}
-        about_log.findings += _unlisted(self.path, self.said, known, self.listed_only)
+        known = {run.rows.recording.recording for run in runs if run.rows.recording is not None}
+        findings = (*about_log.rows.findings, *_unlisted(self.path, self.said, known, self.listed_only))
         if self.listed_only:
-            runs = [scored for scored in runs if scored.recording is None or self._is_listed(scored.recording)]
-        return [about_log, *runs]
+            runs = [run for run in runs if run.rows.recording is None or self._is_listed(run.rows.recording)]
+        return [replace(about_log, rows=replace(about_log.rows, findings=findings)), *runs]
 
     def _is_listed(self, run: RecordingResult) -> bool:
         return any(run.recording in by_name for by_name in self.said.values())
 
-    def _detect(self, operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
+    def _detect(self, _: Path, operations: Sequence[Operation]) -> Detections:
         found = [self._of_operation(operation) for operation in operations]
-        scored.detectors = list(dict.fromkeys(item.detector for detections in found for item in detections))
-        return found
+        return Detections(found, {item.detector: () for detections in found for item in detections}, {})
 
     def _of_operation(self, operation: Operation) -> list[Detection]:
         log = operation.whole.name
@@ -205,12 +206,13 @@ def _unlisted(
     return found
 
 
-def _beside(scored: Scored, detector: str, said: Mapping[str, Triggered], clock: str) -> list[Skipped]:
+def _beside(scored: ScoredLog, detector: str, said: Mapping[str, Triggered], clock: str) -> list[Skipped]:
     """Report rows at times without a recording, mostly times on another clock."""
-    if scored.recording is None or scored.recording.recording not in said:
+    row, matched = scored.rows.recording, scored.matched
+    if row is None or matched is None or row.recording not in said:
         return []
-    name, item = scored.recording.recording, said[scored.recording.recording]
-    parts = [judged.operation.recording for judged in scored.judged]
+    name, item = row.recording, said[row.recording]
+    parts = [judged.operation.recording for judged in matched.judged]
     shift = parts[0].origin if clock == "source" else 0.0
     spans = [(part.start + shift, part.end + shift) for part in parts]
     rows = [(at, at) for at in item.alarms] + item.blind

@@ -31,7 +31,7 @@ from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
-from cdtool.commands.scoring.scoring import Detect, Scored, detect_with, score_runs
+from cdtool.commands.scoring.scoring import ScoredLog, detect_with, score_runs
 from cdtool.commands.scoring.store.stored_learned import StoreOfRun
 from cdtool.detectors.base import Detector
 from cdtool.execution.store.digest import code_version, digest_of
@@ -43,7 +43,7 @@ from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.curves.sweep import MULTIPLES
 from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import LimitRule, unchecked
-from cdtool.results.results import RecordingFinding, Skipped
+from cdtool.results.results import Skipped
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.normal_choice import NormalMotions
 
@@ -219,22 +219,19 @@ class _LogScoring:
             wanted_here = detectors or tuple(item.name for item in self.detectors)
             detectors = tuple(name for name in wanted_here if name not in refused)
         chosen = self if detectors is None else self._with_only(detectors)
-        scored = score_runs(chosen.setup, group, path, chosen._detection_of, chosen.factors, chosen.ranges)
+        detect = detect_with(chosen.setup, chosen.detectors, chosen.thresholds.without, chosen.unusable)
+        scored = score_runs(chosen.setup, group, path, detect, chosen.factors, chosen.ranges)
         return [outcome_of(item, chosen.setup, chosen._normals_for(item), wanted) for item in scored]
 
     def _with_only(self, names: tuple[str, ...]) -> _LogScoring:
         chosen = tuple(detector for detector in self.detectors if detector.name in names)
         return replace(self, detectors=chosen, thresholds=self.thresholds.with_only(names))
 
-    def _normals_for(self, scored: Scored) -> NormalMotions | NormalsWithout:
+    def _normals_for(self, scored: ScoredLog) -> NormalMotions | NormalsWithout:
         """Return the normal motion that a log is compared with: without its own."""
-        if not self.runs or scored.log is None:
+        if not self.runs or scored.recording is None:
             return self.normals
-        return NormalsWithout(self.runs, scored.log.name, self.setup.rule)
-
-    def _detection_of(self, log: Path) -> tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]:
-        thresholds, untaught = self.thresholds.without(log)
-        return detect_with(self.setup, self.detectors, thresholds, self.unusable), untaught
+        return NormalsWithout(self.runs, scored.recording.name, self.setup.rule)
 
 
 def _scoring(

@@ -10,21 +10,19 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cdtool.alarms.pipeline import Detection
-from cdtool.base.findings import Finding
 from cdtool.commands.judging.judged_operation import Judged
-from cdtool.commands.judging.matched_log import UncutStrokes
+from cdtool.commands.judging.matched_log import MatchedLog, UncutStrokes
 from cdtool.commands.learning.normal_runs import NormalsWithout
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.detector_inputs import inputs_of
 from cdtool.commands.scoring.left_out import LeftOut
-from cdtool.commands.scoring.scoring import Scored
+from cdtool.commands.scoring.scoring import LogRows, ScoredLog
 from cdtool.report.explanation_words import words
 from cdtool.results.curves.sweep import Swept
 from cdtool.results.explanation.explanation import explain_operation
 from cdtool.results.results import (
     ContactResult,
     FalseAlarmResult,
-    ForceResult,
     RecordingFinding,
     RecordingResult,
     Skipped,
@@ -32,7 +30,6 @@ from cdtool.results.results import (
 from cdtool.results.traces.choice import TraceChoice
 from cdtool.results.traces.trace import Trace, make_trace
 from cdtool.thresholds.normal_choice import NormalMotions
-from cdtool.truth.force.verdict import ForceVerdict
 from cdtool.truth.matching import Matching
 
 # The normal motion of impact-free runs, or how it is made when it is needed.
@@ -75,26 +72,6 @@ class DetectorOutcome:
     failed: tuple[Skipped, ...] = ()
     findings: tuple[RecordingFinding, ...] = ()
     uncut: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class LogRows:
-    """The rows of a log that do not depend on the detectors.
-
-    `unchecked`: names of logs assumed to be free of impacts, with the ground truth that is missing from them.
-    `beside`: name and SHA-256 of each file beside the log with a channel. `strokes`: of a log that is not cut.
-    `unread`: it could not be read.
-    """
-
-    recording: RecordingResult | None
-    forces: tuple[ForceResult, ...] = ()
-    verdicts: tuple[ForceVerdict, ...] = ()
-    skipped: tuple[Skipped, ...] = ()
-    findings: tuple[RecordingFinding, ...] = ()
-    unchecked: tuple[tuple[str, Finding], ...] = ()
-    beside: tuple[tuple[str, str], ...] = ()
-    strokes: int = 0
-    unread: bool = False
 
 
 @dataclass(frozen=True)
@@ -209,31 +186,22 @@ class TheseTraces:
 Wanted = WantedTraces | TheseTraces
 
 
-def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: Wanted | None) -> LogOutcome:
+def outcome_of(scored: ScoredLog, setup: BenchmarkFile, normals: Normals, wanted: Wanted | None) -> LogOutcome:
     """Return what remains of a scored log; alarms are explained by comparison with `normals`, for wanted traces."""
-    uncut = scored.matched.uncut if scored.matched else UncutStrokes("")
-    rows = LogRows(
-        recording=scored.recording,
-        forces=tuple(scored.forces),
-        verdicts=tuple(scored.verdicts.values()),
-        skipped=tuple(scored.skipped),
-        findings=tuple(scored.findings),
-        unchecked=tuple(scored.unchecked),
-        beside=scored.log.beside if scored.log else (),
-        strokes=uncut.strokes,
-        unread=scored.unread,
-    )
+    detections, matched = scored.detections, scored.matched
+    judged = matched.judged if matched else ()
+    uncut = matched.uncut.not_assessable if matched else {}
     outcome = LogOutcome(
-        rows,
+        scored.rows,
         tuple(
             DetectorOutcome(
                 detector=name,
-                operations=tuple(_on_operation(name, scored, number) for number in range(len(scored.judged))),
-                failed=tuple(scored.failed.get(name, ())),
-                findings=tuple(scored.untaught.get(name, ())),
-                uncut=uncut.not_assessable.get(name, ()),
+                operations=tuple(_on_operation(name, matched, number) for number in range(len(judged))),
+                failed=failed,
+                findings=tuple(detections.untaught.get(name, ())),
+                uncut=uncut.get(name, ()),
             )
-            for name in scored.detectors
+            for name, failed in detections.failed.items()
         ),
         reading=scored.reading,
         detecting=scored.detecting,
@@ -242,16 +210,16 @@ def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: W
     if wanted is None:
         return outcome
     traces = [
-        _trace(judged, setup, normals) if wanted.is_wanted(judged.group, tuple(outcome.of_operation(number))) else None
-        for number, judged in enumerate(scored.judged)
+        _trace(item, setup, normals) if wanted.is_wanted(item.group, tuple(outcome.of_operation(number))) else None
+        for number, item in enumerate(judged)
     ]
     return replace(outcome, traces=tuple(traces))
 
 
-def _on_operation(detector: str, scored: Scored, number: int) -> OperationOutcome | None:
+def _on_operation(detector: str, matched: MatchedLog | None, number: int) -> OperationOutcome | None:
     """Return the outcome of a detector on an operation; None if it failed on it."""
-    judged, matched = scored.judged[number], scored.matched
     assert matched is not None, "operations are matched before they are judged"
+    judged = matched.judged[number]
     for detection, swept in zip(judged.detections, judged.sweeps, strict=True):
         if detection.detector == detector:
             statistic = detection.statistic

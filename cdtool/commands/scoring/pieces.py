@@ -10,7 +10,8 @@ from time import perf_counter
 from cdtool.base.remote.remote_path import is_remote
 from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
-from cdtool.commands.scoring.log_outcome import LogOutcome, LogRows, TheseTraces, Wanted, WantedTraces
+from cdtool.commands.scoring.log_outcome import LogOutcome, TheseTraces, Wanted, WantedTraces
+from cdtool.commands.scoring.scoring import LogRows
 from cdtool.execution.store.sources import SourceFile, State, files_of, read_sources, state_of
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.results.results import Skipped

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 from cdtool.alarms.pipeline import Detection, detect_operations
 from cdtool.base.arrays import FloatArray
@@ -39,80 +39,96 @@ from cdtool.recordings.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recordings.recording import Contact, Recording
 from cdtool.results.curves.sweep import sweep_operation
 from cdtool.results.results import ForceResult, RecordingFinding, RecordingResult, Skipped
-from cdtool.thresholds.base import FittedThreshold
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.verdict import ForceVerdict, assess_force
 
 
-@dataclass
-class Scored:
-    """The results of one log.
+@dataclass(frozen=True)
+class LogRows:
+    """The rows of a log that do not depend on the detectors.
 
-    `detectors` are those that were run; `failed` are the operations on which one failed, by detector. `untaught`: why
-    nothing could be learned for this log, by detector.
+    `recording` is None if it was left out. `unchecked`: names of logs assumed to be free of impacts, with the ground
+    truth that is missing from them. `beside`: name and SHA-256 of each file beside the log with a channel. `strokes`:
+    of a log that is not cut. `unread`: it could not be read.
     """
 
-    recording: RecordingResult | None = None
-    judged: list[Judged] = field(default_factory=list)
-    detectors: list[str] = field(default_factory=list)
-    failed: dict[str, list[Skipped]] = field(default_factory=dict)
-    untaught: Mapping[str, Sequence[RecordingFinding]] = field(default_factory=dict)
-    forces: list[ForceResult] = field(default_factory=list)
-    verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
-    skipped: list[Skipped] = field(default_factory=list)
-    findings: list[RecordingFinding] = field(default_factory=list)
-    # Whether the log could not be read, and whether that lasts: it is not because of a network or a full disk.
+    recording: RecordingResult | None
+    forces: tuple[ForceResult, ...] = ()
+    verdicts: tuple[ForceVerdict, ...] = ()
+    skipped: tuple[Skipped, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
+    unchecked: tuple[tuple[str, Finding], ...] = ()
+    beside: tuple[tuple[str, str], ...] = ()
+    strokes: int = 0
     unread: bool = False
-    lasts: bool = True
-    # Names of logs assumed to be free of impacts, with the ground truth that is missing from them.
-    unchecked: list[tuple[str, Finding]] = field(default_factory=list)
-    source: str = ""
-    # The recording, its contacts and their matching, for commands that show more than rows.
-    log: Recording | None = None
-    truth: tuple[Contact, ...] = ()
+
+
+class Detections(NamedTuple):
+    """The detections of each operation of a log.
+
+    `failed` are the operations on which a detector failed, for every detector that was run. `untaught`: why nothing
+    could be learned for this log, by detector.
+    """
+
+    of_operations: Sequence[Sequence[Detection]]
+    failed: Mapping[str, tuple[Skipped, ...]]
+    untaught: Mapping[str, Sequence[RecordingFinding]]
+
+
+_NOTHING_DETECTED = Detections((), {}, {})
+
+
+@dataclass(frozen=True)
+class ScoredLog:
+    """One log or run after detection and matching: its rows, and with its samples what the rows are made of.
+
+    `recording`, `contacts` and `matched` are absent if the log was left out; `lasts` says whether it would be again: it
+    is not because of a network or a full disk. `reading`, `detecting` [s]: time taken.
+    """
+
+    rows: LogRows
+    recording: Recording | None = None
+    contacts: tuple[Contact, ...] = ()
+    detections: Detections = _NOTHING_DETECTED
     matched: MatchedLog | None = None
+    lasts: bool = True
     reading: float = 0.0
     detecting: float = 0.0
-
-    def leave_out(self, left_out: Skipped, fault: CdtoolError) -> None:
-        """Note that the log cannot be read."""
-        self.skipped.append(left_out)
-        self.unread, self.lasts = True, is_lasting(fault)
 
     @property
     def left_out(self) -> list[Skipped]:
         """Return everything that was left out; what all detectors left out for the same reason is listed once."""
         combined = LeftOut()
-        for name in self.detectors:
-            combined.add(name, self.failed.get(name, ()))
-        return [*self.skipped, *combined.combined()]
+        for name, failed in self.detections.failed.items():
+            combined.add(name, failed)
+        return [*self.rows.skipped, *combined.combined()]
 
 
-# Returns the detections of each operation of a log; failures are reported in the log's `Scored`.
-Detect = Callable[[Sequence[Operation], Scored], list[list[Detection]]]
-# Returns how a log, given by its path, is detected, and the findings about that by detector.
-DetectionOf = Callable[[Path], tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]]
+# Returns the detections in the operations of a log or run, given by its path.
+Detect = Callable[[Path, Sequence[Operation]], Detections]
 
 
 def detect_with(
     setup: BenchmarkFile,
     detectors: Sequence[Any],
-    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
+    thresholds_for: Callable[[Path], tuple[Mapping[str, Any], Mapping[str, Sequence[RecordingFinding]]]],
     unusable: Mapping[str, str],
 ) -> Detect:
     """Return the detectors with their thresholds as one function; a detector that fails on a log is left out there.
 
-    Detectors in `unusable` cannot be used, for the given reason; none of their samples is assessable. A class of
-    motion is monitored for the longest matching window.
+    `thresholds_for` returns the thresholds of each detector for a log, and the findings about that. Detectors in
+    `unusable` cannot be used, for the given reason; none of their samples is assessable. A class of motion is monitored
+    for the longest matching window.
     """
     hold = max(HOLD, *(group.window for group in setup.impacts.values()))
     machine = setup.machine_file.machine
 
-    def detect(operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
+    def detect(log: Path, operations: Sequence[Operation]) -> Detections:
+        thresholds, untaught = thresholds_for(log)
         found: list[list[Detection]] = [[] for _ in operations]
-        scored.detectors = [detector.name for detector in detectors]
+        failed: dict[str, tuple[Skipped, ...]] = {}
         for detector in detectors:
-            failed: list[Skipped] = []
+            failed[detector.name] = ()
             if detector.name in unusable:
                 unit, why = detector.unit(machine), unusable[detector.name]
                 made = [not_assessable(item, detector.name, unit, why, setup.watched) for item in operations]
@@ -123,66 +139,49 @@ def detect_with(
                         operations, machine, detector, known, setup.activation, setup.watched, hold
                     )
                 except CdtoolError as fault:
-                    failed = [Skipped(item.whole.name, str(fault)) for item in operations]
-                    made = []
-            scored.failed[detector.name] = failed
-            for of_operation, detection in zip(found, made, strict=not failed):
+                    failed[detector.name] = tuple(Skipped(item.whole.name, str(fault)) for item in operations)
+                    continue
+            for of_operation, detection in zip(found, made, strict=True):
                 of_operation.append(detection)
-        return found
+        return Detections(found, failed, untaught)
 
     return detect
-
-
-def score_log(
-    setup: BenchmarkFile,
-    group: str,
-    path: Path,
-    detect: Detect,
-    factors: Mapping[str, FloatArray],
-    ranges: LearnedRanges | None = None,
-) -> Scored:
-    """Return the rows of a log; a log or detector that fails is left out and reported, and nothing is raised.
-
-    `factors`: the safety factors of the sweep by detector. `group` is empty for a log outside all groups. Values
-    outside the plausible `ranges` are masked.
-    """
-    return _score(setup, group, path, detect, factors, _WholeLog(setup, group, path, ranges))
 
 
 def score_runs(
     setup: BenchmarkFile,
     group: str,
     path: Path,
-    detection_of: DetectionOf,
+    detect: Detect,
     factors: Mapping[str, FloatArray],
     ranges: LearnedRanges | None = None,
-) -> list[Scored]:
-    """Return the same for each run of a log, if the benchmark cuts logs into runs; the first entry is about the log.
+) -> list[ScoredLog]:
+    """Score a log, or each of its runs if the benchmark cuts logs into runs; the first entry is then about the log.
 
-    `detection_of` returns for the path of a log or run how it is detected.
+    A log or detector that fails is left out and reported, and nothing is raised. `factors`: the safety factors of the
+    sweep by detector. `group` is empty for a log outside all groups. Values outside the plausible `ranges` are masked.
     """
     cut = RunCut.of(setup.operations)
     if cut is None:
-        detect, untaught = detection_of(path)
-        whole_log = score_log(setup, group, path, detect, factors, ranges)
-        whole_log.untaught = untaught
-        return [whole_log]
-    about_log, begin = Scored(), perf_counter()
+        return [_score(setup, group, path, detect, factors, _WholeLog(setup, group, path, ranges))]
+    begin = perf_counter()
     try:
         runs = read_runs(path, setup.machine_file, cut)
     except CdtoolError as fault:
-        about_log.leave_out(unread(path, setup.path.parent, fault), fault)
-        return [about_log]
-    finally:
-        about_log.reading = perf_counter() - begin
-    about_log.skipped, about_log.findings = reported(runs, path, setup.path.parent)
-    scored = [about_log]
+        return [_unread(setup, path, fault, perf_counter() - begin)]
+    seconds = perf_counter() - begin
+    skipped, findings = reported(runs, path, setup.path.parent)
+    rows = LogRows(None, skipped=tuple(skipped), findings=tuple(findings))
+    scored = [ScoredLog(rows, reading=seconds)]
     for logged in runs.runs:
         run = location(logged.recording.source)
-        detect, untaught = detection_of(run)
         scored.append(_score(setup, group, path, detect, factors, _OneRun(setup, run, logged, ranges)))
-        scored[-1].untaught = untaught
     return scored
+
+
+def _unread(setup: BenchmarkFile, path: Path, fault: CdtoolError, seconds: float) -> ScoredLog:
+    left_out = unread(path, setup.path.parent, fault)
+    return ScoredLog(LogRows(None, skipped=(left_out,), unread=True), lasts=is_lasting(fault), reading=seconds)
 
 
 @dataclass(frozen=True)
@@ -277,50 +276,57 @@ def _score(
     detect: Detect,
     factors: Mapping[str, FloatArray],
     load: _WholeLog | _OneRun,
-) -> Scored:
-    """Return the rows of a log or of one of its runs; `log` is its path in the benchmark file."""
-    scored = Scored()
+) -> ScoredLog:
+    """Score a log or one of its runs; `log` is its path in the benchmark file."""
     rules, path = setup.rules_of(group), load.path
     begin = perf_counter()
     try:
         read = _log_to_score(setup, group, log, load)
     except CdtoolError as fault:
-        scored.leave_out(unread(path, setup.path.parent, fault), fault)
-        scored.reading = perf_counter() - begin
-        return scored
+        return _unread(setup, path, fault, perf_counter() - begin)
     recording, operations, contacts, unwanted = read.recording, read.operations, read.contacts, read.unwanted
-    scored.reading = perf_counter() - begin
-    scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
-    scored.findings += lost(recording)
+    reading = perf_counter() - begin
+    findings, skipped, unchecked = [*lost(recording)], list[Skipped](), list[tuple[str, Finding]]()
     if setup.is_impact_free(group):
         operations, touched = without_contacts(operations, unwanted)
-        scored.skipped += [replace(item, recording=recording.name) for item in touched]
-        scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
+        skipped += [replace(item, recording=recording.name) for item in touched]
+        unchecked = [(recording.name, item) for item in absent_truth(recording)]
         if not operations:
-            scored.findings += log_warnings(recording, unwanted, setup.onset)
-            return scored
-    scored.recording = _recording_result(recording, group, log, len(operations), len(contacts), setup)
-    found = detect(operations, scored)
-    detected = DetectedLog(recording, operations, setup.operations, contacts, found)
+            findings += log_warnings(recording, unwanted, setup.onset)
+            rows = LogRows(None, (), (), tuple(skipped), tuple(findings), tuple(unchecked), beside=recording.beside)
+            return ScoredLog(rows, recording, tuple(contacts), reading=reading)
+    row = _recording_result(recording, group, log, len(operations), len(contacts), setup)
+    found = detect(path, operations)
+    detected = DetectedLog(recording, operations, setup.operations, contacts, found.of_operations)
     matched = match_log(detected, group, rules, setup.activation.wait)
-    scored.skipped += matched.not_scored
-    scored.findings += matched.about_log
-    scored.matched, curves = matched, matched.curves
-    profile = setup.impacts[group].force if group in setup.impacts else None
-    if profile:
-        scored.verdicts = {number: assess_force(curve, profile) for number, curve in curves.items()}
-        scored.forces = force_rows(scored.recording, scored.verdicts, curves)
-        scored.findings += _force_not_seen(recording, profile.name, scored.verdicts, curves)
+    skipped += matched.not_scored
+    findings += matched.about_log
+    forces, verdicts = list[ForceResult](), dict[int, ForceVerdict]()
+    if group in setup.impacts and (profile := setup.impacts[group].force):
+        curves = matched.curves
+        verdicts = {number: assess_force(curve, profile) for number, curve in curves.items()}
+        forces = force_rows(row, verdicts, curves)
+        findings += _force_not_seen(recording, profile.name, verdicts, curves)
         numbered = enumerate(contacts, 1)
         unseen = [f"contact {number}" for number, item in numbered if number not in curves and not item.in_progress]
         if unseen:
             text = f"{', '.join(unseen)}: no load-cell force to compare with {profile.name}"
-            scored.skipped.append(Skipped(recording.name, text))
+            skipped.append(Skipped(recording.name, text))
     # The curve of latency against false alarms is that of the unchanged machine.
     moved = {} if setup.is_condition(group) else factors
-    scored.judged = [_swept(item, setup, rules.window, moved) for item in matched.judged]
-    scored.detecting = perf_counter() - begin - scored.reading
-    return scored
+    matched = replace(matched, judged=tuple(_swept(item, setup, rules.window, moved) for item in matched.judged))
+    rows = LogRows(
+        row,
+        tuple(forces),
+        tuple(verdicts.values()),
+        tuple(skipped),
+        tuple(findings),
+        tuple(unchecked),
+        beside=recording.beside,
+        strokes=matched.uncut.strokes,
+    )
+    detecting = perf_counter() - begin - reading
+    return ScoredLog(rows, recording, tuple(contacts), found, matched, True, reading, detecting)
 
 
 def _force_not_seen(

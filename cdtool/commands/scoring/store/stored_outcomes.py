@@ -17,8 +17,9 @@ from typing import Any
 
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
-from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, LogRows
+from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome
 from cdtool.commands.scoring.pieces import Piece, PieceOutcome
+from cdtool.commands.scoring.scoring import LogRows
 from cdtool.commands.scoring.store.determinants import Determinants
 from cdtool.commands.scoring.store.finished_run import FinishedRun, TraceKey
 from cdtool.commands.scoring.store.known_sources import KnownSources
