@@ -235,7 +235,7 @@ def test_a_copy_of_a_log_is_said_to_have_been_learned_from(gate, prepared, tmp_p
 
 
 def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):
-    log = prepared.score(gate / "stiff" / "01.csv")[0].log
+    log = prepared.score(gate / "stiff" / "01.csv")[0].recording
     assert log is not None and prepared.normals.motions[0].runs == 7
     assert prepared.normals_for(log).motions[0].runs == 6
 
