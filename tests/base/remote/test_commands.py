@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
-from cdtool.base.remote import staging
+from cdtool.base.remote import session, staging
 from tests.command import cdtool
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
@@ -158,9 +158,8 @@ def test_runs_of_a_log_are_named_by_its_url(memory, tmp_path):
 
 def test_no_copy_is_left_after_a_command(gate):
     cdtool("benchmark", f"{gate}/benchmark.toml")
-    assert not staging._session.copies or staging._session.owned is not None
     staging.release()
-    assert not [path for path in staging._session.own_folder().iterdir() if path.is_file()]
+    assert {path.name for path in session.folder().iterdir()} <= {"lock", "read"}
 
 
 def test_a_store_at_a_url_is_used_again(gate, memory, tmp_path):
