@@ -225,7 +225,7 @@ def _uploaded_folder(path: Path, may_replace: Callable[[Path], bool] | None) -> 
         for item in sorted(Path(folder).rglob("*")):
             if item.is_file():
                 _upload(path / item.relative_to(folder).as_posix(), item)
-        for old in list(path.rglob("*")) if whole else ():
+        for old in list(path.glob("**/*")) if whole else ():
             if old.is_file() and not (Path(folder) / old.relative_to(path)).exists():
                 old.unlink(missing_ok=True)
 

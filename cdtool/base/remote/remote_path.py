@@ -241,10 +241,6 @@ class Remote(os.PathLike[str]):
         with suppress(FileNotFoundError, NotADirectoryError):
             yield from self._listed(pattern)
 
-    def rglob(self, pattern: str) -> Iterator[Remote]:
-        """Yield what fits a pattern in this folder or one below it; raises StorageError."""
-        return self.glob(f"**/{pattern}")
-
     def iterdir(self) -> Iterator[Remote]:
         """Yield the files and folders in a folder, in order; raises MissingObjectError, StorageError."""
         return self._listed()

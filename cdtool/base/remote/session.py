@@ -38,13 +38,9 @@ def note_read(size: int) -> None:
 
 def amount_read() -> tuple[int, int]:
     """Return the bytes that this command has read from URLs, and in how many requests."""
-    given = os.environ.get(_FOLDER)
-    if not given:
-        return 0, 0
-    with suppress(OSError, ValueError):
-        sizes = [int(line) for line in (Path(given) / _READ).read_text(encoding="ascii").split()]
-        return sum(sizes), len(sizes)
-    return 0, 0
+    noted = Path(os.environ.get(_FOLDER, os.devnull)) / _READ
+    sizes = [int(line) for line in noted.read_text(encoding="ascii").split()] if noted.is_file() else []
+    return sum(sizes), len(sizes)
 
 
 def _made() -> Path:
