@@ -105,10 +105,8 @@ def check_place(path: Path) -> None:
     if scheme_of(str(path)) not in _BUCKETS:
         return
     try:
-        with suppress(FileNotFoundError):  # some versions of s3fs do not find an empty one
-            storage.info(path.anchor)
-            return
-        storage.names_in(path.anchor)
+        if staging.known_info(path.anchor) is None:  # some versions of s3fs do not find an empty one
+            storage.names_in(path.anchor)
     except FileNotFoundError:
         raise UsageError(f"{path}: no bucket {path.anchor}", "create the bucket first") from None
     except StorageError as fault:
@@ -116,17 +114,10 @@ def check_place(path: Path) -> None:
             raise
 
 
-def _normal(names: list[str]) -> tuple[str, ...]:
-    """Return names without ".", ".." and empty ones at the end; in a bucket, one between others may be empty."""
-    made: list[str] = []
-    for name in names:
-        if name == "..":
-            del made[-1:]
-        elif name != ".":
-            made.append(name)
-    while made and not made[-1]:
-        made.pop()
-    return tuple(made)
+def _normal(below: str) -> str:
+    """Return names without ".", ".." and "/" at the end; in a bucket, one between others may be empty."""
+    dots = {".", ".."} & set(below.split("/"))
+    return (posixpath.normpath(f"/{below}")[1:] if dots else below).rstrip("/")
 
 
 @total_ordering
@@ -135,20 +126,20 @@ class Remote(os.PathLike[str]):
     """A file or folder at a URL: the protocol with the host or bucket, and the names below it."""
 
     anchor: str
-    names: tuple[str, ...] = ()
+    below: str = ""
 
     @classmethod
     def of(cls, url: str) -> Remote:
         """Return that of a URL."""
         scheme, _, rest = shown(url).partition("://")
-        first, *names = ("", *rest.split("/")) if scheme == "memory" else rest.split("/")
-        return cls(f"{scheme}://{first}", _normal(names))
+        first, _, below = ("", "", rest) if scheme == "memory" else rest.partition("/")
+        return cls(f"{scheme}://{first}", _normal(below))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Remote.of, (complete(str(self)),)
 
     def __str__(self) -> str:
-        return f"{self.anchor}{'/' if self.names and self.anchor[-1] != '/' else ''}{'/'.join(self.names)}"
+        return f"{self.anchor}{'/' if self.below and self.anchor[-1] != '/' else ''}{self.below}"
 
     as_posix = __str__
 
@@ -162,7 +153,7 @@ class Remote(os.PathLike[str]):
     @property
     def name(self) -> str:
         """The last name."""
-        return self.names[-1] if self.names else ""
+        return self.below.rpartition("/")[2]
 
     @property
     def suffix(self) -> str:
@@ -177,23 +168,23 @@ class Remote(os.PathLike[str]):
     @property
     def parts(self) -> tuple[str, ...]:
         """The anchor and the names below it."""
-        return (self.anchor, *self.names)
+        return (self.anchor, *self.below.split("/")) if self.below else (self.anchor,)
 
     @property
     def parent(self) -> Remote:
         """The folder; of a host or bucket itself."""
-        return replace(self, names=self.names[:-1])
+        return replace(self, below=self.below.rpartition("/")[0])
 
     def with_name(self, name: str) -> Remote:
         """Return the path with another name."""
-        return replace(self, names=(*self.names[:-1], name))
+        return replace(self, below=f"{self.below.removesuffix(self.name)}{name}")
 
     def __truediv__(self, other: str | os.PathLike[str]) -> Any:
         """Return the path below; an absolute path or a URL replaces it."""
         text = str(other)
         if scheme_of(text) or text.startswith("/"):
             return location(text)
-        return replace(self, names=_normal([*self.names, *text.split("/")]))
+        return replace(self, below=_normal(f"{self.below}/{text}" if self.below else text))
 
     def absolute(self) -> Remote:
         """Return the path itself: there are no links."""
@@ -211,7 +202,7 @@ class Remote(os.PathLike[str]):
 
     def relative_to(self, base: Remote) -> Path:
         """Return the path below another URL."""
-        return Path(*self.names[len(base.names) :])
+        return Path(self.below.removeprefix(base.below).lstrip("/"))
 
     def samefile(self, other: object) -> bool:
         """Return whether another path is the same URL."""
@@ -247,7 +238,7 @@ class Remote(os.PathLike[str]):
 
     def _listed(self, pattern: str = "") -> Iterator[Remote]:
         for name, found in storage.names_in(str(self), pattern).items():
-            path = replace(self, names=(*self.names, *name.split("/")))
+            path = replace(self, below=f"{self.below}/{name}" if self.below else name)
             if found is not None:
                 staging.note(str(path), found)
             yield path
