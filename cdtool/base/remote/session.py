@@ -10,7 +10,6 @@ import atexit
 import os
 import shutil
 import tempfile
-import threading
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
@@ -18,16 +17,12 @@ from typing import IO
 # The folder, for the processes that are started here.
 _FOLDER = "CDTOOL_REMOTE_FOLDER"
 _PREFIX, _LOCK, _READ = "cdtool-remote-", "lock", "read"
-_making = threading.Lock()
 
 
 def folder() -> Path:
     """Return the folder of this command; make it at the first call."""
-    with _making:
-        given = os.environ.get(_FOLDER)
-        if given and Path(given).is_dir():
-            return Path(given)
-        return _made()
+    given = Path(os.environ.get(_FOLDER, os.devnull))
+    return given if given.is_dir() else _made()
 
 
 def note_read(size: int) -> None:
@@ -51,11 +46,12 @@ def _made() -> Path:
     lock_handle(lock.fileno())
     os.environ[_FOLDER] = str(made)
     atexit.register(_end, made, lock, os.getpid())
-    for left in made.parent.glob(f"{_PREFIX}*"):
-        if left != made:
-            with suppress(OSError), (left / _LOCK).open("r+b") as file:
-                if lock_handle(file.fileno()):
-                    shutil.rmtree(left, ignore_errors=True)
+    for left in set(made.parent.glob(f"{_PREFIX}*")) - {made}:
+        with suppress(OSError):
+            with (left / _LOCK).open("r+b") as file:
+                is_left = lock_handle(file.fileno())
+            if is_left:
+                shutil.rmtree(left, ignore_errors=True)
     return made
 
 
