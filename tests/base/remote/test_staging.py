@@ -56,6 +56,7 @@ def _use_copies() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_what_a_worker_reads_is_counted(memory):
     memory.pipe_file("/logs/a.mcap", b"x" * 100)
+    assert location("memory://logs/a.mcap").exists()  # as a command does before it starts workers
     before = session.amount_read()
     child = os.fork()
     if not child:
