@@ -108,6 +108,7 @@ def names_in(url: str, pattern: str = "") -> dict[str, ObjectInfo | None]:
         own = place.rstrip("/")
         within = f"{glob.escape(own)}/{pattern}"
         listed = fs.glob(within, detail=True).values() if pattern else fs.ls(place, detail=True)
+        listed = [item for item in listed if str(item["name"]).startswith(own)]  # a web page has other links, too
         found = {str(item["name"]).removeprefix(own).strip("/"): item for item in listed}
     is_web = scheme_of(url) in ("http", "https")
     return {
