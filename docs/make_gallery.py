@@ -7,6 +7,7 @@ its last line, and its figures: docs/images/gallery_NAME_1.png. With a folder as
 
 from __future__ import annotations
 
+import argparse
 import ast
 import contextlib
 import io
@@ -121,9 +122,11 @@ def page_of(name: str) -> Page:
     return Page("\n".join(lines), pictures)
 
 
-def main(arguments: list[str]) -> int:
+def main() -> None:
     """Write all pages and pictures, or those into a folder."""
-    docs = Path(arguments[0]).resolve() if arguments else DOCS
+    parser = argparse.ArgumentParser(description="Run the examples of the gallery and write their pages.")
+    parser.add_argument("folder", type=Path, nargs="?", default=DOCS, help="where the pages are written")
+    docs = parser.parse_args().folder.resolve()
     sys.path.insert(0, str(DOCS.parent))
     for folder in (docs / "gallery", docs / "images"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -136,9 +139,8 @@ def main(arguments: list[str]) -> int:
             old.unlink()
         for file, picture in page.pictures.items():
             (docs / "images" / file).write_bytes(picture)
-    return 0
 
 
 if __name__ == "__main__":
     os.environ["COLUMNS"], os.environ["MPLBACKEND"] = "120", "Agg"
-    sys.exit(main(sys.argv[1:]))
+    main()
