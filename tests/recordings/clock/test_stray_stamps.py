@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import cdtool
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.commands.detecting.detection import detect_log
-from cdtool.commands.detecting.detection_options import DetectionOptions
 from cdtool.commands.judging.information import info
 from cdtool.recordings.clock import clean_time, epoch_start
 from cdtool.recordings.clock.stamps import EPOCH, ClockCleaner
@@ -136,7 +135,7 @@ def test_one_stray_stamp_does_not_change_the_verdict(tmp_path, row, stamp):
     log = tmp_path / "03.csv"
     log.write_text("\n".join(lines) + "\n")
     whole, stray = (
-        detect_log(path, DetectionOptions(gate / "machine.toml", detector="momentum", limit=[300.0]))
+        cdtool.detect(path, gate / "machine.toml", detector="momentum", limit=[300.0])
         for path in (gate / "stiff" / "03.csv", log)
     )
     assert [alarm.time for item in whole.detections for alarm in item.verdict.alarms]
