@@ -335,7 +335,7 @@ def _operations(run: DetectionResult) -> Iterator[OperationRow]:
 
 
 @overload
-def detect(  # type: ignore[overload-overlap]  # the public function: a keyword for each setting; a str is one log, not a sequence of them
+def detect(  # type: ignore[overload-overlap]  # a str is one log, not a sequence of them
     logs: str | Path,
     machine: str | Path | MachineFile | None = ...,
     *,
@@ -353,7 +353,7 @@ def detect(  # type: ignore[overload-overlap]  # the public function: a keyword 
 
 
 @overload
-def detect(  # the public function: a keyword for each setting
+def detect(
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile | None = ...,
     *,

@@ -23,38 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DetectionOptions:
-    """The machine and the threshold, or a benchmark file that contains them and every other setting.
-
-    Parameters
-    ----------
-    machine : str, Path or MachineFile, optional
-        The machine file; not with `benchmark`.
-    benchmark : str, Path or PreparedBenchmark, optional
-        A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors, and
-        `signature`, which replaces its threshold.
-    signature : str, Path, Learned or SignatureFile, optional
-        A signature file or what was learned, which contains detector, threshold and activation.
-    detector : str or Detector, optional
-        Name or short name of the detector, or a detector of your own; needed with `limit` or `warm_up`.
-    limit : sequence of float, optional
-        Limit |i| < limit in the signal's unit, one number or one per joint, in place of a signature.
-    warm_up : float, optional
-        Limits from the run's own first seconds in motion (threshold `baseline`), this long [s], in place of a
-        signature.
-    joints : sequence of str, optional
-        With `limit` or `warm_up`, the joints to monitor; all by default. A signature monitors those that it was learned
-        for.
-    section : LogSection, optional
-        The part of the log that is used; the whole log by default.
-    operations : str, optional
-        How the log is cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
-        clock-reset.
-    activation : ActivationSettings, optional
-        Settings of the activation that replace those of the signature, or the default: debounce [samples], rearm [s],
-        hysteresis [share], latch.
-    rules : ScoringRules, optional
-        The onset rule of contacts, and how long after it an alarm belongs to a contact.
-    """
+    """The machine and the threshold, or a benchmark file that contains them: the parameters of `cdtool.detect`."""
 
     machine: str | Path | MachineFile | None = None
     _: KW_ONLY
