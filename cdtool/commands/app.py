@@ -219,8 +219,8 @@ def _run_app(came: list[int]) -> Any:
 
 def _transferred() -> tuple[int, int]:
     """Return the bytes that this process and its workers have read from URLs, and in how many requests."""
-    staging = sys.modules.get("cdtool.base.remote.staging")
-    return staging.amount_read() if staging is not None else (0, 0)
+    session = sys.modules.get("cdtool.base.remote.session")
+    return session.amount_read() if session is not None else (0, 0)
 
 
 def _show_transferred(before: tuple[int, int]) -> None:
