@@ -9,7 +9,6 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
@@ -17,6 +16,11 @@ from typing import IO
 # The folder, for the processes that are started here.
 _FOLDER = "CDTOOL_REMOTE_FOLDER"
 _PREFIX, _LOCK, _READ = "cdtool-remote-", "lock", "read"
+
+
+def begin() -> None:
+    """Begin a command: a folder that it inherits is that of the program that started it."""
+    os.environ.pop(_FOLDER, None)
 
 
 def folder() -> Path:
@@ -27,7 +31,7 @@ def folder() -> Path:
 
 def note_read(size: int) -> None:
     """Note a request that has read `size` bytes."""
-    with suppress(OSError), (folder() / _READ).open("a", encoding="ascii") as file:
+    with suppress(OSError), (folder() / _READ).open("a", encoding="ascii", newline="\n") as file:
         file.write(f"{size}\n")
 
 
@@ -39,6 +43,8 @@ def amount_read() -> tuple[int, int]:
 
 
 def _made() -> Path:
+    import tempfile
+
     from cdtool.base.files.locks import lock_handle
 
     made = Path(tempfile.mkdtemp(prefix=_PREFIX))

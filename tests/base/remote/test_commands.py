@@ -224,3 +224,10 @@ def test_a_path_at_a_url_is_one_log_in_python(gate):
     log = location(f"{gate}/stiff/03.csv")
     one, several = [api.detect(logs, MACHINE, detector="pt", limit=[50.0]) for logs in (log, [log])]
     assert several[log].alarms.equals(one.alarms) and log in several
+
+
+def test_what_the_program_that_started_a_command_has_read_is_not_counted(tmp_path, monkeypatch):
+    monkeypatch.setenv("CDTOOL_REMOTE_FOLDER", str(tmp_path))
+    (tmp_path / "read").write_text("1000\n", encoding="ascii")
+    assert session.amount_read() == (1000, 1)
+    assert "URL" not in cdtool("info", GATE / "stiff" / "03.csv", "-m", MACHINE).err
