@@ -295,28 +295,31 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
-    """Rename each file to its target; if one fails, undo the others."""
-    done: list[tuple[Path, Path, bool, Path]] = []
+    """Rename each file to its target; if one fails, undo the others.
+
+    Killed meanwhile, the process leaves no old file beside a new one: all but the first are set aside before that is
+    replaced.
+    """
+    old = {target: temporary_name(target, part.parent) for part, target in pairs if target.exists()}
+    _temporaries.update(old.values())
     try:
+        for _, target in pairs[1:]:
+            if target in old:
+                target.rename(old[target])
         for part, target in pairs:
-            existed, old = target.exists(), temporary_name(target, part.parent)
-            if existed and len(pairs) > 1:
-                _temporaries.add(old)
-                with suppress(OSError):  # a file system without hard links
-                    os.link(target, old)
-            done.append((part, target, existed, old))
+            if target in old and len(pairs) > 1:
+                with suppress(OSError):  # it is set aside; a file system without hard links
+                    os.link(target, old[target])
             part.replace(target)
     except BaseException:
-        for part, target, existed, old in reversed(done):
-            if part.exists():
-                continue  # it was not renamed
-            if not existed:
+        for part, target in reversed(pairs):
+            if target in old and old[target].exists():
+                old[target].replace(target)
+            elif target not in old and not part.exists():
                 _remove(target)
-            elif old.exists():
-                old.replace(target)
         raise
     finally:
-        _discard([old for *_, old in done])
+        _discard(list(old.values()))
 
 
 def _put_whole(part: Path, target: Path) -> bool:
