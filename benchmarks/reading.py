@@ -47,8 +47,12 @@ for line in sys.stdin:
 READERS = {
     "cdtool": (
         f"""
-from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
-from cdtool.formats.channels.reading import choose_format
+try:
+    from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+    from cdtool.formats.channels.reading import choose_format
+except ImportError:  # the earlier cdtool
+    from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+    from cdtool.ingest.reading import choose_format
 fields = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in {FLAT.wanted!r})
 wanted = ChannelMap(TimeSource(clock="log"), fields, {JOINTS!r}, topics=True)
 """,
