@@ -38,8 +38,6 @@ from cdtool.truth.force.verdict import ForceVerdict
 
 # The name of its group and the path of each log.
 Logs = Sequence[tuple[str, Path]]
-# The most logs that a worker receives at once.
-_TOGETHER = 8
 
 
 @dataclass
@@ -138,7 +136,7 @@ class Gathering:
         of_lost = partial(lost, self.setup)
         computed: Iterator[PieceOutcome] = iter(())
         if missing:
-            computed = in_order(work(), pieces, len(missing), workers, of_lost=of_lost, together=_TOGETHER)
+            computed = in_order(work(), pieces, len(missing), workers, of_lost=of_lost)
         for log, ((group, path), planned) in enumerate(zip(logs, plan, strict=True)):
             made = None if planned.is_known else next(computed)
             outcomes = self._complete(group, path, planned, made, stored)

@@ -50,7 +50,7 @@ def read_recordings(
     runs = load_runs(setup.learn, setup.machine_file, setup.run_reading(workers))
     check_enough(budget, runs.operations)
     listed = [(name, path) for name in setup.groups_of_impacts for path in setup.impacts[name].logs]
-    read = in_order(_Reading(setup), listed, len(listed), workers, progress=progress, together=8)
+    read = in_order(_Reading(setup), listed, len(listed), workers, progress=progress)
     struck: list[StruckLog] = []
     skipped: list[Skipped] = []
     for made in read:

@@ -14,9 +14,6 @@ from cdtool.execution.store.store import Store
 from cdtool.execution.store.use import StoreUse
 from cdtool.execution.workers import Workers, in_order
 
-# The most files that a worker hashes before their digests are sent.
-_TOGETHER = 64
-
 
 @dataclass(frozen=True)
 class KnownSources:
@@ -44,7 +41,7 @@ class KnownSources:
                 to_hash.append(number)
         paths = [logs[number] for number in to_hash]
         work = _Hashing(self.setup)
-        hashed = in_order(work, paths, len(paths), self.workers, of_lost=_not_hashed, together=_TOGETHER)
+        hashed = in_order(work, paths, len(paths), self.workers, of_lost=_not_hashed)
         for number, sources in zip(to_hash, hashed, strict=True):
             found[number] = sources
         return found
