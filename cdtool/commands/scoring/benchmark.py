@@ -34,7 +34,6 @@ from cdtool.commands.scoring.measured_synchronisation import with_synchronisatio
 from cdtool.commands.scoring.scoring import ScoredLog, detect_with, score_runs
 from cdtool.commands.scoring.store.stored_learned import StoreOfRun
 from cdtool.detectors.base import Detector
-from cdtool.execution.store.digest import code_version, digest_of
 from cdtool.execution.store.use import StoreUse
 from cdtool.execution.workers import Progress, Workers
 from cdtool.recordings.operations import Operation
@@ -158,44 +157,13 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     provenance = _provenance(setup, used, learned)
     stored = store.outcomes(setup, learned, factors) if store else None
     plan = stored.plan(logs, workers) if stored else ()
-    beside_logs = _digest_beside_logs(gathered, learned, provenance, stored.determinants.normals) if stored else ""
-    found = stored.finished(beside_logs, provenance) if stored else None
-    if found is None:
-        gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
-        gathered.skipped += _labels_without_run(setup, gathered.scored)
-        provenance["units"] |= gathered.units
-        evaluated = evaluate(gathered.results(provenance, learned.about.calibration), setup.limits)
-        traces = gathered.traces
-    else:
-        evaluated, traces = found[0].evaluated, found[1]
-        if progress:
-            progress(len(logs), len(logs))
+    gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
+    gathered.skipped += _labels_without_run(setup, gathered.scored)
+    provenance["units"] |= gathered.units
+    evaluated = evaluate(gathered.results(provenance, learned.about.calibration), setup.limits)
     report = stored.finish() if stored else None
-    if stored and found is None:
-        stored.add_finished(beside_logs, evaluated, gathered.trace_keys)
     times = {"reading": learned.seconds + gathered.reading, "detecting": seconds - learned.seconds + gathered.detecting}
-    return BenchmarkResult(evaluated, traces, setup.inputs, times, report)
-
-
-def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mapping[str, Any], normals: str) -> str:
-    """Return the digest of what determines the results beside the outcome of each log, before the first is scored.
-
-    `normals` is the digest of the normal motion.
-    """
-    setup = gathered.setup
-    return digest_of(
-        code_version(),
-        provenance,
-        str(setup.path),
-        setup.limits,
-        setup.labels,
-        {name: group.force for name, group in setup.impacts.items()},
-        list(gathered.skipped),
-        list(gathered.findings),
-        learned.about.calibration,
-        learned.about.sources,
-        normals,
-    )
+    return BenchmarkResult(evaluated, gathered.traces, setup.inputs, times, report)
 
 
 @dataclass(frozen=True)

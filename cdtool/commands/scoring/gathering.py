@@ -17,7 +17,6 @@ from cdtool.commands.scoring.counting import Exposure, SweepRows
 from cdtool.commands.scoring.force_rows import point_rows
 from cdtool.commands.scoring.log_outcome import LogOutcome, OfOperation, slowest_of, striking_of
 from cdtool.commands.scoring.pieces import Piece, PieceOutcome, PieceScoring, ScoreLog, lost
-from cdtool.commands.scoring.store.finished_run import TraceKey
 from cdtool.commands.scoring.store.stored_outcomes import Planned, StoredOutcomes, same_content
 from cdtool.execution.store.sources import SourceFile
 from cdtool.execution.workers import Progress, Workers, in_order
@@ -60,10 +59,6 @@ class _Place:
         """Store the trace of an operation."""
         if self.stored:
             self.stored.add_trace(self.log, self.sources, operation, trace)
-
-    def trace_key(self, operation: int) -> str | None:
-        """Return under which key the trace of an operation is stored; None if it is not."""
-        return self.stored.trace_key(self.log, self.sources, operation) if self.stored else None
 
 
 class Gathering:
@@ -245,18 +240,6 @@ class Gathering:
         """Return the selected traces."""
         why = self._choice.kept()
         return tuple(replace(self._traces[number], chosen=why[number]) for number in why if number in self._traces)
-
-    @property
-    def trace_keys(self) -> list[TraceKey] | None:
-        """Return where the store has the selected traces; None if it does not have all of them."""
-        why, found = self._choice.kept(), []
-        for number, chosen in why.items():
-            place, operation = self._places[number]
-            key = place.trace_key(operation) if number in self._traces else None
-            if key is None:
-                return None
-            found.append(TraceKey(key, chosen))
-        return found
 
     def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
         """Return all results; raises RecordingError if no log could be scored."""

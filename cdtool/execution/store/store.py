@@ -3,7 +3,6 @@
     store.json                what the folder is
     parts/*.parquet           the entries, a row each; a file is complete or not there
     runs/*.parquet            a file per run: which entries it used, how many it computed
-    finished/*.parquet        all results of the last runs, by what determines them
     *.journal                 entries of a run that is under way
 
 Several processes may write at the same time: each writes files of its own. An entry that two of them compute is there

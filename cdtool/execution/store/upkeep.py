@@ -11,7 +11,6 @@ from pathlib import Path
 from cdtool.base.errors import UsageError
 from cdtool.base.remote.remote_path import location
 from cdtool.execution.store.entry import Entry
-from cdtool.execution.store.finished import finished
 from cdtool.execution.store.store import RunRecord, Store, read_columns, read_keys, read_runs, require_store, write_part
 
 _DAY = 86_400.0
@@ -117,7 +116,7 @@ def collect_garbage(folder: str | Path, *, keep_runs: int = 10, older_than_days:
     oldest = time.time() - _DAY * older_than_days
     parts = store.parts
     kept, removed, files = _rewrite(store, used, oldest)
-    for path in (*(path for path, _ in runs[keep_runs:]), *finished(store.folder)[keep_runs:]):
+    for path, _ in runs[keep_runs:]:
         path.unlink(missing_ok=True)
     return Collected(kept, removed, len(parts), files, before, _size(store.folder))
 

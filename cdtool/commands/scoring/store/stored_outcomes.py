@@ -6,32 +6,25 @@ determines it; so a detector with another gain is run on its own. Errors of the 
 
 from __future__ import annotations
 
-import hashlib
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
-from cdtool.base.errors import CdtoolError
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome
 from cdtool.commands.scoring.pieces import Piece, PieceOutcome
 from cdtool.commands.scoring.scoring import LogRows
 from cdtool.commands.scoring.store.determinants import Determinants
-from cdtool.commands.scoring.store.finished_run import FinishedRun, TraceKey
 from cdtool.commands.scoring.store.known_sources import KnownSources
-from cdtool.execution.store.digest import code_version, combined
+from cdtool.execution.store.digest import code_version
 from cdtool.execution.store.encoding import decoded, encoded
 from cdtool.execution.store.entry import Entry, source_entry
-from cdtool.execution.store.finished import mark_used, read_finished, write_finished
 from cdtool.execution.store.sources import SourceFile
 from cdtool.execution.store.store import RunRecord, Store, encodable, write_run
 from cdtool.execution.store.use import StoreUse
 from cdtool.execution.workers import Workers
-from cdtool.results.evaluated import Evaluated
 from cdtool.results.traces.choice import TraceChoice
 from cdtool.results.traces.trace import Trace
 
@@ -77,61 +70,17 @@ class StoredOutcomes:
         self.keys = list(keys)
         self.computed = self.reused = self.failed = 0
         self.began = time.time()
-        # Of the outcomes of all logs, in order: those that are planned, and those that were used.
-        self._planned_keys: list[str] = []
-        self._order = hashlib.sha256()
-        self._lasts = True
 
     def plan(self, logs: Sequence[tuple[str, Path]], workers: Workers) -> list[Planned]:
         """Return what is in the store of each log."""
         known = KnownSources(self.setup, self.store, self.use, workers)
         sources = known.of([path for _, path in logs])
         keys = [key for log, of_log in zip(logs, sources, strict=True) if of_log for key in self._keys_of(log, of_log)]
-        self._planned_keys = [] if None in sources else keys
         places = iter(self.store.places(keys))
         each = 1 + len(self.names)
         planned = [self._planned(item, list(islice(places, each)) if item else None) for item in sources]
         self._note_touched(logs, planned)
-        if not all(item.is_known for item in planned):
-            self._planned_keys = []
         return planned
-
-    def finished(self, key: str, provenance: Mapping[str, Any]) -> tuple[FinishedRun, tuple[Trace, ...]] | None:
-        """Return the results of a run with the planned outcomes, under `key` for everything else, with its traces.
-
-        Returns None if the store has none, or if some of its logs could not be read and are to be read again.
-        """
-        planned, self._planned_keys = self._planned_keys, []
-        if not planned:
-            return None
-        whole = combined(key, _digest_of_keys(planned))
-        try:
-            found = FinishedRun.of_texts(read_finished(self.store.folder, whole), provenance, self.setup.groups)
-            if found is None or (found.failed and self.use.retry_failed):
-                return None
-            entries = [self.store.get(item.key) for item in found.traces]
-            traces = tuple(
-                replace(decoded(entry.content, Trace), chosen=item.chosen)
-                for entry, item in zip(entries, found.traces, strict=True)
-                if entry is not None
-            )
-        except ValueError:  # damaged
-            return None
-        if len(traces) < len(found.traces):
-            return None
-        mark_used(self.store.folder, whole)
-        self.keys += [*planned, *(item.key for item in found.traces)]
-        self.reused, self.failed = len(planned) // (1 + len(self.names)), found.failed
-        return found, traces
-
-    def add_finished(self, key: str, evaluated: Evaluated, traces: Sequence[TraceKey] | None) -> None:
-        """Store the results of the run if it would have the same again; `traces` is None if one of them is missing."""
-        if not self._lasts or traces is None or not self.store.writes:
-            return
-        whole = combined(key, self._order.hexdigest())
-        # What the run has found does not depend on this file: without it, only time is lost.
-        with suppress(OSError, CdtoolError):
-            write_finished(self.store.folder, whole, FinishedRun(evaluated, tuple(traces), self.failed).to_texts())
 
     def _keys_of(self, log: tuple[str, Path], sources: tuple[SourceFile, ...]) -> list[str]:
         """Return the key of the rows of a log, and of the outcome of each detector."""
@@ -168,7 +117,7 @@ class StoredOutcomes:
             detectors = [decoded(item.content, _OfDetector) for item in entries[1:]]
         except ValueError:
             return None
-        self._use([item.key for item in entries])
+        self.keys += [item.key for item in entries]
         self.reused += 1
         self.failed += any(item.unread for item in rows)
         return _combined(rows, detectors)
@@ -185,11 +134,6 @@ class StoredOutcomes:
                 return None
             found.append(entry)
         return found
-
-    def _use(self, keys: Sequence[str]) -> None:
-        """Note the keys of the outcomes of the next log."""
-        self.keys += keys
-        self._order.update("".join(keys).encode())
 
     def _note_touched(self, logs: Sequence[tuple[str, Path]], planned: Sequence[Planned]) -> None:
         """Add the present times of the files of logs whose content is the same as before."""
@@ -230,11 +174,9 @@ class StoredOutcomes:
             return None
         self.computed += 1
         self.failed += unread
-        if made.sources is None:
-            self._lasts = False
-        else:
+        if made.sources is not None:
             keys = self._store(group, path, made, new) | {name: entry.key for name, entry in stored.items()}
-            self._use([keys[name] for name in ("", *self.names)])
+            self.keys += [keys[name] for name in ("", *self.names)]
         return _combined(rows, [(new | known)[name] for name in self.names]) if known else list(made.outcomes)
 
     def _store(self, group: str, path: Path, made: PieceOutcome, new: dict[str, _OfDetector]) -> dict[str, str]:
@@ -294,10 +236,6 @@ class StoredOutcomes:
         )
         write_run(self.store.folder, run, self.keys)
         return StoreReport(self.computed, self.reused)
-
-
-def _digest_of_keys(keys: Sequence[str]) -> str:
-    return hashlib.sha256("".join(keys).encode()).hexdigest()
 
 
 def same_content(one: Sequence[SourceFile] | None, other: Sequence[SourceFile] | None) -> bool:
