@@ -247,29 +247,39 @@ def _closed(client: Any) -> None:
 @contextmanager
 def _local(jobs: int) -> Iterator[Any]:
     """Start a scheduler and worker processes on this machine, and end them after the block."""
-    import distributed
-
-    start: Any = distributed.LocalCluster
     resource_tracker.ensure_running()  # its start would end the block below for the thread that starts processes
     cluster = None
     try:
         with without_interruption():
-            cluster = start(
-                n_workers=jobs,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,
-                # Its other pages have a free port.
-                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-                silence_logs=logging.CRITICAL + 1,
-                # Dask calls its function dask_setup.
-                preload=["cdtool.execution.starting"],
-            )
+            cluster = _started(jobs)
         yield cluster
     finally:
         if cluster is not None:
             with suppress(Exception):
                 cluster.close(timeout=10)
+
+
+def _started(jobs: int, attempts: int = 2) -> Any:
+    """Start a scheduler and worker processes; again if one of them ends meanwhile."""
+    import distributed
+
+    start: Any = distributed.LocalCluster
+    try:
+        return start(
+            n_workers=jobs,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            # Its other pages have a free port.
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            silence_logs=logging.CRITICAL + 1,
+            # Dask calls its function dask_setup.
+            preload=["cdtool.execution.starting"],
+        )
+    except RuntimeError as fault:
+        if attempts > 1:
+            return _started(jobs, attempts - 1)
+        raise WorkerError(f"--cluster {LOCAL}: a worker ended while it was started", "run it again") from fault
 
 
 @contextmanager
