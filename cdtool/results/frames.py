@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 from cdtool.results.files.results_folder import tables
 from cdtool.results.results import Results
-from cdtool.results.rows import values_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +31,7 @@ def rows_as_frame(
     kind : type
         The class of the rows.
     rows : sequence
-        The rows; those that are held as columns are not made.
+        The rows.
     categories : mapping of str to sequence of str, optional
         Columns of few different texts, and these in their order.
 
@@ -53,7 +52,7 @@ def rows_as_frame(
     hints, known = get_type_hints(kind), categories or {}
     columns: dict[str, Any] = {}
     for item in fields(kind):
-        values = list(values_of(rows, item.name))
+        values = [getattr(row, item.name) for row in rows]
         if item.name in known:
             columns[item.name] = pd.Categorical(values, categories=list(dict.fromkeys(known[item.name])))
         else:
@@ -119,7 +118,7 @@ def results_as_frame(results: Results, table: str) -> pd.DataFrame:
     complete = {
         name: values
         for name, values in known.items()
-        if name in {item.name for item in fields(kind)} and set(values_of(rows, name)) <= set(values)
+        if name in {item.name for item in fields(kind)} and {getattr(row, name) for row in rows} <= set(values)
     }
     return rows_as_frame(kind, rows, complete)
 

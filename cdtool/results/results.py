@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Self
+from operator import attrgetter
+from typing import Any, Self, TypeVar
 
 from cdtool.base.findings import Finding
-from cdtool.results.rows import picked, values_of
 
+Row = TypeVar("Row")
 SCHEMA_VERSION = 4
 # How reports introduce what is lost of a recording that was used.
 DAMAGED = "damaged, used as far as it goes"
@@ -271,23 +272,23 @@ class RecordingFinding:
 
 @dataclass(frozen=True)
 class Results:
-    """All of it, in the order of the benchmark file; rows of which there may be many are tuples, or `Rows`."""
+    """All of it, in the order of the benchmark file."""
 
     provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the results")
     detectors: tuple[str, ...] = meant("full names")
     groups: tuple[str, ...] = meant("groups of the unchanged machine: of impacts, then the impact-free hold-out")
-    contacts: Sequence[ContactResult] = meant("one row per contact and detector")
-    false_alarms: Sequence[FalseAlarmResult] = meant("one row per alarm without a contact")
+    contacts: tuple[ContactResult, ...] = meant("one row per contact and detector")
+    false_alarms: tuple[FalseAlarmResult, ...] = meant("one row per alarm without a contact")
     exposure: tuple[ExposureResult, ...] = meant("one row per group and detector")
-    recordings: Sequence[RecordingResult] = meant("one row per log that was scored", default=())
-    forces: Sequence[ForceResult] = meant("one row per contact with a force profile", default=())
+    recordings: tuple[RecordingResult, ...] = meant("one row per log that was scored", default=())
+    forces: tuple[ForceResult, ...] = meant("one row per contact with a force profile", default=())
     points: tuple[PointResult, ...] = meant("one row per test point with a force profile", default=())
     sweep: tuple[SweepResult, ...] = meant("latency against false alarms with all limits moved", default=())
     calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
     conditions: tuple[ConditionResult, ...] = meant("groups of the machine under changed conditions", default=())
-    skipped: Sequence[Skipped] = meant("what was left out", default=())
-    findings: Sequence[RecordingFinding] = meant("findings about recordings that were used", default=())
+    skipped: tuple[Skipped, ...] = meant("what was left out", default=())
+    findings: tuple[RecordingFinding, ...] = meant("findings about recordings that were used", default=())
     conclusion: ConclusionResult = field(
         default_factory=ConclusionResult, metadata={"meaning": "the conclusion from all of it"}
     )
@@ -299,23 +300,29 @@ class Results:
         return (*self.groups, *(item.group for item in self.conditions))
 
     @property
-    def losses(self) -> Sequence[RecordingFinding]:
+    def losses(self) -> list[RecordingFinding]:
         """The findings about recordings of which a part is lost."""
-        return picked(
-            self.findings, [i for i, item in enumerate(values_of(self.findings, "severity")) if item == _LOSS]
-        )
+        return [item for item in self.findings if item.is_loss]
 
     @property
-    def warnings(self) -> Sequence[RecordingFinding]:
+    def warnings(self) -> list[RecordingFinding]:
         """The other findings."""
-        return picked(
-            self.findings, [i for i, item in enumerate(values_of(self.findings, "severity")) if item != _LOSS]
-        )
+        return [item for item in self.findings if not item.is_loss]
 
     @property
-    def scored_contacts(self) -> Sequence[ContactResult]:
+    def scored_contacts(self) -> list[ContactResult]:
         """The contacts that have an onset, and so a latency or a reason for none."""
-        outcomes = values_of(self.contacts, "outcome")
-        if _IN_PROGRESS not in outcomes:
-            return self.contacts
-        return picked(self.contacts, [i for i, outcome in enumerate(outcomes) if outcome != _IN_PROGRESS])
+        return [item for item in self.contacts if not item.in_progress]
+
+
+def grouped(rows: Sequence[Row], *names: str) -> dict[Any, list[Row]]:
+    """Return rows by the value of a field, or the values of several, in the order of their first rows.
+
+    >>> grouped([Skipped("a", "empty"), Skipped("b", "empty")], "reason")["empty"][1].recording
+    'b'
+    """
+    key = attrgetter(*names)
+    found: dict[Any, list[Row]] = {}
+    for row in rows:
+        found.setdefault(key(row), []).append(row)
+    return found

@@ -25,8 +25,7 @@ from cdtool.report.table import (
     tabulate,
 )
 from cdtool.report.tables.results import detector_cell, part_of
-from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
-from cdtool.results.rows import grouped
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results, grouped
 from cdtool.results.summary import later_ms
 
 _OPERATION = re.compile(r"#\d+\Z")
@@ -121,7 +120,7 @@ def contact_tables(results: Results) -> list[Table]:
     }
     rows = grouped(results.contacts, "outcome")
     return [
-        tabulate(name, title, fields, rows.get((outcome,), ()), "contacts", (), most_rows(results))
+        tabulate(name, title, fields, rows.get(outcome, ()), "contacts", (), most_rows(results))
         for outcome, (name, title) in tables.items()
     ]
 

@@ -22,7 +22,6 @@ from cdtool.base.files.strict_json import finite, strict_json
 from cdtool.base.value_words import value_in_words
 from cdtool.results.files.typed_rows import WORDS, build
 from cdtool.results.results import SCHEMA_VERSION, Results
-from cdtool.results.rows import Rows
 from cdtool.results.summary import kind_group
 
 # Rows that are in memory as text at once.
@@ -98,9 +97,7 @@ def json_pieces(results: Results) -> Iterator[str]:
 
 def _are_rows(value: Any) -> bool:
     """Whether a value has rows; a tuple also has names."""
-    if isinstance(value, tuple):
-        return bool(value) and is_dataclass(value[0])
-    return isinstance(value, Sequence) and not isinstance(value, str)
+    return isinstance(value, tuple) and bool(value) and is_dataclass(value[0])
 
 
 def _rows_in_json(rows: Sequence[Any], depth: int = 2) -> Iterator[str]:
@@ -120,9 +117,6 @@ def _rows_in_json(rows: Sequence[Any], depth: int = 2) -> Iterator[str]:
 
 def _blocks(rows: Sequence[Any], names: Sequence[str]) -> Iterator[list[Sequence[Any]]]:
     """Yield the values of each field of rows, in blocks."""
-    if isinstance(rows, Rows):
-        yield from rows.blocks(_AT_ONCE)
-        return
     for first in range(0, len(rows), _AT_ONCE):
         some = rows[first : first + _AT_ONCE]
         yield [[getattr(row, name) for row in some] for name in names]

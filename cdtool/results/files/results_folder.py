@@ -24,8 +24,9 @@ from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, parse_jso
 from cdtool.base.files.strict_json import strict_json
 from cdtool.results.files.typed_rows import build
 from cdtool.results.results import SCHEMA_VERSION, Results
-from cdtool.results.rows import Rows, picked, values_of
 
+# A row, and its position in results.json.
+_Numbered = tuple[int, Any]
 PROVENANCE = "provenance.json"
 KIND = "cdtool results.parquet"
 # Rows of a row group, which are in memory at once.
@@ -41,8 +42,6 @@ _PARTS: Mapping[str, tuple[str, ...]] = {
 _OF_RECORDING = ("contacts", "false_alarms", "recordings")
 # Tables that a results.parquet of an earlier version does not have.
 _LATER = ("conditions",)
-# Tables of which there may be many rows, held as columns.
-_MANY = (*_PARTS, "skipped", "findings")
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST_NAME = 40
 _OPERATION = re.compile(r"#\d+\Z")
@@ -130,9 +129,9 @@ def write_tables(results: Results, folder: Path) -> str:
     for table, kind in tables().items():
         rows = getattr(results, table)
         (folder / table).mkdir()
-        for name, numbers in _parts(table, rows):
+        for name, numbered in _parts(table, rows):
             joined = of_recordings if table in _OF_RECORDING else None
-            _write(folder / table / f"{name}.parquet", _columns(kind), rows, numbers, joined)
+            _write(folder / table / f"{name}.parquet", _columns(kind), numbered, joined)
     rest = {item.name: getattr(results, item.name) for item in fields(results) if item.name not in tables()}
     return strict_json({"kind": KIND, **rest, "conclusion": vars(results.conclusion)}) + "\n"
 
@@ -203,14 +202,14 @@ def read_tables(folder: Path) -> Results:
         known = build(Results, {**head, **{name: [] for name in tables()}}, "results")
         # A table that earlier versions did not write is empty.
         rows = {
-            name: _read(folder / name, kind) if (folder / name).exists() or name not in _LATER else Rows(kind)
+            name: _read(folder / name, kind) if (folder / name).exists() or name not in _LATER else ()
             for name, kind in tables().items()
         }
     except (ContentError, ValueError, KeyError, TypeError, AttributeError, OSError, ArrowException) as fault:
         reason = " ".join(str(fault).split())[:200]
         raise RecordingError(f"{folder}: damaged, or not a results.parquet: {reason}", _NEXT_STEP) from fault
     rest = {item.name: getattr(known, item.name) for item in fields(known)}
-    return Results(**{**rest, **{name: held if name in _MANY else tuple(held) for name, held in rows.items()}})
+    return Results(**{**rest, **rows})
 
 
 def _has_mark(folder: Path) -> bool:
@@ -225,50 +224,37 @@ class _OfRecordings:
     """When the recording of a row began, and its campaign, test point and machine."""
 
     def __init__(self, results: Results) -> None:
-        rows = results.recordings
-        names = zip(values_of(rows, "group"), values_of(rows, "recording"), strict=True)
-        self.numbers = {key: number for number, key in enumerate(names)}
-        self.columns = {name: values_of(rows, name) for name in ("began_s", "campaign", "point")}
+        self.rows = {(row.group, row.recording): row for row in results.recordings}
         self.machine = str(results.provenance.get("machine") or "") or None
 
-    def of(self, groups: Sequence[str], names: Sequence[str]) -> dict[str, Sequence[Any]]:
-        """Return columns for the recordings, or their operations, with these groups and names."""
-        numbers = [
-            self.numbers.get((group, name), self.numbers.get((group, _OPERATION.sub("", name))))
-            for group, name in zip(groups, names, strict=True)
+    def of(self, rows: Sequence[_Numbered]) -> dict[str, Sequence[Any]]:
+        """Return columns for the recordings, or their operations, that rows name."""
+        of_rows = [
+            self.rows.get((row.group, row.recording), self.rows.get((row.group, _OPERATION.sub("", row.recording))))
+            for _, row in rows
         ]
-        found = {name: [None if n is None else column[n] for n in numbers] for name, column in self.columns.items()}
-        began = [None if at is None else round(1e6 * at) for at in found.pop("began_s")]
-        return {**found, "began": began, "machine": [self.machine] * len(numbers)}
+        began = [None if row is None or row.began_s is None else round(1e6 * row.began_s) for row in of_rows]
+        found = {name: [getattr(row, name, None) for row in of_rows] for name in ("campaign", "point")}
+        return {**found, "began": began, "machine": [self.machine] * len(rows)}
 
 
-def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[int]]]:
-    """Yield the name of each file of a table, and the numbers of its rows."""
-    names = _PARTS.get(table)
-    if not names or not len(rows):
-        yield table, range(len(rows))
+def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[_Numbered]]]:
+    """Yield the name of each file of a table, and its rows."""
+    numbered = list(enumerate(rows))
+    if table not in _PARTS or not numbered:
+        yield table, numbered
         return
-    numbers = range(len(rows))
-    keys = list(zip(*(values_of(rows, name) for name in names), strict=True))
-    for place, (key, part) in enumerate(_by_key(keys, numbers).items()):
+    names, parts = _PARTS[table], dict[tuple[str, ...], list[_Numbered]]()
+    for number, row in numbered:
+        parts.setdefault(tuple(getattr(row, name) for name in names), []).append((number, row))
+    for place, (key, part) in enumerate(parts.items()):
         yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:_LONGEST_NAME] for name in key)}", part
 
 
-def _by_key(keys: Sequence[tuple[str, ...]], numbers: Sequence[int]) -> dict[tuple[str, ...], list[int]]:
-    found: dict[tuple[str, ...], list[int]] = {}
-    for key, number in zip(keys, numbers, strict=True):
-        found.setdefault(key, []).append(number)
-    return found
-
-
 def _write(
-    path: Path,
-    columns: Sequence[_Column],
-    rows: Sequence[Any],
-    places: Sequence[int],
-    of_recordings: _OfRecordings | None,
+    path: Path, columns: Sequence[_Column], rows: Sequence[_Numbered], of_recordings: _OfRecordings | None
 ) -> None:
-    """Write the rows with these numbers as one file, a row group at a time."""
+    """Write numbered rows as one file, a row group at a time."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -280,18 +266,16 @@ def _write(
         listed.append(pa.field("began", pa.timestamp("us"), metadata={"meaning": "when the recording began, UTC"}))
     schema = pa.schema(listed)
     with pq.ParquetWriter(path, schema, compression="zstd") as writer:
-        for first in range(0, max(len(places), 1), _AT_ONCE):
-            numbers = list(places[first : first + _AT_ONCE])
-            some = picked(rows, numbers)
-            values: dict[str, Sequence[Any]] = {item.name: _stored(item, some) for item in columns}
-            if of_recordings:
-                values = {**of_recordings.of(values["group"], values["recording"]), **values}
-            arrays = [_array(values[item.name] if item.name != "row" else numbers, item.type) for item in schema]
+        for first in range(0, max(len(rows), 1), _AT_ONCE):
+            some = rows[first : first + _AT_ONCE]
+            values: dict[str, Sequence[Any]] = of_recordings.of(some) if of_recordings else {}
+            values |= {"row": [number for number, _ in some]} | {item.name: _stored(item, some) for item in columns}
+            arrays = [_array(values[item.name], item.type) for item in schema]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
 
 
-def _stored(column: _Column, rows: Sequence[Any]) -> Sequence[Any]:
-    values = values_of(rows, column.name)
+def _stored(column: _Column, rows: Sequence[_Numbered]) -> Sequence[Any]:
+    values = [getattr(row, column.name) for _, row in rows]
     return [column.store(value) for value in values] if column.store else values
 
 
@@ -314,7 +298,7 @@ def _encodable(value: Any) -> Any:
     return value
 
 
-def _read(folder: Path, kind: Any) -> Rows[Any]:
+def _read(folder: Path, kind: Any) -> tuple[Any, ...]:
     """Return the rows of a table in their order in results.json."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -323,12 +307,9 @@ def _read(folder: Path, kind: Any) -> Rows[Any]:
     names = ["row", *(item.name for item in columns)]
     table = pa.concat_tables(pq.read_table(path, columns=names) for path in sorted(folder.glob("*.parquet")))
     table = table.sort_by("row")
-    rows = Rows(kind)
-    for batch in table.to_batches(max_chunksize=_AT_ONCE):
-        values = [batch.column(item.name).to_pylist() for item in columns]
-        loaded = zip(columns, values, strict=True)
-        rows.extend_columns([list(map(item.load, held)) if item.load else held for item, held in loaded])
-    return rows
+    values = [table[item.name].to_pylist() for item in columns]
+    loaded = [list(map(item.load, held)) if item.load else held for item, held in zip(columns, values, strict=True)]
+    return tuple(kind(*row) for row in zip(*loaded, strict=True))
 
 
 def _columns(kind: Any) -> list[_Column]:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import cache
+from dataclasses import dataclass
 from types import GenericAlias
-from typing import Any, get_type_hints
+from typing import Any
 
 from cdtool.base.files.bounded_loading import parse_own_json
 from cdtool.execution.store.encoding import decoded, encoded
@@ -19,7 +18,6 @@ from cdtool.results.comparison import Comparison
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.files.results_folder import tables
 from cdtool.results.results import ConclusionResult, Results
-from cdtool.results.rows import Rows
 from cdtool.results.summary import Summary
 
 # Rows that are in memory as text at once.
@@ -55,7 +53,6 @@ class FinishedRun:
             **{name: results.provenance[name] for name in _FROM_LOGS if name in results.provenance},
             "traces": encoded(self.traces, tuple[TraceKey, ...]),
             "failed": self.failed,
-            "rows": [name for name in tables() if isinstance(getattr(results, name), Rows)],
         }
         yield [
             (_HEAD, json.dumps(head)),
@@ -67,8 +64,8 @@ class FinishedRun:
         ]
         for name, kind in tables().items():
             rows = getattr(results, name)
-            for columns in (rows if isinstance(rows, Rows) else Rows(kind, rows)).blocks(_AT_ONCE):
-                yield [(name, encoded(tuple(columns), _columns_of(kind)))]
+            for first in range(0, len(rows), _AT_ONCE):
+                yield [(name, encoded(rows[first : first + _AT_ONCE], _rows_of(kind)))]
 
     @classmethod
     def of_texts(
@@ -78,19 +75,18 @@ class FinishedRun:
 
         `provenance` is that of the run, without what follows from its logs; `groups` are its groups.
         """
-        known = {name: Rows(kind) for name, kind in tables().items()}
+        known: dict[str, list[Any]] = {name: [] for name in tables()}
         parts: dict[str, str] = {}
         try:
             for name, text in texts:
                 if name in known:
-                    columns: Any = decoded(text, _columns_of(tables()[name]))
-                    known[name].extend_columns(columns)
+                    known[name] += decoded(text, _rows_of(tables()[name]))
                 else:
                     parts[name] = text
             if not parts:
                 return None
             head = parse_own_json(parts[_HEAD])
-            held: dict[str, Any] = {name: rows if name in head["rows"] else tuple(rows) for name, rows in known.items()}
+            held: dict[str, Any] = {name: tuple(rows) for name, rows in known.items()}
             results = Results(
                 provenance={**provenance, **{name: head[name] for name in _FROM_LOGS if name in head}},
                 detectors=tuple(provenance["gains"]),
@@ -110,9 +106,5 @@ class FinishedRun:
             raise ValueError(f"not a finished run: {fault}") from fault
 
 
-@cache
-def _columns_of(kind: Any) -> Any:
-    """Return the type of the columns of rows."""
-    hints = get_type_hints(kind)
-    each = [GenericAlias(tuple, (hints[item.name], ...)) for item in fields(kind)]
-    return GenericAlias(tuple, tuple(each))
+def _rows_of(kind: Any) -> Any:
+    return GenericAlias(tuple, (kind, ...))
