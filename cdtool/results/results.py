@@ -7,9 +7,10 @@ together with its meaning, from which the published schema is made.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cache
 from operator import attrgetter
-from typing import Any, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar, get_args, get_origin, get_type_hints
 
 from cdtool.base.findings import Finding
 
@@ -56,7 +57,9 @@ class ContactResult:
     latency_ms: float | None = meant(
         "alarm less onset; 0 where the alarm came within the onset's uncertainty before it"
     )
-    outcome: str = meant("detected, missed, not_assessable or in_progress (at the start: neither detected nor missed)")
+    outcome: Literal["detected", "missed", "not_assessable", "in_progress"] = meant(
+        "detected, missed, not_assessable or in_progress (at the start: neither detected nor missed)"
+    )
     force_at_alarm_n: float | None = meant(
         "magnitude of the load-cell force over its rest level: last sample at or before the alarm, or at the onset"
     )
@@ -73,7 +76,9 @@ class ContactResult:
         "the latency is no finer than this: sample periods, synchronisation, noise, drift and slope of the force",
         default=None,
     )
-    side: str | None = meant("the limit that was crossed: above or below; null for triggers of a program", default=None)
+    side: Literal["above", "below"] | None = meant(
+        "the limit that was crossed: above or below; null for triggers of a program", default=None
+    )
     statistic: float | None = meant("value compared with the limit at the alarm; null for triggers", default=None)
     limit: float | None = meant("limit at the alarm, in the unit of the statistic; null for triggers", default=None)
     rest_n: float | None = meant("what the load cell read at rest just before the onset", default=None)
@@ -104,7 +109,7 @@ class FalseAlarmResult:
     detector: str = meant("full name of the detector")
     joint: str = meant("joint that raised it")
     time_s: float = meant("when")
-    side: str | None = meant("the limit that was crossed: above or below", default=None)
+    side: Literal["above", "below"] | None = meant("the limit that was crossed: above or below", default=None)
     statistic: float | None = meant("value compared with the limit, in the unit of provenance.units", default=None)
     limit: float | None = meant("limit, in the detector's unit", default=None)
 
@@ -141,7 +146,7 @@ class ForceStepResult:
     at_most_n: float = meant("largest force allowed")
     peak_n: float | None = meant("largest force in the step; of a point: the mean of its tests, or the largest of them")
     time_budget_ms: float | None = meant("how long after the onset the limit was first exceeded; null if never")
-    verdict: str = meant("pass, fail or not_assessable")
+    verdict: Literal["pass", "fail", "not_assessable"] = meant("pass, fail or not_assessable")
     reason: str | None = meant("why it does not pass", default=None)
 
 
@@ -153,7 +158,7 @@ class ForceResult:
     group: str = meant("the benchmark's group")
     contact: int = meant("number of the contact in its recording, from 1")
     profile: str = meant("name of the profile in the limits file")
-    verdict: str = meant("pass, fail or not_assessable")
+    verdict: Literal["pass", "fail", "not_assessable"] = meant("pass, fail or not_assessable")
     peak_n: float | None = meant("largest force of the contact, corrected for the mass before the cell")
     steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
     point: str | None = meant("test point", default=None)
@@ -171,7 +176,7 @@ class PointResult:
     group: str = meant("the benchmark's group")
     profile: str = meant("name of the profile in the limits file")
     tests: int = meant("contacts at the point")
-    verdict: str = meant("pass, fail or not_assessable")
+    verdict: Literal["pass", "fail", "not_assessable"] = meant("pass, fail or not_assessable")
     steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
     note: str = meant("how many tests were averaged")
     reason: str | None = meant("why it does not pass", default=None)
@@ -218,7 +223,7 @@ class LimitResult:
     value: float | None = meant("value of the metric; null where it is not known or not finite")
     least: float | None = meant("smallest value allowed")
     largest: float | None = meant("largest value allowed")
-    outcome: str = meant("met, violated or not_assessable")
+    outcome: Literal["met", "violated", "not_assessable"] = meant("met, violated or not_assessable")
     reason: str | None = meant("why it is not met", default=None)
 
 
@@ -226,7 +231,7 @@ class LimitResult:
 class ConclusionResult:
     """What follows from limits, force profiles, missed contacts and what could not be assessed, taken together."""
 
-    outcome: str = meant(
+    outcome: Literal["violated", "not_assessable", "met", "not_asked"] = meant(
         "violated, not_assessable, met, or not_asked without limits and force profiles", default="not_asked"
     )
     headline: str = meant("the conclusion in one line, as every report shows it", default="no limits are set")
@@ -255,7 +260,7 @@ class RecordingFinding:
 
     recording: str = meant("path of the log below the benchmark file, or a detector")
     reason: str = meant("the finding in words")
-    severity: str = meant("loss, warning or note", default="warning")
+    severity: Literal["loss", "warning", "note"] = meant("loss, warning or note", default="warning")
     kind: str = meant("kind of the finding; empty in files of earlier versions", default="")
     channel: str = meant("channel or topic that it is about; empty for the whole log", default="")
 
@@ -326,3 +331,28 @@ def grouped(rows: Sequence[Row], *names: str) -> dict[Any, list[Row]]:
     for row in rows:
         found.setdefault(key(row), []).append(row)
     return found
+
+
+@cache
+def tables() -> Mapping[str, Any]:
+    """Return the class of the rows of each table; the tables are the fields of `Results` with rows.
+
+    >>> list(tables())[:3]
+    ['contacts', 'false_alarms', 'exposure']
+    """
+    hints = get_type_hints(Results)
+    found = {item.name: get_args(hints[item.name]) for item in fields(Results)}
+    return {name: inner[0] for name, inner in found.items() if inner and is_dataclass(inner[0])}
+
+
+def scalar_of(hint: Any) -> type | None:
+    """Return str, float, int or bool where a field has such values, or null; None for any other field.
+
+    >>> scalar_of(float | None), scalar_of(Literal["above"]), scalar_of(tuple[float, ...])
+    (<class 'float'>, <class 'str'>, None)
+    """
+    if type(None) in get_args(hint):
+        (hint,) = (item for item in get_args(hint) if item is not type(None))
+    if get_origin(hint) is Literal:
+        return str
+    return hint if hint in (str, float, int, bool) else None

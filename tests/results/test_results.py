@@ -14,7 +14,7 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.files.strict_json import strict_json
 from cdtool.report.model import onset_words
 from cdtool.results.files.results_file import json_pieces, read_results, to_json
-from cdtool.results.results import SCHEMA_VERSION, RecordingFinding, Skipped
+from cdtool.results.results import SCHEMA_VERSION, RecordingFinding, Skipped, tables
 from cdtool.results.summary import summarise
 from tests.report.html.html_case import case
 from tests.results.full_results import FULL, RESULTS, STEP
@@ -36,8 +36,12 @@ def test_the_json_is_strict_with_null_for_missing_values():
 
 
 @pytest.mark.parametrize("results", [FULL, RESULTS, many_results(30, 3), case()[0].results], ids=range(4))
-def test_the_json_is_laid_out_as_strict_json_lays_out_all_of_it(results):
-    assert to_json(results) == strict_json(asdict(results)) + "\n"
+def test_the_json_has_all_of_it_and_a_line_for_each_row(results):
+    text = to_json(results)
+    assert json.loads(text) == json.loads(strict_json(asdict(results)))
+    lines = [json.loads(line.removesuffix(",")) for line in text.splitlines() if line.startswith("  {")]
+    rows = [row for name in tables() for row in getattr(results, name)]
+    assert lines == json.loads(strict_json([asdict(row) for row in rows]))
 
 
 def test_the_json_of_many_rows_is_never_in_memory_as_a_whole():

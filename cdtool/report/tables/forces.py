@@ -70,7 +70,7 @@ def contacts_table(results: Results, *, only_exceptions: bool = False) -> Table:
 
 
 def _group_row(key: tuple[str, ...], forces: Sequence[ForceResult]) -> Row:
-    counts = Counter(item.verdict for item in forces)
+    counts = Counter[str](item.verdict for item in forces)
     peaks = [item.peak_n for item in forces if item.peak_n is not None]
     budgets = [item.time_budget_ms for item in forces if item.time_budget_ms is not None]
     return (

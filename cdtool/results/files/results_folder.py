@@ -13,17 +13,16 @@ false alarms the campaign and the test point. A table without rows has a file wi
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from cdtool.base.errors import RecordingError, UsageError, installing
 from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.base.files.strict_json import strict_json
-from cdtool.results.files.typed_rows import build
-from cdtool.results.results import SCHEMA_VERSION, Results
+from cdtool.base.files.typed_json import plain, typed
+from cdtool.results.results import SCHEMA_VERSION, Results, scalar_of, tables
 
 # A row, and its position in results.json.
 _Numbered = tuple[int, Any]
@@ -48,17 +47,6 @@ _OPERATION = re.compile(r"#\d+\Z")
 _NEXT_STEP = "write one with cdtool benchmark -o results.parquet"
 
 
-@dataclass(frozen=True)
-class _Column:
-    """A field of rows: its Arrow type and meaning, and what a value is stored and read as where that differs."""
-
-    name: str
-    arrow: Any
-    meaning: str
-    store: Callable[[Any], Any] | None = None
-    load: Callable[[Any], Any] | None = None
-
-
 def require_pyarrow(folder: Path) -> None:
     """Check that Parquet can be read and written.
 
@@ -80,25 +68,6 @@ def require_pyarrow(folder: Path) -> None:
         import pyarrow.parquet  # noqa: F401
     except ImportError as fault:
         raise UsageError(f"{folder.name}: Parquet needs pyarrow", f"install it: {installing('store')}") from fault
-
-
-@cache
-def tables() -> Mapping[str, Any]:
-    """Return the class of the rows of each table; the tables are the fields of `Results` with rows.
-
-    Returns
-    -------
-    mapping of str to type
-        The class by the name of the field.
-
-    Examples
-    --------
-    >>> list(tables())[:3]
-    ['contacts', 'false_alarms', 'exposure']
-    """
-    hints = get_type_hints(Results)
-    found = {item.name: get_args(hints[item.name]) for item in fields(Results)}
-    return {name: inner[0] for name, inner in found.items() if inner and is_dataclass(inner[0])}
 
 
 def write_tables(results: Results, folder: Path) -> str:
@@ -131,9 +100,9 @@ def write_tables(results: Results, folder: Path) -> str:
         (folder / table).mkdir()
         for name, numbered in _parts(table, rows):
             joined = of_recordings if table in _OF_RECORDING else None
-            _write(folder / table / f"{name}.parquet", _columns(kind), numbered, joined)
+            _write(folder / table / f"{name}.parquet", kind, numbered, joined)
     rest = {item.name: getattr(results, item.name) for item in fields(results) if item.name not in tables()}
-    return strict_json({"kind": KIND, **rest, "conclusion": vars(results.conclusion)}) + "\n"
+    return strict_json({"kind": KIND, **rest, "conclusion": plain(results.conclusion)}) + "\n"
 
 
 def holds_only_tables(folder: Path, others: Sequence[str] = ()) -> bool:
@@ -199,7 +168,7 @@ def read_tables(folder: Path) -> Results:
         head = parse_json(read_bytes(folder / PROVENANCE, RecordingError, most=MOST_JSON))
         if head.pop("kind") != KIND or head["schema_version"] != SCHEMA_VERSION:
             raise ValueError(f"this version of cdtool reads schema_version {SCHEMA_VERSION}")
-        known = build(Results, {**head, **{name: [] for name in tables()}}, "results")
+        known = typed(Results, {**head, **{name: [] for name in tables()}}, "results")
         # A table that earlier versions did not write is empty.
         rows = {
             name: _read(folder / name, kind) if (folder / name).exists() or name not in _LATER else ()
@@ -227,15 +196,14 @@ class _OfRecordings:
         self.rows = {(row.group, row.recording): row for row in results.recordings}
         self.machine = str(results.provenance.get("machine") or "") or None
 
-    def of(self, rows: Sequence[_Numbered]) -> dict[str, Sequence[Any]]:
-        """Return columns for the recordings, or their operations, that rows name."""
-        of_rows = [
-            self.rows.get((row.group, row.recording), self.rows.get((row.group, _OPERATION.sub("", row.recording))))
-            for _, row in rows
-        ]
-        began = [None if row is None or row.began_s is None else round(1e6 * row.began_s) for row in of_rows]
-        found = {name: [getattr(row, name, None) for row in of_rows] for name in ("campaign", "point")}
-        return {**found, "began": began, "machine": [self.machine] * len(rows)}
+    def of(self, row: Any) -> dict[str, Any]:
+        """Return columns for the recording, or its operation, that a row names."""
+        own = self.rows.get((row.group, row.recording))
+        known = own or self.rows.get((row.group, _OPERATION.sub("", row.recording)))
+        if known is None:
+            return {"machine": self.machine}
+        began = None if known.began_s is None else round(1e6 * known.began_s)
+        return {"campaign": known.campaign, "point": known.point, "began": began, "machine": self.machine}
 
 
 def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[_Numbered]]]:
@@ -251,41 +219,30 @@ def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[_Num
         yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:_LONGEST_NAME] for name in key)}", part
 
 
-def _write(
-    path: Path, columns: Sequence[_Column], rows: Sequence[_Numbered], of_recordings: _OfRecordings | None
-) -> None:
+def _write(path: Path, kind: Any, rows: Sequence[_Numbered], of_recordings: _OfRecordings | None) -> None:
     """Write numbered rows as one file, a row group at a time."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    listed = [pa.field("row", pa.int64(), metadata={"meaning": "position in results.json"})]
-    listed += [pa.field(item.name, item.arrow, metadata={"meaning": item.meaning}) for item in columns]
+    listed = [pa.field("row", pa.int64(), metadata={"meaning": "position in results.json"}), *_columns(kind)]
     if of_recordings:
-        known = {item.name for item in columns}
+        known = {item.name for item in listed}
         listed += [pa.field(name, pa.string()) for name in ("campaign", "point", "machine") if name not in known]
         listed.append(pa.field("began", pa.timestamp("us"), metadata={"meaning": "when the recording began, UTC"}))
     schema = pa.schema(listed)
+    maps = [item.name for item in schema if pa.types.is_map(item.type)]
     with pq.ParquetWriter(path, schema, compression="zstd") as writer:
         for first in range(0, max(len(rows), 1), _AT_ONCE):
-            some = rows[first : first + _AT_ONCE]
-            values: dict[str, Sequence[Any]] = of_recordings.of(some) if of_recordings else {}
-            values |= {"row": [number for number, _ in some]} | {item.name: _stored(item, some) for item in columns}
-            arrays = [_array(values[item.name], item.type) for item in schema]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
-
-
-def _stored(column: _Column, rows: Sequence[_Numbered]) -> Sequence[Any]:
-    values = [getattr(row, column.name) for _, row in rows]
-    return [column.store(value) for value in values] if column.store else values
-
-
-def _array(values: Sequence[Any], kind: Any) -> Any:
-    import pyarrow as pa
-
-    try:
-        return pa.array(values, kind)
-    except UnicodeEncodeError:  # half a surrogate pair, from a file name that is not UTF-8
-        return pa.array(_encodable(values), kind)
+            values = []
+            for number, row in rows[first : first + _AT_ONCE]:
+                joined = of_recordings.of(row) if of_recordings else {}
+                values.append({**joined, **plain(row, kind), "row": number})
+                values[-1].update({name: list(values[-1][name].items()) for name in maps})
+            try:
+                table = pa.Table.from_pylist(values, schema)
+            except UnicodeEncodeError:  # half a surrogate pair, from a file name that is not UTF-8
+                table = pa.Table.from_pylist(_encodable(values), schema)
+            writer.write_table(table)
 
 
 def _encodable(value: Any) -> Any:
@@ -304,36 +261,33 @@ def _read(folder: Path, kind: Any) -> tuple[Any, ...]:
     import pyarrow.parquet as pq
 
     columns = _columns(kind)
-    names = ["row", *(item.name for item in columns)]
-    table = pa.concat_tables(pq.read_table(path, columns=names) for path in sorted(folder.glob("*.parquet")))
-    table = table.sort_by("row")
-    values = [table[item.name].to_pylist() for item in columns]
-    loaded = [list(map(item.load, held)) if item.load else held for item, held in zip(columns, values, strict=True)]
-    return tuple(kind(*row) for row in zip(*loaded, strict=True))
+    names = [item.name for item in columns]
+    parts = (pq.read_table(path, columns=["row", *names]) for path in sorted(folder.glob("*.parquet")))
+    table = pa.concat_tables(parts).sort_by("row")
+    strict = {item.name: "strict" for item in columns if pa.types.is_map(item.type)}
+    values = [table[name].to_pylist(maps_as_pydicts=strict.get(name)) for name in names]
+    return tuple(
+        typed(kind, dict(zip(names, row, strict=True)), f"{folder.name}[{number}]")
+        for number, row in enumerate(zip(*values, strict=True))
+    )
 
 
-def _columns(kind: Any) -> list[_Column]:
-    """Return the columns of a class of rows."""
-    hints = get_type_hints(kind)
-    return [_column(item.name, hints[item.name], item.metadata["meaning"]) for item in fields(kind)]
-
-
-def _column(name: str, kind: Any, meaning: str) -> _Column:
+def _columns(kind: Any) -> list[Any]:
+    """Return the Arrow fields of a class of rows, with their meanings."""
     import pyarrow as pa
 
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin is tuple and is_dataclass(inner[0]):
-        parts = _columns(inner[0])
-        row: Any = inner[0]
-        return _Column(
-            name,
-            pa.list_(pa.struct([(item.name, item.arrow) for item in parts])),
-            meaning,
-            store=lambda rows: [vars(one) for one in rows],
-            load=lambda rows: tuple(row(**values) for values in rows),
-        )
-    if origin is Mapping:
-        return _Column(name, pa.map_(pa.string(), pa.float64()), meaning, lambda values: list(values.items()), dict)
-    known = next(item for item in (*inner, kind) if item is not type(None))
-    plain = {str: pa.string(), float: pa.float64(), int: pa.int64(), bool: pa.bool_()}
-    return _Column(name, plain[known], meaning)
+    hints = get_type_hints(kind)
+    return [
+        pa.field(item.name, _arrow_type(hints[item.name]), metadata={"meaning": item.metadata["meaning"]})
+        for item in fields(kind)
+    ]
+
+
+def _arrow_type(hint: Any) -> Any:
+    import pyarrow as pa
+
+    if scalar := scalar_of(hint):
+        return {str: pa.string(), float: pa.float64(), int: pa.int64(), bool: pa.bool_()}[scalar]
+    if get_origin(hint) is Mapping:
+        return pa.map_(pa.string(), pa.float64())
+    return pa.list_(pa.struct(_columns(get_args(hint)[0])))

@@ -21,8 +21,8 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.base.files.strict_json import finite, strict_json
+from cdtool.base.files.typed_json import typed
 from cdtool.recordings.recording import Contact
-from cdtool.results.files.typed_rows import build
 from cdtool.results.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 
 SCHEMA_VERSION = 3
@@ -247,7 +247,7 @@ def _trace(values: dict[str, Any]) -> Trace:
         group=str(values["group"]),
         start=float(values["start"]),
         end=float(values["end"]),
-        contacts=tuple(build(Contact, _numbers(item), "contact") for item in values["contacts"]),
+        contacts=tuple(typed(Contact, _numbers(item), "contact") for item in values["contacts"]),
         contact=int(values["contact"]),
         view=(float(values["view"][0]), float(values["view"][1])),
         force_time=_decoded(values["force_time"]),
@@ -268,7 +268,7 @@ def _panel(values: dict[str, Any]) -> Panel:
         # A file of the version before has another spelling.
         verdict="not_assessable" if values["verdict"] == "not assessable" else str(values["verdict"]),
         reason=str(values["reason"]),
-        seen=tuple(build(ContactOutcome, _numbers(item), "seen") for item in values["seen"]),
+        seen=tuple(typed(ContactOutcome, _numbers(item), "seen") for item in values["seen"]),
         alarms=tuple(map(float, values["alarms"])),
         false_alarms=tuple(map(float, values["false_alarms"])),
         why=tuple(map(str, values["why"])),

@@ -18,8 +18,7 @@ from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import evaluate
 from cdtool.results.files.reading import load_report
 from cdtool.results.files.results_file import read_results, to_json
-from cdtool.results.files.results_folder import tables
-from cdtool.results.results import Results
+from cdtool.results.results import Results, tables
 from cdtool.results.traces.file import encode_traces
 from tests.report.html.html_case import case
 from tests.results.full_results import FULL

@@ -13,11 +13,10 @@ from types import GenericAlias
 from typing import Any
 
 from cdtool.base.files.bounded_loading import parse_own_json
-from cdtool.execution.store.encoding import decoded, encoded
+from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.results.comparison import Comparison
 from cdtool.results.evaluated import Evaluated
-from cdtool.results.files.results_folder import tables
-from cdtool.results.results import ConclusionResult, Results
+from cdtool.results.results import ConclusionResult, Results, tables
 from cdtool.results.summary import Summary
 
 # Rows that are in memory as text at once.

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.base.errors import CdtoolError
+from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome
 from cdtool.commands.scoring.pieces import Piece, PieceOutcome
@@ -24,7 +25,6 @@ from cdtool.commands.scoring.store.determinants import Determinants
 from cdtool.commands.scoring.store.finished_run import FinishedRun, TraceKey
 from cdtool.commands.scoring.store.known_sources import KnownSources
 from cdtool.execution.store.digest import code_version, combined
-from cdtool.execution.store.encoding import decoded, encoded
 from cdtool.execution.store.entry import Entry, source_entry
 from cdtool.execution.store.finished import mark_used, read_finished, write_finished
 from cdtool.execution.store.sources import SourceFile
