@@ -100,7 +100,7 @@ def compare_detectors(results: Results) -> list[Comparison]:
 
 def _pairs_of(first: Mapping[Key, ContactResult], second: Mapping[Key, ContactResult]) -> list[Pair]:
     """Return the contacts that both could assess."""
-    both = [(first[key], second[key]) for key in first if key in second]
+    both = [(item, second[key]) for key, item in first.items() if key in second]
     return [pair for pair in both if all(item.outcome != "not_assessable" for item in pair)]
 
 

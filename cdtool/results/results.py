@@ -26,7 +26,7 @@ def meant(meaning: str, **default: Any) -> Any:
     return field(metadata={"meaning": meaning}, **default)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class RecordingResult:
     """One log that was scored."""
 
@@ -43,7 +43,7 @@ class RecordingResult:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ContactResult:
     """One contact seen by one detector."""
 
@@ -100,7 +100,7 @@ class ContactResult:
         return self.outcome == _IN_PROGRESS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class FalseAlarmResult:
     """One alarm without a contact."""
 
@@ -114,7 +114,7 @@ class FalseAlarmResult:
     limit: float | None = meant("limit, in the detector's unit", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ExposureResult:
     """How long and how often a detector monitored a group: the denominator of its false alarms."""
 
@@ -127,7 +127,7 @@ class ExposureResult:
     not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ConditionResult:
     """One group of recordings of the machine under a changed condition: it is scored, and counts nowhere else."""
 
@@ -137,7 +137,7 @@ class ConditionResult:
     impact_free: bool = meant("whether its recordings have no contacts")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ForceStepResult:
     """One step of a force profile, compared with one contact or one test point."""
 
@@ -150,7 +150,7 @@ class ForceStepResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ForceResult:
     """One contact against a force profile."""
 
@@ -168,7 +168,7 @@ class ForceResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PointResult:
     """The tests at one point against a force profile, averaged as the profile asks."""
 
@@ -182,7 +182,7 @@ class PointResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class SweepResult:
     """One detector in one group with all its limits moved: a point of the latency against false-alarm curve."""
 
@@ -200,7 +200,7 @@ class SweepResult:
     in_use: bool = meant("the benchmark's own limits", default=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class CalibrationResult:
     """How a detector's safety factor was set for a false-alarm budget."""
 
@@ -212,7 +212,7 @@ class CalibrationResult:
     alarms: int = meant("operations that alarm with that factor; of a budget by hour: alarms")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LimitResult:
     """One limit of the benchmark file, checked against one metric."""
 
@@ -227,7 +227,7 @@ class LimitResult:
     reason: str | None = meant("why it is not met", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ConclusionResult:
     """What follows from limits, force profiles, missed contacts and what could not be assessed, taken together."""
 
@@ -246,7 +246,7 @@ class ConclusionResult:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Skipped:
     """What was left out: a recording, a part of one, or a detector."""
 
@@ -254,7 +254,7 @@ class Skipped:
     reason: str = meant("why it was left out")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class RecordingFinding:
     """A finding about a recording, or a detector, that was used."""
 
@@ -275,7 +275,7 @@ class RecordingFinding:
         return self.severity == _LOSS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Results:
     """All of it, in the order of the benchmark file."""
 

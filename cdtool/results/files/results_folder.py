@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -39,8 +40,6 @@ _PARTS: Mapping[str, tuple[str, ...]] = {
 }
 # Tables that also have columns of the recording.
 _OF_RECORDING = ("contacts", "false_alarms", "recordings")
-# Tables that a results.parquet of an earlier version does not have.
-_LATER = ("conditions",)
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST_NAME = 40
 _OPERATION = re.compile(r"#\d+\Z")
@@ -169,16 +168,11 @@ def read_tables(folder: Path) -> Results:
         if head.pop("kind") != KIND or head["schema_version"] != SCHEMA_VERSION:
             raise ValueError(f"this version of cdtool reads schema_version {SCHEMA_VERSION}")
         known = typed(Results, {**head, **{name: [] for name in tables()}}, "results")
-        # A table that earlier versions did not write is empty.
-        rows = {
-            name: _read(folder / name, kind) if (folder / name).exists() or name not in _LATER else ()
-            for name, kind in tables().items()
-        }
+        rows: dict[str, Any] = {name: _read(folder / name, kind) for name, kind in tables().items()}
+        return replace(known, **rows)
     except (ContentError, ValueError, KeyError, TypeError, AttributeError, OSError, ArrowException) as fault:
         reason = " ".join(str(fault).split())[:200]
         raise RecordingError(f"{folder}: damaged, or not a results.parquet: {reason}", _NEXT_STEP) from fault
-    rest = {item.name: getattr(known, item.name) for item in fields(known)}
-    return Results(**{**rest, **rows})
 
 
 def _has_mark(folder: Path) -> bool:
@@ -208,15 +202,15 @@ class _OfRecordings:
 
 def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[_Numbered]]]:
     """Yield the name of each file of a table, and its rows."""
-    numbered = list(enumerate(rows))
-    if table not in _PARTS or not numbered:
-        yield table, numbered
+    if table not in _PARTS or not rows:
+        yield table, list(enumerate(rows))
         return
-    names, parts = _PARTS[table], dict[tuple[str, ...], list[_Numbered]]()
-    for number, row in numbered:
-        parts.setdefault(tuple(getattr(row, name) for name in names), []).append((number, row))
-    for place, (key, part) in enumerate(parts.items()):
-        yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:_LONGEST_NAME] for name in key)}", part
+    parts: dict[tuple[str, ...], list[_Numbered]] = {}
+    keys = zip(*(map(attrgetter(name), rows) for name in _PARTS[table]), strict=True)
+    for names, numbered in zip(keys, enumerate(rows), strict=True):
+        parts.setdefault(names, []).append(numbered)
+    for place, (names, part) in enumerate(parts.items()):
+        yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:_LONGEST_NAME] for name in names)}", part
 
 
 def _write(path: Path, kind: Any, rows: Sequence[_Numbered], of_recordings: _OfRecordings | None) -> None:
@@ -230,19 +224,32 @@ def _write(path: Path, kind: Any, rows: Sequence[_Numbered], of_recordings: _OfR
         listed += [pa.field(name, pa.string()) for name in ("campaign", "point", "machine") if name not in known]
         listed.append(pa.field("began", pa.timestamp("us"), metadata={"meaning": "when the recording began, UTC"}))
     schema = pa.schema(listed)
-    maps = [item.name for item in schema if pa.types.is_map(item.type)]
+    hints = _hints(kind)
     with pq.ParquetWriter(path, schema, compression="zstd") as writer:
         for first in range(0, max(len(rows), 1), _AT_ONCE):
-            values = []
-            for number, row in rows[first : first + _AT_ONCE]:
-                joined = of_recordings.of(row) if of_recordings else {}
-                values.append({**joined, **plain(row, kind), "row": number})
-                values[-1].update({name: list(values[-1][name].items()) for name in maps})
+            some = [row for _, row in rows[first : first + _AT_ONCE]]
+            joined = [of_recordings.of(row) for row in some] if of_recordings else []
+            columns = {name: [of_row.get(name) for of_row in joined] for name in schema.names if name not in hints}
+            columns |= {name: _stored(hint, list(map(attrgetter(name), some))) for name, hint in hints.items()}
+            columns["row"] = [number for number, _ in rows[first : first + _AT_ONCE]]
             try:
-                table = pa.Table.from_pylist(values, schema)
+                table = pa.Table.from_pydict(columns, schema)
             except UnicodeEncodeError:  # half a surrogate pair, from a file name that is not UTF-8
-                table = pa.Table.from_pylist(_encodable(values), schema)
+                table = pa.Table.from_pydict(_encodable(columns), schema)
             writer.write_table(table)
+
+
+def _stored(hint: Any, values: list[Any]) -> list[Any]:
+    """Return the values of a field as Arrow takes them."""
+    if scalar_of(hint):
+        return values
+    made = [plain(value, hint) for value in values]
+    return [list(value.items()) for value in made] if get_origin(hint) is Mapping else made
+
+
+def _hints(kind: Any) -> dict[str, Any]:
+    hints = get_type_hints(kind)
+    return {item.name: hints[item.name] for item in fields(kind)}
 
 
 def _encodable(value: Any) -> Any:
@@ -260,23 +267,26 @@ def _read(folder: Path, kind: Any) -> tuple[Any, ...]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = _columns(kind)
-    names = [item.name for item in columns]
-    parts = (pq.read_table(path, columns=["row", *names]) for path in sorted(folder.glob("*.parquet")))
+    hints = _hints(kind)
+    parts = (pq.read_table(path, columns=["row", *hints]) for path in sorted(folder.glob("*.parquet")))
     table = pa.concat_tables(parts).sort_by("row")
-    strict = {item.name: "strict" for item in columns if pa.types.is_map(item.type)}
-    values = [table[name].to_pylist(maps_as_pydicts=strict.get(name)) for name in names]
-    return tuple(
-        typed(kind, dict(zip(names, row, strict=True)), f"{folder.name}[{number}]")
-        for number, row in enumerate(zip(*values, strict=True))
-    )
+    texts: dict[str, str] = {}
+    columns = []
+    for name, hint in hints.items():
+        if scalar := scalar_of(hint):
+            values = table[name].to_pylist()
+            columns.append([texts.setdefault(value, value) for value in values] if scalar is str else values)
+        else:
+            values = table[name].to_pylist(maps_as_pydicts="strict")
+            columns.append([typed(hint, value, name) for value in values])
+    return tuple(map(kind, *columns))
 
 
 def _columns(kind: Any) -> list[Any]:
     """Return the Arrow fields of a class of rows, with their meanings."""
     import pyarrow as pa
 
-    hints = get_type_hints(kind)
+    hints = _hints(kind)
     return [
         pa.field(item.name, _arrow_type(hints[item.name]), metadata={"meaning": item.metadata["meaning"]})
         for item in fields(kind)
