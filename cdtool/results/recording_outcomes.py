@@ -7,7 +7,7 @@ violated without any such recording: the upper end of an interval may be beyond 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from cdtool.results.results import ContactResult, FalseAlarmResult, LimitResult, Results, grouped
@@ -76,9 +76,8 @@ def recording_outcomes(results: Results) -> Iterator[RecordingOutcome]:
         logs.setdefault(group, {})[name] = None
     alarms: dict[Pair, dict[str, list[FalseAlarmResult]]] = {}
     for alarm in results.false_alarms:
-        name = _log_of(alarm.recording, logs.setdefault(alarm.group, {}))
-        logs[alarm.group][name] = None
-        alarms.setdefault((alarm.group, alarm.detector), {}).setdefault(name, []).append(alarm)
+        logs.setdefault(alarm.group, {})[alarm.recording] = None
+        alarms.setdefault((alarm.group, alarm.detector), {}).setdefault(alarm.recording, []).append(alarm)
     ran = {(item.group, item.detector) for item in results.exposure}
     exceeded = _exceeded(results.limits)
     failed = {(item.group, item.recording, item.contact) for item in results.forces if item.verdict == "fail"}
@@ -95,12 +94,6 @@ def recording_outcomes(results: Results) -> Iterator[RecordingOutcome]:
                 silent = (group, detector) in ran and not true_contacts.get((group, name), 0)
                 judged = bool(seen or false or silent)
                 yield RecordingOutcome(name, group, detector, tuple(seen), tuple(false), breaks, judged)
-
-
-def _log_of(operation: str, logs: Mapping[str, None]) -> str:
-    """Return the log of an operation, which is named log#n if the log was cut."""
-    log, _, number = operation.rpartition("#")
-    return log if operation not in logs and number.isdecimal() and log in logs else operation
 
 
 def _exceeded(limits: Sequence[LimitResult]) -> dict[tuple[str, str], list[LimitResult]]:

@@ -15,7 +15,7 @@ from typing import Any, Literal, Self, TypeVar, get_args, get_origin, get_type_h
 from cdtool.base.findings import Finding
 
 Row = TypeVar("Row")
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 # How reports introduce what is lost of a recording that was used.
 DAMAGED = "damaged, used as far as it goes"
 _LOSS, _IN_PROGRESS = "loss", "in_progress"
@@ -112,6 +112,9 @@ class FalseAlarmResult:
     side: Literal["above", "below"] | None = meant("the limit that was crossed: above or below", default=None)
     statistic: float | None = meant("value compared with the limit, in the unit of provenance.units", default=None)
     limit: float | None = meant("limit, in the detector's unit", default=None)
+    operation: int | None = meant(
+        "number of the operation in its recording, from 1; null: read from a file of version 4 without it", default=None
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +264,7 @@ class RecordingFinding:
     recording: str = meant("path of the log below the benchmark file, or a detector")
     reason: str = meant("the finding in words")
     severity: Literal["loss", "warning", "note"] = meant("loss, warning or note", default="warning")
-    kind: str = meant("kind of the finding; empty in files of earlier versions", default="")
+    kind: str = meant("kind of the finding", default="")
     channel: str = meant("channel or topic that it is about; empty for the whole log", default="")
 
     @classmethod

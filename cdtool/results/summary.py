@@ -165,8 +165,8 @@ def _summaries(results: Results, groups: Sequence[str]) -> list[Summary]:
     contacts = grouped(results.contacts, "detector", "group")
     forces = {group: _failed(items) for group, items in grouped(results.forces, "group").items()}
     false_alarms = Counter((item.detector, item.group) for item in results.false_alarms)
-    of_recordings = {(item.detector, item.group, item.recording) for item in results.false_alarms}
-    alarming = Counter((detector, group) for detector, group, _ in of_recordings)
+    operations = {(item.detector, item.group, item.recording, item.operation) for item in results.false_alarms}
+    alarming = Counter((detector, group) for detector, group, *_ in operations)
     exposures = {(item.detector, item.group): item for item in results.exposure}
     clusters = campaigns(results)
     return [

@@ -181,13 +181,11 @@ def logs_of(results: Results) -> frozenset[Log]:
 
 
 def _outcomes(results: Results) -> dict[tuple[str, str, str], _Outcome]:
-    logs = logs_of(results)
     outcomes: dict[tuple[str, str, str], _Outcome] = {}
     for item in results.contacts:
         outcomes.setdefault((item.group, item.recording, item.detector), _Outcome()).contacts.append(item)
     for alarm in results.false_alarms:
-        log = log_of(alarm.group, alarm.recording, logs)
-        outcomes.setdefault((*log, alarm.detector), _Outcome()).false_alarms += 1
+        outcomes.setdefault((alarm.group, alarm.recording, alarm.detector), _Outcome()).false_alarms += 1
     return outcomes
 
 

@@ -73,7 +73,7 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
     wanted = dict.fromkeys(log_of(*log, logs) for log in traced)
     cases: list[_Case] = []
     counts = []
-    for words, made, total in _kinds(results, {**wanted, **dict.fromkeys(traced)}, logs):
+    for words, made, total in _kinds(results, {**wanted, **dict.fromkeys(traced)}):
         cases += made
         counts += [f"{len(made)} of {total} {words}"] if total else []
     listed = {case.log for case in cases}
@@ -94,9 +94,7 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
     return replace(table, marks=marks), f"Listed: {'; '.join(counts)}." if counts else ""
 
 
-def _kinds(
-    results: Results, traced: Collection[Log], logs: frozenset[Log]
-) -> Iterator[tuple[str, Sequence[_Case], int]]:
+def _kinds(results: Results, traced: Collection[Log]) -> Iterator[tuple[str, Sequence[_Case], int]]:
     """Yield each kind of case in words, its listed cases, and how many there are."""
     pairs = max(len(results.every_group) * len(results.detectors), 1)
     most = max(_MOST_OF_KIND // pairs, _FEWEST_OF_PAIR)
@@ -104,7 +102,7 @@ def _kinds(
     worst = _worst(failed, ("group",), "peak_n", most * max(len(results.detectors), 1), traced)
     yield "contacts above their force limits", [_of_force(item) for item in worst], len(failed)
     alarms = _worst(results.false_alarms, ("group", "detector"), "statistic", most, traced)
-    yield "false alarms", [_of_alarm(item, logs) for item in alarms], len(results.false_alarms)
+    yield "false alarms", [_of_alarm(item) for item in alarms], len(results.false_alarms)
     of_outcome = grouped(results.contacts, "outcome")
     missed = Counter((item.group, item.recording, item.contact) for item in of_outcome.get("missed", ()))
     for outcome, (_, _, words, by) in _OUTCOMES.items():
@@ -153,8 +151,8 @@ def _of_contact(item: ContactResult, missed_by_all: bool) -> _Case:
     )
 
 
-def _of_alarm(item: FalseAlarmResult, logs: frozenset[Log]) -> _Case:
-    log = log_of(item.group, item.recording, logs)
+def _of_alarm(item: FalseAlarmResult) -> _Case:
+    log = item.group, item.recording
     return _Case(log, "false alarm", "bad", item.detector, at_s=item.time_s, why=f"joint {shown(item.joint)}")
 
 

@@ -7,9 +7,8 @@ the file. A row is a line.
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from cdtool.base.files.kinds import kind_of
 from cdtool.base.files.strict_json import finite, passive, strict_json
 from cdtool.base.files.typed_json import plain, typed
 from cdtool.base.value_words import value_in_words
-from cdtool.results.results import SCHEMA_VERSION, Results, tables
+from cdtool.results.results import SCHEMA_VERSION, FalseAlarmResult, Results, tables
 from cdtool.results.summary import kind_group
 
 # Rows that are in memory as text at once.
@@ -27,15 +26,6 @@ _AT_ONCE = 256
 _as_json = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False).encode
 # Rows of a detector, of a group or of both.
 _NAMED = ("contacts", "false_alarms", "exposure", "recordings", "forces", "points", "sweep", "calibration", "limits")
-# Earlier versions that can be read: 2 has "kept", "broken" and "not assessable", and no conclusion; 3 lists lost data
-# of a recording as skipped, and names the label file in the rule of the onset.
-_SPACED_WORDS, _LOSSES_LEFT_OUT = 2, 3
-_READABLE = (_SPACED_WORDS, _LOSSES_LEFT_OUT, SCHEMA_VERSION)
-# How versions 2 and 3 write these.
-_DAMAGED = "damaged, used as far as it goes: "
-_LABEL_FILE = "; label file "
-_IN_SAMPLES = re.compile(r"\bfor \d+ samples?\b")
-_RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
 _NEXT_STEP = "write one with cdtool benchmark -o results.json"
 
 
@@ -147,74 +137,34 @@ def read_results(path: Path) -> Results:
         raise other
     if not isinstance(values, dict) or "schema_version" not in values:
         raise _no_results(path, "it has no schema_version")
-    if values["schema_version"] not in _READABLE:
-        known = f"this version of cdtool reads {', '.join(map(str, _READABLE[:-1]))} and {SCHEMA_VERSION}"
+    version = values["schema_version"]
+    if version not in (SCHEMA_VERSION - 1, SCHEMA_VERSION):
         raise RecordingError(
-            f"{path}: schema_version is {value_in_words(values['schema_version'])}; {known}",
+            f"{path}: schema_version is {value_in_words(version)}; "
+            f"this version of cdtool reads {SCHEMA_VERSION - 1} and {SCHEMA_VERSION}",
             "run cdtool benchmark again with this version",
         )
     try:
-        values = migrated(values)
-        results = typed(Results, values, "results")
+        results = typed(Results, {**values, "schema_version": SCHEMA_VERSION}, "results")
+        if version != SCHEMA_VERSION:
+            results = _with_operations(results)
         _refuse_unlisted(results)
     except ValueError as fault:
         raise _no_results(path, str(fault)) from fault
     return results
 
 
-def migrated(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of an earlier schema_version as those of this one."""
-    if values["schema_version"] == _SPACED_WORDS:
-        values = _with_joined_words(values)
-    return _with_losses_as_findings(values) if values["schema_version"] == _LOSSES_LEFT_OUT else dict(values)
+def _with_operations(results: Results) -> Results:
+    """Return results of version 4, in which a false alarm may name its operation as recording, RECORDING#N."""
+    operations = {(row.group, row.recording): row.operations for row in results.recordings}
 
+    def renamed(row: FalseAlarmResult) -> FalseAlarmResult:
+        recording, _, number = row.recording.rpartition("#")
+        if (row.group, row.recording) not in operations and (row.group, recording) in operations and number.isdecimal():
+            return replace(row, recording=recording, operation=int(number))
+        return replace(row, operation=1 if operations.get((row.group, row.recording)) == 1 else None)
 
-def _with_joined_words(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of schema_version 2 as those of version 3: it has other words for verdicts, and no conclusion."""
-
-    def renamed(rows: Any, name: str) -> Any:
-        if not isinstance(rows, list):
-            return rows
-        made = []
-        for row in rows:
-            if isinstance(row, dict) and isinstance(row.get(name), str):
-                row = {**row, name: _RENAMED.get(row[name], row[name])}
-            if isinstance(row, dict) and "steps" in row:
-                row = {**row, "steps": renamed(row["steps"], name)}
-            made.append(row)
-        return made
-
-    tables = {name: renamed(values[name], "verdict") for name in ("forces", "points") if name in values}
-    tables |= {"limits": renamed(values["limits"], "outcome")} if "limits" in values else {}
-    return {**values, **tables, "schema_version": _LOSSES_LEFT_OUT}
-
-
-def _with_losses_as_findings(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of schema_version 3 as those of version 4: losses are findings, the label file is separate.
-
-    `onset_unit` of the provenance becomes "samples" if the rule counts samples.
-    """
-    made = {**values, "schema_version": SCHEMA_VERSION}
-    skipped, findings = values.get("skipped", []), values.get("findings", [])
-    if isinstance(skipped, list) and isinstance(findings, list):
-        made["skipped"] = [row for row in skipped if not _is_loss(row)]
-        losses = [
-            {**row, "reason": row["reason"].removeprefix(_DAMAGED), "severity": "loss"}
-            for row in skipped
-            if _is_loss(row)
-        ]
-        made["findings"] = [*losses, *findings]
-    provenance = values.get("provenance")
-    onset = provenance.get("onset") if isinstance(provenance, dict) else None
-    if isinstance(provenance, dict) and isinstance(onset, str):
-        made["provenance"] = {**provenance, "onset": onset.partition(_LABEL_FILE)[0]}
-        if _IN_SAMPLES.search(onset):
-            made["provenance"]["onset_unit"] = "samples"
-    return made
-
-
-def _is_loss(row: Any) -> bool:
-    return isinstance(row, dict) and isinstance(row.get("reason"), str) and row["reason"].startswith(_DAMAGED)
+    return replace(results, false_alarms=tuple(map(renamed, results.false_alarms)))
 
 
 def _refuse_unlisted(results: Results) -> None:

@@ -42,7 +42,6 @@ _PARTS: Mapping[str, tuple[str, ...]] = {
 _OF_RECORDING = ("contacts", "false_alarms", "recordings")
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST_NAME = 40
-_OPERATION = re.compile(r"#\d+\Z")
 _NEXT_STEP = "write one with cdtool benchmark -o results.parquet"
 
 
@@ -191,9 +190,8 @@ class _OfRecordings:
         self.machine = str(results.provenance.get("machine") or "") or None
 
     def of(self, row: Any) -> dict[str, Any]:
-        """Return columns for the recording, or its operation, that a row names."""
-        own = self.rows.get((row.group, row.recording))
-        known = own or self.rows.get((row.group, _OPERATION.sub("", row.recording)))
+        """Return columns for the recording that a row names."""
+        known = self.rows.get((row.group, row.recording))
         if known is None:
             return {"machine": self.machine}
         began = None if known.began_s is None else round(1e6 * known.began_s)

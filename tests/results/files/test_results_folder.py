@@ -64,7 +64,7 @@ def test_an_alarm_in_an_operation_has_the_columns_of_its_recording(tmp_path):
     evaluated, _ = case()
     target = written(evaluated.results, tmp_path)
     (row,) = pq.read_table(target / "false_alarms").to_pylist()
-    assert row["recording"] == "free.csv#2" and row["machine"] == "gate"
+    assert (row["recording"], row["operation"], row["machine"]) == ("free.csv", 2, "gate")
 
 
 def test_columns_say_what_they_mean(tmp_path):
