@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.base.plain_text import counted
-from cdtool.results.results import ContactResult, ExposureResult, ForceResult, Results
-from cdtool.results.rows import Rows, grouped, values_of
+from cdtool.results.results import ContactResult, ExposureResult, ForceResult, Results, grouped
 from cdtool.statistics.interval import Interval
 from cdtool.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
 from cdtool.statistics.small_sample import FEWEST, median_of, p95_of
@@ -164,12 +163,10 @@ def summarise_conditions(results: Results) -> list[Summary]:
 
 def _summaries(results: Results, groups: Sequence[str]) -> list[Summary]:
     contacts = grouped(results.contacts, "detector", "group")
-    forces = {group: _failed(items) for (group,), items in grouped(results.forces, "group").items()}
-    false_alarms = Counter(
-        zip(values_of(results.false_alarms, "detector"), values_of(results.false_alarms, "group"), strict=True)
-    )
-    columns = (values_of(results.false_alarms, name) for name in ("detector", "group", "recording"))
-    alarming = Counter((detector, group) for detector, group, _ in set(zip(*columns, strict=True)))
+    forces = {group: _failed(items) for group, items in grouped(results.forces, "group").items()}
+    false_alarms = Counter((item.detector, item.group) for item in results.false_alarms)
+    operations = {(item.detector, item.group, item.recording, item.operation) for item in results.false_alarms}
+    alarming = Counter((detector, group) for detector, group, *_ in operations)
     exposures = {(item.detector, item.group): item for item in results.exposure}
     clusters = campaigns(results)
     return [
@@ -230,8 +227,8 @@ def summarise_kinds(results: Results) -> list[Summary]:
     `evaluate` adds them to the results.
     """
     kinds: dict[str, dict[str, None]] = {}
-    for group, kind in zip(values_of(results.contacts, "group"), values_of(results.contacts, "kind"), strict=True):
-        kinds.setdefault(group, {})[kind or ""] = None
+    for row in results.contacts:
+        kinds.setdefault(row.group, {})[row.kind or ""] = None
     if not any(any(known) for known in kinds.values()):
         return []
     clusters = campaigns(results)
@@ -248,7 +245,7 @@ def summarise_kinds(results: Results) -> list[Summary]:
                 for name in results.detectors
             }
             numbers = {(item.recording, item.contact) for items in rows.values() for item in items}
-            of_kind = [item for item in forces.get((group,), ()) if (item.recording, item.contact) in numbers]
+            of_kind = [item for item in forces.get(group, ()) if (item.recording, item.contact) in numbers]
             failed = _failed(of_kind)
             for name, items in rows.items():
                 made.append(_summary(name, kind_group(group, kind), items, 0, None, clusters, failed))
@@ -282,7 +279,7 @@ def later_ms(item: ContactResult) -> float:
 
 def at_worst(results: Results) -> Results:
     """Return the results with the longest latencies and the largest forces that missing load-cell samples allow."""
-    return replace(results, contacts=Rows(ContactResult, map(_at_worst, results.contacts)))
+    return replace(results, contacts=tuple(map(_at_worst, results.contacts)))
 
 
 def _at_worst(item: ContactResult) -> ContactResult:
@@ -314,8 +311,7 @@ def campaigns(results: Results) -> dict[str, str]:
     --------
     `cdtool.benchmark` returns the results.
     """
-    names, named = values_of(results.recordings, "recording"), values_of(results.recordings, "campaign")
-    return {name: campaign or name for name, campaign in zip(names, named, strict=True)}
+    return {item.recording: item.campaign or item.recording for item in results.recordings}
 
 
 def latencies(contacts: Sequence[ContactResult]) -> tuple[np.ndarray, np.ndarray]:
@@ -401,6 +397,6 @@ def _summary(
 
 def _failed(forces: Sequence[ForceResult]) -> float:
     """Contacts above their force limits; NaN where none was judged, or none failed and one could not be assessed."""
-    verdicts = Counter(values_of(forces, "verdict"))
+    verdicts = Counter(item.verdict for item in forces)
     failed, unknown = verdicts["fail"], verdicts["not_assessable"]
     return math.nan if not verdicts or (unknown and not failed) else float(failed)

@@ -131,7 +131,7 @@ class BenchmarkResult:
         UsageError
             There are no rows of that name.
         """
-        from cdtool.results.files.results_folder import tables
+        from cdtool.results.results import tables
 
         if table not in tables():
             raise UsageError(f"no table '{table}' in the results", nearest(table, tuple(tables())))

@@ -30,7 +30,6 @@ from cdtool.results.results import (
     Results,
     Skipped,
 )
-from cdtool.results.rows import Rows
 from cdtool.results.traces.choice import TraceChoice
 from cdtool.results.traces.trace import Trace
 from cdtool.truth.force.verdict import ForceVerdict
@@ -77,13 +76,12 @@ class Gathering:
         self.setup = setup
         self.names = tuple(names)
         self.learned = learned
-        self.recordings = Rows(RecordingResult)
-        self.contacts = Rows(ContactResult)
-        self.false_alarms = Rows(FalseAlarmResult)
-        self.forces = Rows(ForceResult)
-        self.skipped = Rows(Skipped)
-        self.findings = Rows(RecordingFinding)
-        self.findings += (RecordingFinding.of(str(setup.path), remark(words)) for words in setup.migrated)
+        self.recordings: list[RecordingResult] = []
+        self.contacts: list[ContactResult] = []
+        self.false_alarms: list[FalseAlarmResult] = []
+        self.forces: list[ForceResult] = []
+        self.skipped: list[Skipped] = []
+        self.findings = [RecordingFinding.of(str(setup.path), remark(words)) for words in setup.migrated]
         self.findings += setup.rules_of("").findings
         # SHA-256 of the files beside the logs.
         self._beside: dict[str, str] = {}
@@ -257,27 +255,27 @@ class Gathering:
             detectors=self.names,
             groups=self.setup.groups,
             conditions=self.setup.conditions,
-            recordings=self.recordings,
-            contacts=self.contacts,
-            false_alarms=self.false_alarms,
+            recordings=tuple(self.recordings),
+            contacts=tuple(self.contacts),
+            false_alarms=tuple(self.false_alarms),
             exposure=tuple(item.result(group, name) for (group, name), item in self._exposure.items()),
-            forces=self.forces,
+            forces=tuple(self.forces),
             points=tuple(point_rows(self._tests, profiles)),
             sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
             calibration=tuple(calibration),
-            skipped=self.skipped,
+            skipped=tuple(self.skipped),
             findings=self._findings(),
         )
 
-    def _findings(self) -> Rows[RecordingFinding]:
+    def _findings(self) -> tuple[RecordingFinding, ...]:
         """Return all findings; one about a file of which several groups have runs is the same in each of them."""
         self.findings += unchecked(self._unchecked)
-        return Rows(RecordingFinding, dict.fromkeys(self.findings)) if self.setup.has_runs else self.findings
+        return tuple(dict.fromkeys(self.findings) if self.setup.has_runs else self.findings)
 
     @property
     def scored(self) -> frozenset[str]:
         """Return the names of the recordings that were scored or left out by name."""
-        return frozenset((*self.skipped.values("recording"), *self.recordings.values("recording")))
+        return frozenset([item.recording for rows in (self.skipped, self.recordings) for item in rows])
 
     def _refuse_learned(self, recording: RecordingResult) -> None:
         before = self._scored.get(recording.sha256, "") if recording.sha256 else ""

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from cdtool.base.files.locks import lock_handle, remove_locked
-from cdtool.execution.store.encoding import decoded, encoded
+from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.execution.store.entry import Entry
 
 JOURNAL_SUFFIX = ".journal"

@@ -27,9 +27,9 @@ import numpy.typing as npt
 
 from cdtool.base.errors import ConfigurationError, UsageError, installing
 from cdtool.base.files.bounded_loading import parse_json, parse_own_json, read_bytes
+from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.base.files.writing import write_bytes, write_text
 from cdtool.base.remote.remote_path import is_remote
-from cdtool.execution.store.encoding import decoded, encoded
 from cdtool.execution.store.entry import Entry
 from cdtool.execution.store.journal import JOURNAL_SUFFIX, Journal, entries_in, left_behind
 from cdtool.execution.store.sources import SourceFile

@@ -22,8 +22,7 @@ from cdtool.report.table import (
     tabulate,
     tone_of,
 )
-from cdtool.results.results import ForceResult, ForceStepResult, PointResult, Results
-from cdtool.results.rows import grouped, picked, values_of
+from cdtool.results.results import ForceResult, ForceStepResult, PointResult, Results, grouped
 
 _VERDICTS = ("pass", "fail", "not_assessable")
 
@@ -65,17 +64,15 @@ def contacts_table(results: Results, *, only_exceptions: bool = False) -> Table:
         (Column("why"), lambda item: Cell(item.reason or "")),
     )
     name, title = ("force_exceptions", "Force limits not met") if only_exceptions else ("forces", "Force by contact")
-    verdicts = values_of(results.forces, "verdict")
-    numbers = [i for i, verdict in enumerate(verdicts) if not only_exceptions or verdict != "pass"]
-    items = picked(results.forces, numbers)
-    logs = list(zip(values_of(items, "group"), values_of(items, "recording"), strict=True))
+    items = [item for item in results.forces if not only_exceptions or item.verdict != "pass"]
+    logs = [(item.group, item.recording) for item in items]
     return tabulate(name, title, fields, items, "forces", logs, most_rows(results))
 
 
 def _group_row(key: tuple[str, ...], forces: Sequence[ForceResult]) -> Row:
-    counts = Counter(values_of(forces, "verdict"))
-    peaks = [value for value in values_of(forces, "peak_n") if value is not None]
-    budgets = [value for value in values_of(forces, "time_budget_ms") if value is not None]
+    counts = Counter[str](item.verdict for item in forces)
+    peaks = [item.peak_n for item in forces if item.peak_n is not None]
+    budgets = [item.time_budget_ms for item in forces if item.time_budget_ms is not None]
     return (
         *map(name_cell, key),
         *(count_cell(counts[verdict], tone_of(verdict)) for verdict in _VERDICTS),

@@ -25,8 +25,7 @@ from cdtool.report.table import (
     tabulate,
 )
 from cdtool.report.tables.results import detector_cell, part_of
-from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
-from cdtool.results.rows import grouped
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results, grouped
 from cdtool.results.summary import later_ms
 
 _OPERATION = re.compile(r"#\d+\Z")
@@ -121,7 +120,7 @@ def contact_tables(results: Results) -> list[Table]:
     }
     rows = grouped(results.contacts, "outcome")
     return [
-        tabulate(name, title, fields, rows.get((outcome,), ()), "contacts", (), most_rows(results))
+        tabulate(name, title, fields, rows.get(outcome, ()), "contacts", (), most_rows(results))
         for outcome, (name, title) in tables.items()
     ]
 
@@ -182,13 +181,11 @@ def logs_of(results: Results) -> frozenset[Log]:
 
 
 def _outcomes(results: Results) -> dict[tuple[str, str, str], _Outcome]:
-    logs = logs_of(results)
     outcomes: dict[tuple[str, str, str], _Outcome] = {}
     for item in results.contacts:
         outcomes.setdefault((item.group, item.recording, item.detector), _Outcome()).contacts.append(item)
     for alarm in results.false_alarms:
-        log = log_of(alarm.group, alarm.recording, logs)
-        outcomes.setdefault((*log, alarm.detector), _Outcome()).false_alarms += 1
+        outcomes.setdefault((alarm.group, alarm.recording, alarm.detector), _Outcome()).false_alarms += 1
     return outcomes
 
 

@@ -21,13 +21,11 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.base.files.strict_json import finite, strict_json
+from cdtool.base.files.typed_json import typed
 from cdtool.recordings.recording import Contact
-from cdtool.results.files.typed_rows import build
 from cdtool.results.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 
 SCHEMA_VERSION = 3
-# The version before: "not assessable", where results.json has had "not_assessable" since its version 3.
-_SPACED_WORDS = 2
 NO_LIMIT = 1_000_000_000
 # The name of the file in a results.parquet.
 TRACES_IN_FOLDER = "results.traces.json.gz"
@@ -123,10 +121,9 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = unpack_json(content)
-        if values["schema_version"] not in (_SPACED_WORDS, SCHEMA_VERSION):
+        if values["schema_version"] != SCHEMA_VERSION:
             raise RecordingError(
-                f"{path}: schema_version is {values['schema_version']}; "
-                f"this version of cdtool reads {_SPACED_WORDS} and {SCHEMA_VERSION}",
+                f"{path}: schema_version is {values['schema_version']}; this version of cdtool reads {SCHEMA_VERSION}",
                 "run cdtool benchmark again",
             )
         if results is not None and values["results_sha256"] != _digest(results):
@@ -247,7 +244,7 @@ def _trace(values: dict[str, Any]) -> Trace:
         group=str(values["group"]),
         start=float(values["start"]),
         end=float(values["end"]),
-        contacts=tuple(build(Contact, _numbers(item), "contact") for item in values["contacts"]),
+        contacts=tuple(typed(Contact, _numbers(item), "contact") for item in values["contacts"]),
         contact=int(values["contact"]),
         view=(float(values["view"][0]), float(values["view"][1])),
         force_time=_decoded(values["force_time"]),
@@ -265,10 +262,9 @@ def _panel(values: dict[str, Any]) -> Panel:
         unit=str(values["unit"]),
         joint=str(values["joint"]),
         course=StatisticCurve(time, value, lower, upper, np.array(values["status"], dtype=np.uint8)),
-        # A file of the version before has another spelling.
-        verdict="not_assessable" if values["verdict"] == "not assessable" else str(values["verdict"]),
+        verdict=str(values["verdict"]),
         reason=str(values["reason"]),
-        seen=tuple(build(ContactOutcome, _numbers(item), "seen") for item in values["seen"]),
+        seen=tuple(typed(ContactOutcome, _numbers(item), "seen") for item in values["seen"]),
         alarms=tuple(map(float, values["alarms"])),
         false_alarms=tuple(map(float, values["false_alarms"])),
         why=tuple(map(str, values["why"])),

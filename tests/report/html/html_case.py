@@ -55,7 +55,7 @@ def case(named: Naming = str, contacts: int = 12, *, limits: bool = True) -> tup
         ),
         contacts=tuple(rows),
         false_alarms=(
-            FalseAlarmResult(f"{named('free.csv')}#2", holdout, detectors[1], named("axis"), 4.0, "above", 7.0, 5.0),
+            FalseAlarmResult(named("free.csv"), holdout, detectors[1], named("axis"), 4.0, "above", 7.0, 5.0, 2),
         ),
         exposure=tuple(
             ExposureResult(group, detector, 12, 12, 0.25, 1, {"start-up": 0.05, "missing samples": 0.01})

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
+from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome
 from cdtool.commands.scoring.pieces import Piece, PieceOutcome
@@ -19,7 +20,6 @@ from cdtool.commands.scoring.scoring import LogRows
 from cdtool.commands.scoring.store.determinants import Determinants
 from cdtool.commands.scoring.store.known_sources import KnownSources
 from cdtool.execution.store.digest import code_version
-from cdtool.execution.store.encoding import decoded, encoded
 from cdtool.execution.store.entry import Entry, source_entry
 from cdtool.execution.store.sources import SourceFile
 from cdtool.execution.store.store import RunRecord, Store, encodable, write_run

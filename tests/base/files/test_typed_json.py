@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from cdtool.execution.store import encoding
-from cdtool.execution.store.encoding import decoded, encoded
+from cdtool.base.files import typed_json
+from cdtool.base.files.typed_json import decoded, encoded
 
 Item = TypeVar("Item", bound=np.generic)
 
@@ -38,8 +38,8 @@ def test_arrays_come_back_with_their_type():
 def test_an_alias_of_a_type_is_what_it_stands_for(monkeypatch):
     alias = Subscripted[np.int64]
     monkeypatch.setattr(Subscripted, "__value__", Alias.__value__, raising=False)
-    plan = encoding._plan.__wrapped__(alias)
-    assert plan.decode(plan.encode(np.array([3, 4]))).tolist() == [3, 4]
+    form = typed_json._form.__wrapped__(alias)
+    assert form.typed(form.plain(np.array([3, 4]))).tolist() == [3, 4]
 
 
 def test_a_type_without_a_json_form_is_refused():
