@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -26,11 +27,12 @@ from cdtool.commands.scoring.benchmark_file import (
     with_only,
 )
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
-from cdtool.commands.scoring.gathering import Gathering
+from cdtool.commands.scoring.gathering import recordings_in, results_before, results_of
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
+from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import ScoredLog, detect_with, score_runs
 from cdtool.commands.scoring.store.stored_learned import StoreOfRun
 from cdtool.detectors.base import Detector
@@ -42,7 +44,7 @@ from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.curves.sweep import MULTIPLES
 from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import LimitRule, unchecked
-from cdtool.results.results import Skipped
+from cdtool.results.results import Results, Skipped
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.normal_choice import NormalMotions
 
@@ -143,27 +145,35 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     setup = with_only(setup, learned.about.detectors)
     seconds = perf_counter() - begin
     factors = sweep_factors(setup, learned.thresholds)
-    gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
-    gathered.skipped += (*setup.not_made, *learned.about.skipped)
-    gathered.findings += [*measured, *learned.about.findings]
-    gathered.findings += unchecked(work.limits, setup.detectors, str(setup.path))
-    gathered.skipped += [
+    used = [setup.machine_file.detector(name) for name in setup.detectors]
+    refused = [
         Skipped(name, f"{group}: not tested by injected contacts: {reason}")
         for group, item in setup.impacts.items()
         for name, reason in item.refused.items()
     ]
+    of_limits = unchecked(work.limits, setup.detectors, str(setup.path))
+    before = results_before(
+        setup,
+        _provenance(setup, used, learned),
+        setup.detectors,
+        (*setup.not_made, *learned.about.skipped, *refused),
+        (*measured, *learned.about.findings, *of_limits),
+    )
     logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-    used = [setup.machine_file.detector(name) for name in setup.detectors]
-    provenance = _provenance(setup, used, learned)
     stored = store.outcomes(setup, learned, factors) if store else None
-    plan = stored.plan(logs, workers) if stored else ()
-    gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
-    gathered.skipped += _labels_without_run(setup, gathered.scored)
-    provenance["units"] |= gathered.units
-    evaluated = evaluate(gathered.results(provenance, learned.about.calibration), setup.limits)
+    scoring = partial(_scoring, setup, learned, teaching, factors)
+    scored = ScoredLogs(setup, scoring, logs, workers, progress, stored)
+    results = results_of(setup, before, scored, factors, learned.about.sources)
+    results = replace(
+        results,
+        calibration=tuple(learned.about.calibration),
+        skipped=(*results.skipped, *_labels_without_run(setup, results)),
+        findings=(*results.findings, *scored.left_out),
+    )
+    traces = scored.traces
     report = stored.finish() if stored else None
-    times = {"reading": learned.seconds + gathered.reading, "detecting": seconds - learned.seconds + gathered.detecting}
-    return BenchmarkResult(evaluated, gathered.traces, setup.inputs, times, report)
+    times = {"reading": learned.seconds + scored.reading, "detecting": seconds - learned.seconds + scored.detecting}
+    return BenchmarkResult(evaluate(results, setup.limits), traces, setup.inputs, times, report)
 
 
 @dataclass(frozen=True)
@@ -218,11 +228,11 @@ def _scoring(
     )
 
 
-def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[Skipped]:
+def _labels_without_run(setup: BenchmarkFile, results: Results) -> list[Skipped]:
     """Return the names in the label file that no run has; rows about whole logs were checked before reading."""
     if setup.labels is None or not setup.has_runs:
         return []
-    used = {setup.labels.name_of(name) for name in scored}
+    used = {setup.labels.name_of(name) for name in recordings_in(results)}
     return [
         Skipped(name, f"no such run is scored: {', '.join(lines)} left out")
         for name, lines in setup.labels.lines.items()
