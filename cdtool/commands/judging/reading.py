@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.base.errors import UsageError
+from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.runs import read_log
 from cdtool.formats.machine_file import MachineFile
 from cdtool.recordings.recording import Recording
@@ -50,7 +51,7 @@ def read(
     ((7200, 1), 'm/s')
     """
     if machine is None:
-        name = Path(log).name
+        name = location(log).name
         raise UsageError(
             f"cdtool.read('{name}') needs a machine file: it states which column is which channel, and the units",
             f"cdtool.read('{name}', 'machine.toml'); cdtool.init('{name}', 'machine.toml') drafts one",
