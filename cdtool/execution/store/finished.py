@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,17 +24,16 @@ _FOLDER = "finished"
 _NAMES = ("name", "text")
 
 
-def write_finished(folder: Path, key: str, texts: Iterable[Sequence[tuple[str, str]]]) -> None:
-    """Write names and texts, of which some are in memory at a time, and remove the oldest files."""
+def write_finished(folder: Path, key: str, texts: Iterable[tuple[str, str]]) -> None:
+    """Write names and texts, of which one is in memory at a time, and remove the oldest files."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     stream = io.BytesIO()
     schema = pa.schema([(name, pa.large_string()) for name in _NAMES])
     with pq.ParquetWriter(stream, schema, compression="zstd", write_page_checksum=True) as writer:
-        for some in texts:
-            columns = [text_column(column) for column in zip(*some, strict=True)]
-            writer.write_table(pa.Table.from_arrays(columns, schema=schema))
+        for text in texts:
+            writer.write_table(pa.Table.from_arrays([text_column([part]) for part in text], schema=schema))
     (folder / _FOLDER).mkdir(parents=True, exist_ok=True)
     write_bytes(_path(folder, key), stream.getvalue())
     for path in finished(folder)[_MOST:]:

@@ -106,7 +106,7 @@ class StoredOutcomes:
             return None
         whole = combined(key, _digest_of_keys(planned))
         try:
-            found = FinishedRun.of_texts(read_finished(self.store.folder, whole), provenance, self.setup.groups)
+            found = FinishedRun.of_texts(read_finished(self.store.folder, whole), provenance)
             if found is None or (found.failed and self.use.retry_failed):
                 return None
             entries = [self.store.get(item.key) for item in found.traces]
