@@ -202,10 +202,11 @@ def _record(kind: type[Any]) -> _Form:
     def typed(values: Any) -> Any:
         if not isinstance(values, dict):
             raise ValueError(" is not an object")
-        if unknown := values.keys() - forms.keys():
-            raise ValueError(f" has an unknown field '{min(unknown)}'")
-        if missing := required - values.keys():
-            raise ValueError(f": {', '.join(name for name in names if name in missing)} missing")
+        if values.keys() != decoders.keys():
+            if unknown := values.keys() - decoders.keys():
+                raise ValueError(f" has an unknown field '{min(unknown)}'")
+            if missing := [name for name in names if name in required and name not in values]:
+                raise ValueError(f": {', '.join(missing)} missing")
         made = {}
         for name, value in values.items():
             try:
