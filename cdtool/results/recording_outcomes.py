@@ -27,8 +27,6 @@ FALSE_ALARMS = frozenset(
 )
 FORCES_AT_ALARM = frozenset(("force_at_alarm_n", "force_at_alarm_max_n"))
 
-Pair = tuple[str, str]
-
 
 @dataclass(frozen=True)
 class RecordingOutcome:
@@ -69,41 +67,30 @@ def recording_outcomes(results: Results) -> Iterator[RecordingOutcome]:
     --------
     `cdtool.benchmark` returns the results.
     """
-    contacts = grouped(results.contacts, "group", "detector")
+    contacts = grouped(results.contacts, "group", "recording", "detector")
+    alarms = grouped(results.false_alarms, "group", "recording", "detector")
     true_contacts = {(item.group, item.recording): item.contacts for item in results.recordings}
     logs: dict[str, dict[str, None]] = {group: {} for group in results.every_group}
-    for group, name in (*true_contacts, *((item.group, item.recording) for item in results.contacts)):
+    for group, name, *_ in (*true_contacts, *contacts, *alarms):
         logs.setdefault(group, {})[name] = None
-    alarms: dict[Pair, dict[str, list[FalseAlarmResult]]] = {}
-    for alarm in results.false_alarms:
-        logs.setdefault(alarm.group, {})[alarm.recording] = None
-        alarms.setdefault((alarm.group, alarm.detector), {}).setdefault(alarm.recording, []).append(alarm)
     ran = {(item.group, item.detector) for item in results.exposure}
-    exceeded = _exceeded(results.limits)
+    exceeded = grouped([item for item in results.limits if _exceeded(item)], "group", "detector")
     failed = {(item.group, item.recording, item.contact) for item in results.forces if item.verdict == "fail"}
     for group, names in logs.items():
         for detector in results.detectors:
             limits = exceeded.get((group, detector), [])
-            of_log: dict[str, list[ContactResult]] = {}
-            for contact in contacts.get((group, detector), ()):
-                of_log.setdefault(contact.recording, []).append(contact)
-            false_of_log = alarms.get((group, detector), {})
             for name in names:
-                seen, false = of_log.get(name, []), false_of_log.get(name, [])
+                seen, false = contacts.get((group, name, detector), []), alarms.get((group, name, detector), [])
                 breaks = tuple(words for limit in limits for words in _part_in(limit, seen, false, failed))
                 silent = (group, detector) in ran and not true_contacts.get((group, name), 0)
                 judged = bool(seen or false or silent)
                 yield RecordingOutcome(name, group, detector, tuple(seen), tuple(false), breaks, judged)
 
 
-def _exceeded(limits: Sequence[LimitResult]) -> dict[tuple[str, str], list[LimitResult]]:
-    """Return the limits that a single recording can have violated, by group and detector."""
-    found: dict[tuple[str, str], list[LimitResult]] = {}
-    for limit in limits:
-        above = limit.largest is not None and (limit.value is None or limit.value > limit.largest)
-        if limit.outcome == "violated" and above != (limit.figure == "detected"):
-            found.setdefault((limit.group, limit.detector), []).append(limit)
-    return found
+def _exceeded(limit: LimitResult) -> bool:
+    """Return whether a single recording can have violated a limit."""
+    above = limit.largest is not None and (limit.value is None or limit.value > limit.largest)
+    return limit.outcome == "violated" and above != (limit.figure == "detected")
 
 
 def _part_in(

@@ -54,6 +54,7 @@ def test_results_survive_writing_and_reading(tmp_path):
     again = read_results(path)
     assert to_json(again) == to_json(FULL)
     assert again.forces[0].steps[1] == replace(STEP, peak_n=None)
+    assert again.provenance == {**FULL.provenance, "gain": None}
     assert (again.limits, again.sweep, again.points[0].steps[0].name) == (FULL.limits, FULL.sweep, "dynamic")
 
 

@@ -1,7 +1,8 @@
 """Frozen dataclasses as JSON values and back, by the types of their fields.
 
-An instance is an object of its fields, a tuple a list, an array its shape and its bytes in base64. Numbers are exact,
-NaN and infinity included. Equal texts that are read are one text in memory.
+An instance is an object of its fields, a tuple a list, an array its shape and its bytes in base64. `Any` is a JSON
+value as it is, `Annotated[Any, tuple]` one whose lists are tuples. Numbers are exact, NaN and infinity included. Equal
+texts that are read are one text in memory.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from operator import attrgetter
 from sys import intern
-from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -69,18 +70,10 @@ def _form(kind: Any) -> _Form:
         return _form(origin.__value__[inner])
     if kind in _PLAIN:
         return _Form(None, _number if kind is float else _plain(kind))
-    if origin is Literal:
-        return _Form(None, _word(inner))
-    if origin in (Union, types.UnionType):
-        return _either([item for item in inner if item is not type(None)])
-    if origin is tuple:
-        return _sequence(inner[0]) if len(inner) == 2 and inner[1] is Ellipsis else _fixed(inner)
-    if origin is Mapping:
-        return _mapping(inner[1])
-    if origin is np.ndarray:
-        return _array(np.dtype(get_args(inner[1])[0]).newbyteorder("<"))
-    if kind is Any:  # JSON values and tuples
-        return _Form(None, _with_tuples)
+    if kind is Any:
+        return _Form(None, lambda value: value)
+    if origin in _FORMS:
+        return _FORMS[origin](inner)
     if is_dataclass(kind):
         return _record(kind)  # type: ignore[arg-type]  # a class, not an instance
     raise TypeError(f"{kind} has no JSON form")
@@ -105,7 +98,7 @@ def _plain(kind: type[Any]) -> Callable[[Any], Any]:
     return typed
 
 
-def _word(known: tuple[Any, ...]) -> Callable[[Any], Any]:
+def _word(known: tuple[Any, ...]) -> _Form:
     words = {word: word for word in known}
 
     def typed(value: Any) -> Any:
@@ -115,22 +108,25 @@ def _word(known: tuple[Any, ...]) -> Callable[[Any], Any]:
             raise ValueError(f" is '{value}', not one of {', '.join(known)}")
         return words[value]
 
-    return typed
+    return _Form(None, typed)
 
 
-def _either(inner: list[Any]) -> _Form:
+def _either(inner: tuple[Any, ...]) -> _Form:
     """Return the form of a value that may be missing, or of one of several plain values."""
-    if len(inner) > 1:
-        if all(item in _PLAIN for item in inner):
+    known = [item for item in inner if item is not type(None)]
+    if len(known) > 1:
+        if all(item in _PLAIN for item in known):
             return _Form(None, lambda value: value)
-        raise TypeError(f"{inner} have no common JSON form")
-    encode, decode = _form(inner[0])
+        raise TypeError(f"{known} have no common JSON form")
+    encode, decode = _form(known[0])
     optional = None if encode is None else lambda value: None if value is None else encode(value)
     return _Form(optional, lambda value: None if value is None else decode(value))
 
 
-def _sequence(inner: Any) -> _Form:
-    encode, decode = _form(inner)
+def _sequence(inner: tuple[Any, ...]) -> _Form:
+    if len(inner) != 2 or inner[1] is not Ellipsis:
+        return _fixed(inner)
+    encode, decode = _form(inner[0])
 
     def typed(values: Any) -> tuple[Any, ...]:
         if not isinstance(values, list):
@@ -159,8 +155,8 @@ def _fixed(inner: tuple[Any, ...]) -> _Form:
     )
 
 
-def _mapping(inner: Any) -> _Form:
-    encode, decode = _form(inner)
+def _mapping(inner: tuple[Any, ...]) -> _Form:
+    encode, decode = _form(inner[1])
 
     def typed(values: Any) -> dict[str, Any]:
         if not isinstance(values, dict):
@@ -170,7 +166,9 @@ def _mapping(inner: Any) -> _Form:
     return _Form((lambda items: {name: encode(item) for name, item in items.items()}) if encode else dict, typed)
 
 
-def _array(dtype: np.dtype[Any]) -> _Form:
+def _array(inner: tuple[Any, ...]) -> _Form:
+    dtype = np.dtype(get_args(inner[1])[0]).newbyteorder("<")
+
     def encode(array: Any) -> list[Any]:
         raw = np.ascontiguousarray(array, dtype=dtype).tobytes()
         return [list(array.shape), b64encode(raw).decode("ascii")]
@@ -186,7 +184,7 @@ def _array(dtype: np.dtype[Any]) -> _Form:
 
 
 def _record(kind: type[Any]) -> _Form:
-    hints = get_type_hints(kind)
+    hints = get_type_hints(kind, include_extras=True)
     items = [item for item in fields(kind) if item.init]
     names = tuple(item.name for item in items)
     required = {item.name for item in items if item.default is MISSING and item.default_factory is MISSING}
@@ -204,10 +202,11 @@ def _record(kind: type[Any]) -> _Form:
     def typed(values: Any) -> Any:
         if not isinstance(values, dict):
             raise ValueError(" is not an object")
-        if unknown := values.keys() - forms.keys():
-            raise ValueError(f" has an unknown field '{min(unknown)}'")
-        if missing := required - values.keys():
-            raise ValueError(f": {', '.join(name for name in names if name in missing)} missing")
+        if values.keys() != decoders.keys():
+            if unknown := values.keys() - decoders.keys():
+                raise ValueError(f" has an unknown field '{min(unknown)}'")
+            if missing := [name for name in names if name in required and name not in values]:
+                raise ValueError(f": {', '.join(missing)} missing")
         made = {}
         for name, value in values.items():
             try:
@@ -223,3 +222,14 @@ def _with_tuples(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: _with_tuples(item) for name, item in value.items()}
     return tuple([_with_tuples(item) for item in value]) if isinstance(value, list) else value
+
+
+_FORMS: Mapping[Any, Callable[[tuple[Any, ...]], _Form]] = {
+    Literal: _word,
+    Union: _either,
+    types.UnionType: _either,
+    tuple: _sequence,
+    Mapping: _mapping,
+    np.ndarray: _array,
+    Annotated: lambda _: _Form(None, _with_tuples),
+}
