@@ -58,11 +58,10 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
         if item.duty is not None:
             if "N m" not in machine.accepted_units("torque"):
                 raise ConfigurationError(
-                    f"{source.path}: torque of kind 'duty' is on the motor side, but the machine file states "
-                    "coordinates = 'load'",
+                    "torque of kind 'duty' is on the motor side, but the machine file states coordinates = 'load'",
                     "describe the machine in motor coordinates",
                 )
-            series[item.channel] = _torque_from_duty(source.path, item, series, channels.speed_low_pass)
+            series[item.channel] = _torque_from_duty(item, series, channels.speed_low_pass)
     return Recording(
         name=log_stem(source.path),
         source=str(source.path),
@@ -143,9 +142,7 @@ class _Assembly:
         """Return one channel: its values in SI at its own times."""
         shared = self.table or self._topic_clock(item)
         if not len(shared.clean.time):
-            raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
-            )
+            raise RecordingError(f"channel '{item.channel}' has no sample with a time", channel=item.channel)
         parts = [self.columns[key].values for key in item.keys]
         values = parts[0] if len(parts) == 1 else np.column_stack(parts)
         kept, clock, gaps = self._select(item, values, shared.clean.keep), shared.times, shared.gaps
@@ -193,16 +190,14 @@ class _Assembly:
             rows = {len(column.values) for column in self.columns.values()}
             return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
         column = self.columns[time.key]
-        self.findings += check_clock_unit(self.source.path, time, column, self.origin)
+        self.findings += check_clock_unit(time, column, self.origin)
         self.findings += time_unit_findings(time, column, self.origin)
         start = epoch_start(column.values, time.factor)
         if start:
             self.origin += start * time.factor
         clock = self._clean((column.values - start) * time.factor, "time", counted=column.values)
         if not len(clock.time):
-            raise RecordingError(
-                f"{self.source.path}: column '{column.name}' contains no time stamp", "see [channels] time"
-            )
+            raise RecordingError(f"column '{column.name}' contains no time stamp", "see [channels] time")
         return clock
 
     def _clean(
@@ -214,7 +209,7 @@ class _Assembly:
         try:
             clean = clean_time(stamps, first, row_name, counted=counted, sampled=sampled)
         except RecordingError as fault:
-            raise RecordingError(f"{self.source.path}: {clock}: {fault.message}", fault.hint) from fault
+            raise RecordingError(f"{clock}: {fault.message}", fault.hint) from fault
         self._add_clock_findings(clean, clock)
         return clean
 
@@ -226,14 +221,13 @@ class _Assembly:
         table = values.reshape(len(values), -1)
         if len(table) != len(keep):
             raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' ({item.described}) has {len(table)} values, "
-                f"its clock {len(keep)}",
+                f"channel '{item.channel}' ({item.described}) has {len(table)} values, its clock {len(keep)}",
                 "all columns of a recording have the same length",
                 channel=item.channel,
             )
         if table.shape[1] != len(item.factor):
             raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' ({item.described}) has {table.shape[1]} values "
+                f"channel '{item.channel}' ({item.described}) has {table.shape[1]} values "
                 f"per sample for {len(item.factor)} {'axes' if item.axes else 'joints'}",
                 f"name one element per {'axis' if item.axes else 'joint, in the order of machine.joints'}",
                 channel=item.channel,
@@ -291,7 +285,7 @@ def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, 
     return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, impossible)])
 
 
-def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
+def _torque_from_duty(item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
     """Return tau = k_t (u - k_e omega) / R (thesis 6.2.2); omega is the last motor speed at or before each sample."""
     duty, logged = item.duty, series[item.channel]
     assert duty is not None
@@ -301,7 +295,7 @@ def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series]
         speed = differentiate(series["position"], low_pass, "rad/s")
     else:
         raise ConfigurationError(
-            f"{path}: torque of kind 'duty' needs the motor's speed [rad/s] or angle [rad]",
+            "torque of kind 'duty' needs the motor's speed [rad/s] or angle [rad]",
             "map speed or position of the motor in [channels]",
         )
     voltage = logged.values * (duty.supply_voltage if logged.unit == "1" else 1.0)

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.errors import ConfigurationError, RecordingError, naming
 from cdtool.base.files.kinds import kind_of
 from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem, log_suffix
@@ -78,34 +78,35 @@ _WIDE = {
 
 def choose_format(path: Path) -> Format:
     """Return the format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
-    head = _read_head(path)
-    suffix = log_suffix(path).lower()
-    if suffix == ".toml" and (kind := kind_of(head)):  # its numbers could be read as a table
-        raise RecordingError(f"{path}: is not a recording: it is {kind}", "give a log in its place")
-    for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
-        likely: Format = FORMATS.load(name)()
-        if suffix in likely.suffixes and likely.sniff(path):
-            return likely
-    formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
-    by_suffix = [item for item in formats if suffix in item.suffixes]
-    # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
-    claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
-    for item in [*by_suffix, *formats]:
-        if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
-            return item
-    wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
-    start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
-    content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
-    content = kind_of(head) or content if content == "JSON" else content
-    if wide and not content and _is_damaged_text(path, wide):
+    with naming(path):
+        head = _read_head(path)
+        suffix = log_suffix(path).lower()
+        if suffix == ".toml" and (kind := kind_of(head)):  # its numbers could be read as a table
+            raise RecordingError(f"is not a recording: it is {kind}", "give a log in its place")
+        for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
+            likely: Format = FORMATS.load(name)()
+            if suffix in likely.suffixes and likely.sniff(path):
+                return likely
+        formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
+        by_suffix = [item for item in formats if suffix in item.suffixes]
+        # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
+        claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
+        for item in [*by_suffix, *formats]:
+            if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
+                return item
+        wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
+        start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
+        content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
+        content = kind_of(head) or content if content == "JSON" else content
+        if wide and not content and _is_damaged_text(path, wide):
+            raise RecordingError(
+                f"begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
+            )
+        expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
         raise RecordingError(
-            f"{path}: begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
+            f"is not a recording{f': it is {content}' if content else expected}",
+            _NEXT_STEPS.get(content, f"cdtool reads {', '.join(item.name for item in formats)}"),
         )
-    expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
-    raise RecordingError(
-        f"{path}: is not a recording{f': it is {content}' if content else expected}",
-        _NEXT_STEPS.get(content, f"cdtool reads {', '.join(item.name for item in formats)}"),
-    )
 
 
 def survey(path: Path) -> Source:
@@ -256,7 +257,8 @@ def log_parts(path: Path) -> list[Path]:
             return parts
     if path.is_dir() and (lost := missing_part_findings(path, [])):
         raise RecordingError(f"{path}: {lost[0]}", "copy the complete folder that rosbag2 wrote")
-    _read_head(path)
+    with naming(path):
+        _read_head(path)
     return [path]
 
 
@@ -268,23 +270,24 @@ def mapped_source(
     A mapped load cell or label that is not in the file is left out of the map, with a note. `also` returns a further
     column, given whether the file contains topics; it becomes the last source of the map.
     """
-    return _resolved_source(path, _map_for(choose_format(path), machine_file, path), also)
-
-
-def _resolved_source(
-    path: Path, channels: ChannelMap, also: Callable[[bool], ChannelSource] | None = None
-) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that a map names, with that of `also`, and the map; raises RecordingError."""
     file_format = choose_format(path)
-    if has_topics(file_format) and not channels.topics:
-        raise RecordingError(f"{path}: contains topics, but columns are mapped", "give a file of columns")
+    channels = _map_for(file_format, machine_file, path)
     if also is not None:
         channels = replace(channels, sources=(*channels.sources, also(channels.topics)))
-    asked = fields_by_axis(channels)
-    source, resolved = resolve_columns(file_format.columns(path, asked), asked)
-    if resolved.time.nanoseconds_key:
-        source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
-    return with_own_clocks(*join_fields(source, resolved, channels))
+    return _resolved_source(path, channels, file_format)
+
+
+def _resolved_source(path: Path, channels: ChannelMap, file_format: Format | None = None) -> tuple[Source, ChannelMap]:
+    """Return the columns of one file that a map names, and the map; raises RecordingError."""
+    file_format = file_format or choose_format(path)
+    with naming(path):
+        if has_topics(file_format) and not channels.topics:
+            raise RecordingError("contains topics, but columns are mapped", "give a file of columns")
+        asked = fields_by_axis(channels)
+        source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+        if resolved.time.nanoseconds_key:
+            source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
+        return with_own_clocks(*join_fields(source, resolved, channels))
 
 
 def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: float = 1.0) -> Source:
@@ -311,7 +314,8 @@ def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> L
     for path in paths:
         source, channels = mapped_source(path, machine_file)
         factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
-        parts.append(assemble_recording(source, channels, machine_file.machine))
+        with naming(path):
+            parts.append(assemble_recording(source, channels, machine_file.machine))
         headers.append(replace(source, columns={}))
     whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
     details = in_words(join_details(headers), join_topics(headers))
@@ -372,20 +376,20 @@ def _first_time(part: Path) -> float:
 def _read_head(path: Path) -> bytes:
     try:
         if path.is_dir():
-            raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
+            raise RecordingError("is a folder", "name the recordings in it, e.g. with *.csv")
         if not path.exists():
             whole, mark, _ = str(path).rpartition("#")
             is_run = mark and location(whole).exists()
             hint = f"for a run of {whole}, state how it is cut, as detect --operations column:NAME" if is_run else ""
-            raise RecordingError(f"{path}: no such file", hint or "check the path")
+            raise RecordingError("no such file", hint or "check the path")
         if not path.is_file():
-            raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")
+            raise RecordingError("is not a regular file", "save the stream to a file first")
         with path.open("rb") as file:
             head = file.read(512)
     except OSError as fault:
-        raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the file's permissions") from fault
+        raise RecordingError(f"cannot be read: {fault.strerror}", "check the file's permissions") from fault
     if not head or (head.startswith(MAGIC) and not read_sample(path, 1)):
-        raise RecordingError(f"{path}: is empty", "was the recording stopped at once, or the copy cut off?")
+        raise RecordingError("is empty", "was the recording stopped at once, or the copy cut off?")
     return head
 
 
@@ -403,8 +407,7 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
         return replace(source, columns=plain), channels
     if channels.time.factor != 1.0:
         raise ConfigurationError(
-            f"{source.path}: its own clock is in s, but [channels] time states another unit",
-            'time = { column = "time", unit = "s" }',
+            "its own clock is in s, but [channels] time states another unit", 'time = { column = "time", unit = "s" }'
         )
     joined, notes = dict[str, Column](), list[Finding]()
     for item in channels.sources:
@@ -421,18 +424,18 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
 def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]:
     parts = [source.columns[key] for key in item.keys]
     if item.axes and all(part.time is not None for part in parts):
-        return join_axes(source.path, item, parts)
+        return join_axes(item, parts)
     time = parts[0].time
     for part in parts:
         if part.time is None or time is None:
             raise RecordingError(
-                f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock",
+                f"column '{part.name}' (channel '{item.channel}') has no clock",
                 "name the column with its clock in [channels] time",
                 channel=item.channel,
             )
         if not np.array_equal(part.time, time):
             raise RecordingError(
-                f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
+                f"'{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
                 "all joints of a channel must have the same clock",
                 channel=item.channel,
             )

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.errors import ConfigurationError, RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.plain_text import counted, first_of
@@ -106,37 +106,11 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
             f"{machine_file.path}: a channel in a file of its own cannot be divided into the runs of {path}",
             "write each run to a log of its own, or map a channel of the log",
         )
-    whole = _CutLog.of(path, machine_file, cut)
-    segments = whole.segments
-    lengths = whole.lengths
-    long_enough = np.flatnonzero(lengths >= FEWEST_SAMPLES)
-    if not len(long_enough):
-        raise whole.no_run(int(lengths.max(initial=0)))
-    names = segments.names(long_enough)
-    chosen = [(int(run), name) for run, name in zip(long_enough, names, strict=True) if _fits(name, pattern)]
-    if not chosen:
-        raise RecordingError(f"{path}: no run '{pattern}'", f"its runs are {first_of(names)}")
-    digest = join_digests([file_digest(part) for part in whole.files])
-    runs: list[LoggedRecording] = []
-    left_out: list[tuple[Path, str]] = []
-    for run, name in chosen:
-        try:
-            runs.append(whole.recording(run, name, digest))
-        except RecordingError as fault:
-            left_out.append((location(f"{path}{_MARK}{name}"), str(fault).removeprefix(f"{path}{_MARK}{name}: ")))
-    if not runs:
-        raise RecordingError(f"{left_out[0][0]}: {left_out[0][1]}", "check the log with cdtool info")
-    findings = [*whole.source.findings, *whole.outside()]
-    later = tuple(name for (run, name) in chosen if segments.number[run])
-    if later and cut.by == "column":
-        findings.append(Finding("returning_ids", "", {"names": later, "column": cut.column}))
-    short = np.flatnonzero(lengths < FEWEST_SAMPLES)
-    if pattern:
-        fits = [_fits(name, pattern) for name in segments.names(short)]
-        short = short[np.array(fits, dtype=bool)]
-    if len(short):
-        left_out.append((path, _too_short(segments, short, lengths)))
-    return LogRuns(tuple(runs), tuple(findings), tuple(left_out))
+    files = tuple(log_parts(path))
+    also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
+    mapped = [mapped_source(file, machine_file, also) for file in files]
+    with naming(path):
+        return _CutLog.of(path, files, mapped, machine_file, cut).runs(pattern)
 
 
 def _fits(name: str, pattern: str) -> bool:
@@ -185,28 +159,65 @@ class _CutLog:
     begins: FloatArray | None = None
 
     @classmethod
-    def of(cls, path: Path, machine_file: MachineFile, cut: RunCut) -> _CutLog:
-        """Read and cut a log; raises RecordingError."""
-        files = tuple(log_parts(path))
-        also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
-        mapped = [mapped_source(file, machine_file, also) for file in files]
-        channels = _common_map(path, [item for _, item in mapped])
+    def of(
+        cls,
+        path: Path,
+        files: tuple[Path, ...],
+        mapped: Sequence[tuple[Source, ChannelMap]],
+        machine_file: MachineFile,
+        cut: RunCut,
+    ) -> _CutLog:
+        """Cut a log, whose files have these columns; raises RecordingError."""
+        channels = _common_map([item for _, item in mapped])
         source = _joined(path, [item for item, _ in mapped]) if path.is_dir() else mapped[0][0]
         ids: Column | None = None
         if cut.by != "clock-reset":
             *others, last = channels.sources
             ids = source.columns[last.keys[0]]
             if ids.words and any(last.keys[0] in other.keys for other in others):
-                raise RecordingError(f"{path}: column '{cut.column}' has texts", "map another column to the channel")
+                raise RecordingError(f"column '{cut.column}' has texts", "map another column to the channel")
             channels = replace(channels, sources=tuple(others))
         log = cls(path, source, channels, cut, machine_file, files, _none())
         return log._by_reset() if ids is None else log._by_id(ids)
+
+    def runs(self, pattern: str) -> LogRuns:
+        """Return the runs whose ids fit a pattern; raises RecordingError if none can be used."""
+        segments = self.segments
+        lengths = self.lengths
+        long_enough = np.flatnonzero(lengths >= FEWEST_SAMPLES)
+        if not len(long_enough):
+            raise self.no_run(int(lengths.max(initial=0)))
+        names = segments.names(long_enough)
+        chosen = [(int(run), name) for run, name in zip(long_enough, names, strict=True) if _fits(name, pattern)]
+        if not chosen:
+            raise RecordingError(f"no run '{pattern}'", f"its runs are {first_of(names)}")
+        digest = join_digests([file_digest(part) for part in self.files])
+        runs: list[LoggedRecording] = []
+        left_out: list[tuple[Path, str]] = []
+        for run, name in chosen:
+            try:
+                runs.append(self.recording(run, name, digest))
+            except RecordingError as fault:
+                left_out.append((location(f"{self.path}{_MARK}{name}"), str(fault)))
+        if not runs:
+            raise RecordingError(f"{left_out[0][0]}: {left_out[0][1]}", "check the log with cdtool info")
+        findings = [*self.source.findings, *self.outside()]
+        later = tuple(name for (run, name) in chosen if segments.number[run])
+        if later and self.cut.by == "column":
+            findings.append(Finding("returning_ids", "", {"names": later, "column": self.cut.column}))
+        short = np.flatnonzero(lengths < FEWEST_SAMPLES)
+        if pattern:
+            fits = [_fits(name, pattern) for name in segments.names(short)]
+            short = short[np.array(fits, dtype=bool)]
+        if len(short):
+            left_out.append((self.path, _too_short(segments, short, lengths)))
+        return LogRuns(tuple(runs), tuple(findings), tuple(left_out))
 
     def _by_id(self, ids: Column) -> _CutLog:
         values = ids.values.reshape(len(ids.values), -1)
         if values.shape[1] != 1:
             raise RecordingError(
-                f"{self.path}: column '{self.cut.column}' (channel '{_ID}') has {values.shape[1]} values per sample",
+                f"column '{self.cut.column}' (channel '{_ID}') has {values.shape[1]} values per sample",
                 "select one element, e.g. data[0]",
             )
         bridged = self.cut.by == "column"
@@ -227,13 +238,13 @@ class _CutLog:
     def _by_reset(self) -> _CutLog:
         if any(item.topic for item in self.channels.sources):
             raise RecordingError(
-                f"{self.path}: messages are in the order of their times: their clock cannot start again",
+                "messages are in the order of their times: their clock cannot start again",
                 'cut them by a field: by = "column:TOPIC FIELD"',
             )
         if not self.channels.topics:
             if self.channels.time.column is None:
                 raise RecordingError(
-                    f"{self.path}: has no clock that could start again: [channels] time states a rate",
+                    "has no clock that could start again: [channels] time states a rate",
                     'cut it by a column: by = "column:NAME"',
                 )
             segments = segments_by_reset(self.source.columns[self.channels.time.key].values)
@@ -242,7 +253,7 @@ class _CutLog:
         counts = sorted({len(item) for item in found.values()})
         if len(counts) > 1:
             raise RecordingError(
-                f"{self.path}: its clocks start again at different numbers of places: "
+                f"its clocks start again at different numbers of places: "
                 f"{' and '.join(str(count - 1) for count in counts)}",
                 'cut it by a column: by = "column:NAME"',
             )
@@ -335,10 +346,10 @@ class _CutLog:
         """Return the error for a log without a run that can be used."""
         if not len(self.segments):
             return RecordingError(
-                f"{self.path}: column '{self.cut.column}' has no value in any sample", "name the column of the runs"
+                f"column '{self.cut.column}' has no value in any sample", "name the column of the runs"
             )
         return RecordingError(
-            f"{self.path}: none of {counted(len(self.segments), 'run')} by {_described(self.cut)} has "
+            f"none of {counted(len(self.segments), 'run')} by {_described(self.cut)} has "
             f"{FEWEST_SAMPLES} samples: the longest has {longest}",
             "see cdtool info" if self.cut.by == "clock-reset" else "name a column whose value stays the same in a run",
         )
@@ -367,11 +378,11 @@ def _described(cut: RunCut) -> str:
     return cut.by if cut.by == "clock-reset" else f"{cut.by} '{cut.column}'"
 
 
-def _common_map(path: Path, maps: Sequence[ChannelMap]) -> ChannelMap:
+def _common_map(maps: Sequence[ChannelMap]) -> ChannelMap:
     """Return the map of all parts of a log; raises RecordingError if their channels differ."""
     for other in maps[1:]:
         if [item.channel for item in other.sources] != [item.channel for item in maps[0].sources]:
-            raise RecordingError(f"{path}: its parts have different channels", "cut each part as a log of its own")
+            raise RecordingError("its parts have different channels", "cut each part as a log of its own")
     return maps[0]
 
 
@@ -384,7 +395,7 @@ def _joined(path: Path, parts: Sequence[Source]) -> Source:
     for key in first.columns:
         own = [part.columns[key] for part in ordered]
         if len({item.values.shape[1:] for item in own}) > 1:
-            raise RecordingError(f"{path}: the length of '{key}' differs between its parts", "select one element")
+            raise RecordingError(f"the length of '{key}' differs between its parts", "select one element")
         times = [item.time for item in own if item.time is not None]
         clock = tuple(map(id, times))
         if clock not in clocks:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError, UsageError
+from cdtool.base.errors import RecordingError, UsageError, naming
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
 from cdtool.formats.columns import Column, Piece
@@ -59,29 +59,32 @@ class Csv:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line."""
         if wanted is None:
             return self.columns_by(path, TablePins())
-        return _read_wanted(path, _dialect(path, wanted.pins), wanted)
+        with naming(path):
+            return _read_wanted(path, _dialect(path, wanted.pins), wanted)
 
     def columns_by(self, path: Path, pins: TablePins) -> Source:
         """Return all numeric columns of a table with pins; raises RecordingError with the line."""
         from cdtool.formats.csv.several_clocks import Clocks
         from cdtool.formats.csv.table import read_table
 
-        dialect = _dialect(path, pins)
-        table = read_table(path, dialect, dialect.names)
-        return join_pieces(_by_clock(path, dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
+        with naming(path):
+            dialect = _dialect(path, pins)
+            table = read_table(dialect, dialect.names)
+            return join_pieces(_by_clock(path, dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
         from cdtool.formats.csv.several_clocks import Clocks
         from cdtool.formats.csv.table import table_pieces
 
-        dialect = _dialect(path, TablePins())
-        clocks = Clocks.by_names(dialect)
-        # The last column is always read: it shows whether the file's end is complete.
-        read = dialect.names if keys is None else {*keys, dialect.names[-1]}
-        if len(clocks.groups) > 1:
-            read = {*read, *(dialect.names[i] for i in clocks.columns)}
-        return (yield from _by_clock(path, dialect, clocks, keys, table_pieces(path, dialect, read)))
+        with naming(path):
+            dialect = _dialect(path, TablePins())
+            clocks = Clocks.by_names(dialect)
+            # The last column is always read: it shows whether the file's end is complete.
+            read = dialect.names if keys is None else {*keys, dialect.names[-1]}
+            if len(clocks.groups) > 1:
+                read = {*read, *(dialect.names[i] for i in clocks.columns)}
+            return (yield from _by_clock(path, dialect, clocks, keys, table_pieces(dialect, read)))
 
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
@@ -91,7 +94,7 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
     content = read_small(path)
     sample = read_sample(path) if content is None else content[:SAMPLE_BYTES]
     if not sample.strip():
-        raise RecordingError(f"{path}: is empty", "was the recording stopped immediately, or the copy cut off?")
+        raise RecordingError("is empty", "was the recording stopped immediately, or the copy cut off?")
     return find_dialect(path, sample, pins, content)
 
 
@@ -133,14 +136,14 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     clocks = Clocks.by_names(dialect, clock)
     own = time.column == OWN_CLOCK and time.factor == 1.0
     if len(clocks.groups) < 2 or (clock is None and not own):
-        return _source(path, dialect, read_table(path, dialect, wanted_keys(path, wanted, names), clock, wanted))
-    keys = wanted_keys(path, wanted if clock is not None else replace(wanted, time=TimeSource()), names)
-    table = read_table(path, dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
+        return _source(path, dialect, read_table(dialect, wanted_keys(wanted, names), clock, wanted))
+    keys = wanted_keys(wanted if clock is not None else replace(wanted, time=TimeSource()), names)
+    table = read_table(dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
     other = [] if clock is None else other_clocks(dialect, clocks, clock, keys, table.values)
     if other and not own:
         beside = f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}'"
         differs = other[0].words_for("difference[what]")
-        raise RecordingError(f"{path}: {beside}, but the machine file names '{clock}': {differs}", HINT)
+        raise RecordingError(f"{beside}, but the machine file names '{clock}': {differs}", HINT)
     if clock is not None and not other:
         table.values = {key: values for key, values in table.values.items() if key in keys}
         return _source(path, dialect, table)
@@ -149,7 +152,7 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     channels = [key for key in keys if key != clock]
     for key in channels:
         if dialect.names.index(key) not in clocks.of:
-            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
+            raise RecordingError(f"no clock is beside column '{key}'", "name its clock in [channels] time")
     return join_pieces(_by_clock(path, dialect, clocks, channels, _as_piece(table), stated=True), sort=False)
 
 

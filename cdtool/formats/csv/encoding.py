@@ -61,12 +61,12 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     `content` are all bytes of the file if they have been read.
     """
     if not looks_like_text(sample):
-        raise RecordingError(f"{path}: is not a table of numbers: binary or markup", "name a CSV, MCAP or MAT file")
+        raise RecordingError("is not a table of numbers: binary or markup", "name a CSV, MCAP or MAT file")
     marked, mark = _by_mark(sample)
     encoding = pinned or marked or _wide_without_mark(sample) or _narrow(sample)
     if pinned and marked and codecs.lookup(pinned).name != marked:
         raise RecordingError(
-            f"{path}: line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
+            f"line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
         )
     stream = sample[mark:]
@@ -76,13 +76,13 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     total, size = _without_padding(path, content)
     stream = stream[: max(size - mark, 0)]
     if pinned and encoding not in UNIT_BYTES:
-        _check_pinned(path, stream, encoding)
+        _check_pinned(stream, encoding)
     head = stream[:HEAD_BYTES]
     control = _CONTROL.search(head) if head.translate(None, _ALLOWED) else None
     if control is not None:
         line = stream.count(b"\n", 0, control.start()) + 1
         raise RecordingError(
-            f"{path}: line {line} contains a control character (byte 0x{control[0][0]:02x})",
+            f"line {line} contains a control character (byte 0x{control[0][0]:02x})",
             "save the table as plain text, without terminal colours",
         )
     # A single line feed at the end of a file with carriage returns does not count as its line end.
@@ -124,14 +124,14 @@ def _narrow(sample: bytes) -> str:
     return "utf-8"
 
 
-def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
+def _check_pinned(stream: bytes, encoding: str) -> None:
     try:
         codecs.getincrementaldecoder(encoding)().decode(stream)
     except UnicodeError as fault:
         at = getattr(fault, "start", 0)
         line = stream.count(b"\n", 0, at) + 1
         raise RecordingError(
-            f"{path}: line {line} is not valid {encoding}, as [csv] encoding states", "correct or remove encoding"
+            f"line {line} is not valid {encoding}, as [csv] encoding states", "correct or remove encoding"
         ) from fault
 
 

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
-from pathlib import Path
 
 import numpy as np
 
@@ -119,10 +118,10 @@ class TextTable:
 
 
 def read_table(
-    path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
+    dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> TextTable:
     """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
-    run = PieceRun(table_pieces(path, dialect, keys, clock, wanted))
+    run = PieceRun(table_pieces(dialect, keys, clock, wanted))
     first, *more = islice(pieces := iter(run), 2)
     values, count = first.values, first.rows
     if more:  # in one array per column: half the memory of a list of pieces
@@ -135,13 +134,13 @@ def read_table(
     table = run.source
     table.values = {key: values[key][:count] for key in table.values}
     if clock is not None and wanted is not None:
-        _set_clock(path, table, clock, wanted)
+        _set_clock(table, clock, wanted)
         _set_exact(dialect, table, clock, wanted.time.factor)
     return table
 
 
 def table_pieces(
-    path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
+    dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> Generator[Piece, None, TextTable]:
     """Yield those of the columns `keys` that have numbers, block by block; return the table without its rows.
 
@@ -151,7 +150,7 @@ def table_pieces(
     names, worded = dialect.names, () if wanted is None else wanted.worded
     categories = {names.index(key): Categories() for name in worded if (key := column_key(name, names))}
     columns = [i for i, name in enumerate(names) if name in keys]
-    requested = _requested(path, dialect, columns, clock, survey=wanted is None)
+    requested = _requested(dialect, columns, clock, survey=wanted is None)
     reader = RowReader(dialect, replace(requested, categories=categories), survey=wanted is None)
     stamped = StampColumns(dialect, requested)
     rounded: Counter[str] = Counter()
@@ -168,7 +167,7 @@ def table_pieces(
     findings += stamped.findings()
     remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
     if wanted is None and not remaining:
-        raise RecordingError(f"{path}: no column has only numbers", str(findings[0]) if findings else "")
+        raise RecordingError("no column has only numbers", str(findings[0]) if findings else "")
     for key in names:
         findings += rounding_finding(key, rounded[key]) if key in remaining else []
     return TextTable(
@@ -181,9 +180,7 @@ def table_pieces(
     )
 
 
-def _requested(
-    path: Path, dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool
-) -> RequestedColumns:
+def _requested(dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool) -> RequestedColumns:
     """Return these columns by kind, with a finding on those that a survey leaves out.
 
     Raises RecordingError if their stamps can be read in two ways.
@@ -202,7 +199,7 @@ def _requested(
         elif stamped.layout is None:
             timed = stamped.layouts[0].timed or _beside(dialect, column, dated=False) is not None
             if not survey or timed:
-                raise _two_readings(path, dialect, column)
+                raise _two_readings(dialect, column)
             left_out[column] = Finding("ambiguous_times", "", {"column": name, "readings": stamped.readings})
         else:
             stamps.append(column)
@@ -212,7 +209,7 @@ def _requested(
         days = _beside(dialect, column, dated=True) if layout.timed and not layout.dated else None
         if days is not None:
             if dialect.stamped[days].layout is None:
-                raise _two_readings(path, dialect, days)
+                raise _two_readings(dialect, days)
             dates[column] = days
     return RequestedColumns(numeric, sorted({*stamps, *dates.values()}), dates, left_out)
 
@@ -226,19 +223,19 @@ def _beside(dialect: Dialect, column: int, dated: bool) -> int | None:
     return None
 
 
-def _two_readings(path: Path, dialect: Dialect, column: int) -> RecordingError:
+def _two_readings(dialect: Dialect, column: int) -> RecordingError:
     stamped = dialect.stamped[column]
     return RecordingError(
-        f"{path}: column '{dialect.names[column]}': {stamped.readings}", "pin time_format in [csv] of the machine file"
+        f"column '{dialect.names[column]}': {stamped.readings}", "pin time_format in [csv] of the machine file"
     )
 
 
-def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> None:
+def _set_clock(table: TextTable, clock: str, wanted: ChannelMap) -> None:
     """Check the machine file's unit against the clock's column, and convert days of Excel to seconds."""
     if clock in table.stamped:
         if wanted.time.factor != 1.0:
             raise RecordingError(
-                f"{path}: column '{clock}' has dates or times of day, which are read in s",
+                f"column '{clock}' has dates or times of day, which are read in s",
                 'write unit = "s" in [channels] time',
             )
         return
@@ -253,8 +250,7 @@ def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> 
     readings = "" if wanted.pins.time_format else two_readings(values, wanted.time.factor)
     if readings:
         raise RecordingError(
-            f"{path}: column '{clock}' {readings}",
-            'pin time_format = "excel" or "number" in [csv] of the machine file',
+            f"column '{clock}' {readings}", 'pin time_format = "excel" or "number" in [csv] of the machine file'
         )
 
 
