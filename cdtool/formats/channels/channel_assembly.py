@@ -204,10 +204,8 @@ class _Assembly:
         self, stamps: FloatArray, clock: str, *, counted: FloatArray | None = None, sampled: bool = True
     ) -> CleanTime:
         """Return the cleaned times of a clock's stamps [s]; its findings have `clock` as their channel."""
-        first = self.source.first_row
-        row_name = "line" if first else "sample"
         try:
-            clean = clean_time(stamps, first, row_name, counted=counted, sampled=sampled)
+            clean = clean_time(stamps, self.source.first_row, counted=counted, sampled=sampled)
         except RecordingError as fault:
             raise RecordingError(f"{clock}: {fault.message}", fault.hint) from fault
         self._add_clock_findings(clean, clock)
