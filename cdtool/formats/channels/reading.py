@@ -24,10 +24,8 @@ from cdtool.formats.channels.header_units import unit_findings
 from cdtool.formats.channels.logged_recording import LoggedRecording
 from cdtool.formats.channels.parts import (
     Span,
-    join_details,
     join_recordings,
     join_sources,
-    join_topics,
     loss_findings,
     missing_part_findings,
     named_parts,
@@ -38,7 +36,7 @@ from cdtool.formats.csv.gzipped import MAGIC
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.machine_file import MachineFile
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
-from cdtool.formats.source import Format, Source, in_words
+from cdtool.formats.source import Format, Source
 from cdtool.recordings.clock.stamps import epoch_start
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.recordings.recording import Recording, Series
@@ -190,7 +188,7 @@ def read_as_logged(
         return _read_log_itself(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
 
     recording = logged.recording
-    recording = add_files_beside(recording, path, channels, machine_file.machine, _resolved_source, read_trigger)
+    recording = add_files_beside(recording, path, channels, machine_file.machine, mapped_source, read_trigger)
     return replace(logged, recording=recording)
 
 
@@ -263,25 +261,27 @@ def log_parts(path: Path) -> list[Path]:
 
 
 def mapped_source(
-    path: Path, machine_file: MachineFile, also: Callable[[bool], ChannelSource] | None = None
+    path: Path, mapping: MachineFile | ChannelMap, also: Callable[[bool], ChannelSource] | None = None
 ) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that the machine file maps, and the map for them; raises RecordingError.
+    """Return the columns of one file that are mapped, and the map for them; raises RecordingError.
 
-    A mapped load cell or label that is not in the file is left out of the map, with a note. `also` returns a further
-    column, given whether the file contains topics; it becomes the last source of the map.
+    The map is that of a machine file for a format of columns or topics, or given. A mapped load cell or label that is
+    not in the file is left out of the map, with a note. `also` returns a further column, given whether the file
+    contains topics; it becomes the last source of the map.
     """
     file_format = choose_format(path)
-    channels = _map_for(file_format, machine_file, path)
+    topics = has_topics(file_format)
+    channels = mapping if isinstance(mapping, ChannelMap) else mapping.topics if topics else mapping.columns
+    if isinstance(mapping, MachineFile) and not channels.sources:
+        section, what = ("[channels.mcap]", "topic and field") if topics else ("[channels]", "column and unit")
+        raise ConfigurationError(
+            f"{mapping.path}: no channel in {section}, which {path} needs",
+            f"write {section} with the {what} of each channel",
+        )
     if also is not None:
-        channels = replace(channels, sources=(*channels.sources, also(channels.topics)))
-    return _resolved_source(path, channels, file_format)
-
-
-def _resolved_source(path: Path, channels: ChannelMap, file_format: Format | None = None) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that a map names, and the map; raises RecordingError."""
-    file_format = file_format or choose_format(path)
+        channels = replace(channels, sources=(*channels.sources, also(topics)))
     with naming(path):
-        if has_topics(file_format) and not channels.topics:
+        if topics and not channels.topics:
             raise RecordingError("contains topics, but columns are mapped", "give a file of columns")
         asked = fields_by_axis(channels)
         source, resolved = resolve_columns(file_format.columns(path, asked), asked)
@@ -318,21 +318,7 @@ def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> L
             parts.append(assemble_recording(source, channels, machine_file.machine))
         headers.append(replace(source, columns={}))
     whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
-    details = in_words(join_details(headers), join_topics(headers))
-    return LoggedRecording(whole, factors, channels.speed_low_pass, source.format, details, source.dialect)
-
-
-def _map_for(file_format: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
-    topics = has_topics(file_format)
-    channels = machine_file.topics if topics else machine_file.columns
-    if not channels.sources:
-        section = "[channels.mcap]" if topics else "[channels]"
-        what = "topic and field" if topics else "column and unit"
-        raise ConfigurationError(
-            f"{machine_file.path}: no channel in {section}, which {path} needs",
-            f"write {section} with the {what} of each channel",
-        )
-    return channels
+    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
 
 
 def _sniffs_any_text(file_format: Format) -> bool:

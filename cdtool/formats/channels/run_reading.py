@@ -28,7 +28,7 @@ from cdtool.formats.channels.reading import log_parts, mapped_source
 from cdtool.formats.channels.run_segments import Rows, Segments, segments_by_id, segments_by_reset
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import MachineFile
-from cdtool.formats.source import Source, in_words
+from cdtool.formats.source import Source
 from cdtool.recordings.operations import RunCut
 from cdtool.recordings.recording import GROUND_TRUTH
 
@@ -291,8 +291,7 @@ class _CutLog:
         recording = assemble_recording(part, channels, self.machine_file.machine, mark)
         recording = replace(recording, name=f"{log_stem(self.path)}{_MARK}{name}")
         factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
-        details = in_words(source.details, source.topics)
-        return LoggedRecording(recording, factors, channels.speed_low_pass, source.format, details, source.dialect)
+        return LoggedRecording(recording, factors, channels.speed_low_pass, (replace(source, columns={}),))
 
     def _times(self, run: int) -> tuple[dict[int, FloatArray], float]:
         """Return the times of a run by clock, and their start [s].

@@ -57,18 +57,21 @@ class Csv:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line."""
+        from cdtool.formats.csv_dialect.find_dialect import find_dialect
+
         if wanted is None:
             return self.columns_by(path, TablePins())
         with naming(path):
-            return _read_wanted(path, _dialect(path, wanted.pins), wanted)
+            return _read_wanted(path, find_dialect(path, wanted.pins), wanted)
 
     def columns_by(self, path: Path, pins: TablePins) -> Source:
         """Return all numeric columns of a table with pins; raises RecordingError with the line."""
         from cdtool.formats.csv.several_clocks import Clocks
         from cdtool.formats.csv.table import read_table
+        from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
         with naming(path):
-            dialect = _dialect(path, pins)
+            dialect = find_dialect(path, pins)
             table = read_table(dialect, dialect.names)
             return join_pieces(_by_clock(path, dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
 
@@ -76,26 +79,16 @@ class Csv:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
         from cdtool.formats.csv.several_clocks import Clocks
         from cdtool.formats.csv.table import table_pieces
+        from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
         with naming(path):
-            dialect = _dialect(path, TablePins())
+            dialect = find_dialect(path, TablePins())
             clocks = Clocks.by_names(dialect)
             # The last column is always read: it shows whether the file's end is complete.
             read = dialect.names if keys is None else {*keys, dialect.names[-1]}
             if len(clocks.groups) > 1:
                 read = {*read, *(dialect.names[i] for i in clocks.columns)}
             return (yield from _by_clock(path, dialect, clocks, keys, table_pieces(dialect, read)))
-
-
-def _dialect(path: Path, pins: TablePins) -> Dialect:
-    from cdtool.formats.csv.text import SAMPLE_BYTES, read_sample, read_small
-    from cdtool.formats.csv_dialect.find_dialect import find_dialect
-
-    content = read_small(path)
-    sample = read_sample(path) if content is None else content[:SAMPLE_BYTES]
-    if not sample.strip():
-        raise RecordingError("is empty", "was the recording stopped immediately, or the copy cut off?")
-    return find_dialect(path, sample, pins, content)
 
 
 def _as_piece(table: TextTable) -> Generator[Piece, None, TextTable]:

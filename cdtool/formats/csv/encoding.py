@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.gzipped import is_gzipped, measure
-from cdtool.formats.csv.text import UNIT_BYTES, Text, recoded
+from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text, read_sample, read_small, recoded
 from cdtool.formats.csv_dialect.east_asian import east_asian
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
@@ -53,6 +53,15 @@ def looks_like_text(sample: bytes) -> bool:
         return False
     controls = len(text.translate(None, _ALLOWED))
     return not controls or (b"\0" not in text and controls <= max(_FEW, _SHARE * len(text)))
+
+
+def open_table(path: Path, encoding: str, most: int = SAMPLE_BYTES) -> tuple[Text, bytes]:
+    """Return the encoding and line ends of a text, and its first bytes; raises RecordingError if it is empty."""
+    content = read_small(path)
+    sample = read_sample(path, most) if content is None else content[:most]
+    if not sample.strip():
+        raise RecordingError("is empty", "was the recording stopped immediately, or the copy cut off?")
+    return detect_text(path, sample, encoding, content)
 
 
 def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | None = None) -> tuple[Text, bytes]:

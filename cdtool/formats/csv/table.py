@@ -134,8 +134,7 @@ def read_table(
     table = run.source
     table.values = {key: values[key][:count] for key in table.values}
     if clock is not None and wanted is not None:
-        _set_clock(table, clock, wanted)
-        _set_exact(dialect, table, clock, wanted.time.factor)
+        _set_clock(dialect, table, clock, wanted)
     return table
 
 
@@ -230,8 +229,11 @@ def _two_readings(dialect: Dialect, column: int) -> RecordingError:
     )
 
 
-def _set_clock(table: TextTable, clock: str, wanted: ChannelMap) -> None:
-    """Check the machine file's unit against the clock's column, and convert days of Excel to seconds."""
+def _set_clock(dialect: Dialect, table: TextTable, clock: str, wanted: ChannelMap) -> None:
+    """Check the machine file's unit against the clock's column, and convert days of Excel to seconds.
+
+    It is read again if its stamps have more digits than float64 can represent.
+    """
     if clock in table.stamped:
         if wanted.time.factor != 1.0:
             raise RecordingError(
@@ -252,13 +254,7 @@ def _set_clock(table: TextTable, clock: str, wanted: ChannelMap) -> None:
         raise RecordingError(
             f"column '{clock}' {readings}", 'pin time_format = "excel" or "number" in [csv] of the machine file'
         )
-
-
-def _set_exact(dialect: Dialect, table: TextTable, clock: str, factor: float) -> None:
-    """Read the clock again if its stamps have more digits than float64 can represent."""
-    if clock in table.stamped or table.origin:
-        return
-    exact = exact_differences(dialect, dialect.names.index(clock), table.values[clock], factor)
+    exact = exact_differences(dialect, dialect.names.index(clock), values, wanted.time.factor)
     if exact is not None:
         table.values[clock], table.origin = exact
         table.findings = [

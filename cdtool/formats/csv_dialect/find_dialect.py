@@ -17,7 +17,7 @@ from cdtool.base.findings import Finding, lines_of
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
-from cdtool.formats.csv.encoding import detect_text
+from cdtool.formats.csv.encoding import open_table
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import Text
@@ -244,12 +244,12 @@ def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
     return rows[:: max(1, len(rows) // (2 * _LOOKED))]
 
 
-def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | None = None) -> Dialect:
-    """Return the dialect of a text file from its first bytes; `content` are all its bytes if they have been read.
+def find_dialect(path: Path, pins: TablePins) -> Dialect:
+    """Return the dialect of a text file from its first bytes.
 
     Raises RecordingError if the file is not a table, or is ambiguous.
     """
-    text, stream = detect_text(path, sample, pins.encoding, content)
+    text, stream = open_table(path, pins.encoding)
     dialect = _dialect(text, stream, pins)
     if dialect.marks.sure:
         return dialect

@@ -38,8 +38,8 @@ from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.containers.container_checks import left_out_finding
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, number
-from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
-from cdtool.formats.csv.text import Text, read_sample
+from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text, open_table
+from cdtool.formats.csv.text import BLOCK_BYTES, Text, read_sample
 from cdtool.formats.csv_dialect.foreign_heads import is_measurement
 from cdtool.formats.exports.timed_text import (
     ClockGroup,
@@ -48,7 +48,6 @@ from cdtool.formats.exports.timed_text import (
     details_of,
     dialect_of_rows,
     number_in_head,
-    opened,
 )
 from cdtool.formats.source import Source
 
@@ -152,8 +151,8 @@ class _Style:
 
 
 def _read_heads(path: Path, pins: TablePins) -> TimedText:
-    text, lines = opened(path, pins)
-    style = _style([text.decode(line).strip(" \r\n") for line in lines], pins)
+    text, stream = open_table(path, pins.encoding, BLOCK_BYTES)
+    style = _style([text.decode(line).strip(" \r\n") for line in stream.split(text.line_end)], pins)
     heads, end = _heads(text, style)
     if not heads:
         raise RecordingError("has no row of numbers", "was the recording stopped immediately?")

@@ -22,9 +22,8 @@ from cdtool.formats.column_names import requested_keys
 from cdtool.formats.columns import Column
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.cells import SEPARATORS, kind, number
-from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.rows import RowReader
-from cdtool.formats.csv.text import SAMPLE_BYTES, Text, read_sample, read_small
+from cdtool.formats.csv.text import Text
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell
@@ -162,16 +161,6 @@ class TimedText:
             raise RecordingError("no channel has numbers", "see cdtool info")
         unique = tuple(dict.fromkeys(findings))
         return Source(path, name, columns, self.origin, unique, self.details, tuple(self.units))
-
-
-def opened(path: Path, pins: TablePins, most: int = SAMPLE_BYTES) -> tuple[Text, list[bytes]]:
-    """Return a text file, and the lines in its first bytes; raises RecordingError if it is empty."""
-    content = read_small(path)
-    sample = read_sample(path, most) if content is None else content
-    if not sample.strip():
-        raise RecordingError("is empty", "was the recording stopped immediately, or the copy cut off?")
-    text, stream = detect_text(path, sample, pins.encoding, content)
-    return text, stream.split(text.line_end)
 
 
 def dialect_of_rows(

@@ -29,7 +29,7 @@ from cdtool.base.plain_text import counted
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, split_line
-from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
+from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text, open_table
 from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.csv_dialect.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
 from cdtool.formats.exports.timed_text import (
@@ -39,7 +39,6 @@ from cdtool.formats.exports.timed_text import (
     details_of,
     dialect_of_rows,
     number_in_head,
-    opened,
 )
 from cdtool.formats.source import Source
 
@@ -123,8 +122,8 @@ class _Head:
 
 
 def _read_export(path: Path, pins: TablePins) -> TimedText:
-    text, lines = opened(path, pins, _MOST_HEAD)
-    head, findings = _read_head(text, lines), list[Finding]()
+    text, stream = open_table(path, pins.encoding, _MOST_HEAD)
+    head, findings = _read_head(text, stream.split(text.line_end)), list[Finding]()
     if head.separator == " ":
         _refuse_empty_cells(text, head)
         head = _between_blanks(head, findings)
