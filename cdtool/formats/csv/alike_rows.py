@@ -12,8 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.formats.channels.channel_map import TablePins
+from cdtool.formats.csv.cells import NULLS, kind, split_line
+from cdtool.formats.csv.lines import COMMENTS
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.formats.csv_dialect.head import LABVIEW_UNITS
+from cdtool.formats.csv_dialect.marks import Marks
 
 # Samples with fewer rows, or with more lines above the rows, are not shortened.
 _FEWEST_ROWS, _MOST_ABOVE = 100, 40
@@ -35,6 +39,38 @@ class ShorterSample:
     left_out: int
     separator: str
     width: int
+
+    def plain(self, text: Text) -> Dialect | None:
+        """Return the dialect of the whole sample, without pins, if names are all that is above the rows; else None.
+
+        With two columns a line of names may also state a unit.
+        """
+        line, *rows = text.decode(self.stream).replace("\r", "").split("\n")[:-1]
+        names, cells = split_line(line, self.separator), {cell for row in rows for cell in row.split(self.separator)}
+        if self.first != 2 or not 2 < len({*names}) == self.width == len(names) or text.encoding != "utf-8":
+            return None
+        if {*map(kind, cells)} != {"N"} or '"' in line or names[0] == LABVIEW_UNITS:
+            return None
+        if not all(name[:1].isalpha() and kind(name) == "X" for name in names):
+            return None
+        mark = "," if self.separator != "," and any("," in cell for cell in cells) else "."
+        return Dialect(
+            text=text,
+            pins=TablePins(),
+            separator=self.separator,
+            marks=Marks(mark, sure=any(mark in cell for cell in cells)),
+            comment=COMMENTS[0],
+            missing=NULLS,
+            header=tuple(names),
+            header_line=1,
+            header_text=(line,),
+            first_line=self.first,
+            sampled=self.left_out + len(rows),
+            offset=self.stream.index(b"\n") + 1,
+            width=self.width,
+            kinds="N" * self.width,
+            words={},
+        )
 
     def whole(self, dialect: Dialect) -> Dialect | None:
         """Return the dialect of the whole sample, given that of `stream`; None if the two may differ."""

@@ -21,8 +21,9 @@ from cdtool.formats.column_names import column_key
 from cdtool.formats.columns import Categories, Piece
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
-from cdtool.formats.csv.rows import RowReader, Rows
+from cdtool.formats.csv.rows import RowReader, Rows, plain_rows
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, Layout, seconds_since, unwrap
+from cdtool.formats.csv.text import BLOCK_BYTES
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import PieceRun
@@ -121,6 +122,31 @@ def read_table(
     dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> TextTable:
     """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
+    table = None if wanted is None or wanted.worded else _plain_table(dialect, keys)
+    table = table or _joined_blocks(dialect, keys, clock, wanted)
+    if clock is not None and wanted is not None:
+        _set_clock(dialect, table, clock, wanted)
+    return table
+
+
+def _plain_table(dialect: Dialect, keys: Collection[str]) -> TextTable | None:
+    """Return a small table that has only numbers in plain rows, read at once; None if it may have anything else."""
+    text, names = dialect.text, dialect.names
+    if dialect.stamped or text.padding or text.content is None or not 0 < len(text.content) <= BLOCK_BYTES:
+        return None
+    rows, columns = (
+        text.content[text.mark + dialect.offset : text.size],
+        [i for i, name in enumerate(names) if name in keys],
+    )
+    plain = plain_rows(dialect, columns, (), rows, ended=True) if rows.endswith(b"\n") and columns else None
+    if plain is None:
+        return None
+    values = {names[column]: plain[1][column] for column in columns}
+    return TextTable(values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))])
+
+
+def _joined_blocks(dialect: Dialect, keys: Collection[str], clock: str | None, wanted: ChannelMap | None) -> TextTable:
+    """Return the columns of a table that is read block by block."""
     run = PieceRun(table_pieces(dialect, keys, clock, wanted))
     first, *more = islice(pieces := iter(run), 2)
     values, count = first.values, first.rows
@@ -133,8 +159,6 @@ def read_table(
             count += piece.rows
     table = run.source
     table.values = {key: values[key][:count] for key in table.values}
-    if clock is not None and wanted is not None:
-        _set_clock(dialect, table, clock, wanted)
     return table
 
 

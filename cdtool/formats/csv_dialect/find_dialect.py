@@ -266,6 +266,8 @@ def _dialect(text: Text, stream: bytes, pins: TablePins) -> Dialect:
     """Return the dialect, footer and ambiguous marks not considered, from a shortened sample if that is sufficient."""
     refuse_long_line(text, stream)
     if (shorter := shorter_sample(text, stream, pins)) is not None:
+        if pins == TablePins() and (dialect := shorter.plain(text)) is not None:
+            return dialect
         try:
             if (dialect := shorter.whole(_by_lines(text, shorter.stream, pins))) is not None:
                 return dialect

@@ -19,7 +19,7 @@ _SINGLE_CELL = 1
 # A single line of numbers above the names may be a setting; this many lines are rows of another table.
 _ROWS_OF_A_TABLE = 2
 # In LabVIEW's measurement files a line of the preamble has the units of Y; its first cell is this word.
-_LABVIEW_UNITS = "Y_Unit_Label"
+LABVIEW_UNITS = "Y_Unit_Label"
 
 
 @dataclass(frozen=True)
@@ -136,9 +136,9 @@ class HeadFinder:
         self, names: list[str], header: _SplitLine, units: _SplitLine | None, first: Line, above: Sequence[_SplitLine]
     ) -> Head:
         if units is None and self.pins.units is None:
-            units = next((row for row in above if row.cells[0] == _LABVIEW_UNITS), None)
+            units = next((row for row in above if row.cells[0] == LABVIEW_UNITS), None)
         texts: Sequence[str] = () if units is None or are_types(units.cells) else units.cells
-        if texts and texts[0] == _LABVIEW_UNITS:
+        if texts and texts[0] == LABVIEW_UNITS:
             texts = ("", *texts[1:])
         line = 0 if units is None else units.line.number
         used = {header.line.number, line}
