@@ -86,7 +86,8 @@ class ShorterSample:
 def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample | None:
     """Return the shortened sample; None if its rows are not alike or are few."""
     pinned_line = max(pins.skip_lines, int(pins.header or 0), int(pins.units or 0))
-    if text.line_end != b"\n" or pinned_line > _MOST_ABOVE or _begins_rows(pins.comment or ""):
+    may_begin_rows = bool(pins.comment) and str(pins.comment)[0] in "+-.,;|\t nN0123456789"
+    if text.line_end != b"\n" or pinned_line > _MOST_ABOVE or may_begin_rows:
         return None
     if text.size > SAMPLE_BYTES or stream.endswith(b"\n"):
         stream = stream[: stream.rfind(b"\n") + 1]
@@ -124,11 +125,6 @@ def _alike(rows: bytes, separator: bytes, width: int) -> int:
     filled[:, -1] = np.diff(places)[width - 1 :: width] > 1 + rows.endswith(b"\r\n")
     alike = filled[:, :-1].all() and filled[:, -1].all() == filled[:, -1].any()
     return lines if alike and not before_signs.translate(None, b"\neE" + separator) else 0
-
-
-def _begins_rows(comment: str) -> bool:
-    """Return whether rows of numbers may start with a pinned comment mark."""
-    return bool(comment) and comment[0] in "+-.,;|\t nN0123456789"
 
 
 def _separator(stream: bytes) -> bytes | None:
