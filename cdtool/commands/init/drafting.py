@@ -273,7 +273,7 @@ def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
     if csv and not is_table:
         raise UsageError(f"{path}: is {found.name}, not a text table", "remove --csv")
     try:
-        return Csv().columns_by(path, read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
+        return Csv().columns(path, pins=read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
     except RecordingError as fault:
         if not is_table or csv:
             raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -193,20 +193,27 @@ def read_as_logged(
 
 
 def _read_log_itself(path: Path, machine_file: MachineFile, unread: Literal["error", "loss"]) -> LoggedRecording:
-    """Return one log without the channels in files beside it."""
-    if not path.is_dir():
-        return read_parts([path], machine_file, log_stem(path))
-    if unread == "loss":
-        folder = LogFolder.of(path)
-        parts, lost = list(folder.filled), list(folder.findings)
-        if not parts:
-            raise RecordingError(f"{path}: no part of the log contains a message", "was the recording stopped at once?")
-    else:
-        parts = log_parts(path)
-        lost = missing_part_findings(path, parts)
-    logged = read_parts(parts, machine_file, path.name)
-    findings = (*lost, *logged.recording.findings)
-    return replace(logged, recording=replace(logged.recording, source=str(path), findings=findings))
+    """Return one log without the channels in files beside it; its parts are in the order of their times."""
+    paths, name, lost = [path], log_stem(path), list[Finding]()
+    if path.is_dir():
+        folder, name = LogFolder.of(path) if unread == "loss" else None, path.name
+        paths = log_parts(path) if folder is None else list(folder.filled)
+        lost = missing_part_findings(path, paths) if folder is None else list(folder.findings)
+    if not paths:
+        raise RecordingError(f"{path}: no part of the log contains a message", "was the recording stopped at once?")
+    parts: list[Recording] = []
+    headers: list[Source] = []
+    factors: dict[str, tuple[float, ...]] = {}
+    for each in paths:
+        source, channels = mapped_source(each, machine_file)
+        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
+        with naming(each):
+            parts.append(assemble_recording(source, channels, machine_file.machine))
+        headers.append(replace(source, columns={}))
+    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
+    if path.is_dir():
+        whole = replace(whole, source=str(path), findings=(*lost, *whole.findings))
+    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
 
 
 @dataclass(frozen=True)
@@ -304,21 +311,6 @@ def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: flo
 def has_topics(file_format: Format) -> bool:
     """Return True if a format contains messages of topics, mapped by [channels.mcap]; optional for plug-ins."""
     return bool(getattr(file_format, "topics", False))
-
-
-def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
-    """Return the parts of a log as one recording, in the order of their times; raises RecordingError."""
-    parts: list[Recording] = []
-    headers: list[Source] = []
-    factors: dict[str, tuple[float, ...]] = {}
-    for path in paths:
-        source, channels = mapped_source(path, machine_file)
-        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
-        with naming(path):
-            parts.append(assemble_recording(source, channels, machine_file.machine))
-        headers.append(replace(source, columns={}))
-    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
-    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
 
 
 def _sniffs_any_text(file_format: Format) -> bool:
