@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 import cdtool  # noqa: E402
-from cdtool.base.remote import transferred  # noqa: E402
+from cdtool.base.remote import session  # noqa: E402
 from tests.base.remote.s3_server import S3Server  # noqa: E402
 from tests.execution.dask_cluster import environment, site_with_plugin  # noqa: E402
 
@@ -103,9 +103,9 @@ def mcap(gigabytes: float) -> bool:
         bucket = server.new_bucket()
         # One request: the server cannot join parts of so large an object.
         bucket.fs.put_file(str(log), f"{bucket.name}/long.mcap", chunksize=4 << 30)
-        before = transferred.here()
+        before = session.amount_read()
         there = cdtool.read(f"{bucket.url}/long.mcap", machine)
-        size, requests = (now - then for now, then in zip(transferred.here(), before, strict=True))
+        size, requests = (now - then for now, then in zip(session.amount_read(), before, strict=True))
         here = cdtool.read(log, machine)
         same = all(there[channel].values.tobytes() == here[channel].values.tobytes() for channel in here.channels)
         total = log.stat().st_size

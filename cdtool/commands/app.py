@@ -23,6 +23,7 @@ from typer.core import TyperGroup
 from cdtool.base.errors import CdtoolError, UsageError
 from cdtool.base.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
 from cdtool.base.plain_text import counted, one_line
+from cdtool.base.remote import session
 from cdtool.commands.console.streams import lost_output, open_standard_streams
 
 COMMANDS: Mapping[str, str] = {
@@ -196,12 +197,14 @@ def showing_first_use() -> Iterator[None]:
 
 def main() -> None:
     """Run the app. A known error prints one line to stderr and exits with status 2."""
-    before = _transferred()
+    session.begin()
     with _ending_as_if_interrupted() as came:
         try:
             _main(came)
         finally:
-            _show_transferred(before)
+            size, requests = session.amount_read()
+            if requests:
+                typer.echo(f"read from URLs: {size / 2**20:.1f} MiB in {counted(requests, 'request')}", err=True)
 
 
 def _run_app(came: list[int]) -> Any:
@@ -215,18 +218,6 @@ def _run_app(came: list[int]) -> Any:
         if came:
             raise _end_of(came[0]) from None
         raise
-
-
-def _transferred() -> tuple[int, int]:
-    """Return the bytes that this process and its workers have read from URLs, and in how many requests."""
-    staging = sys.modules.get("cdtool.base.remote.staging")
-    return staging.amount_read() if staging is not None else (0, 0)
-
-
-def _show_transferred(before: tuple[int, int]) -> None:
-    size, requests = (now - then for now, then in zip(_transferred(), before, strict=True))
-    if requests:
-        typer.echo(f"read from URLs: {size / 2**20:.1f} MiB in {counted(requests, 'request')}", err=True)
 
 
 def _main(came: list[int]) -> None:

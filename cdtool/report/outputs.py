@@ -14,8 +14,7 @@ from cdtool.base.files.foreign import FIGURES, Kind, refuse_inputs, refuse_other
 from cdtool.base.files.locks import is_temporary
 from cdtool.base.files.writing import replaced_folder, resolved
 from cdtool.base.plain_text import plain
-from cdtool.base.remote.remote_path import is_remote
-from cdtool.base.remote.uploads import check_place
+from cdtool.base.remote.remote_path import check_place, is_remote
 from cdtool.base.value_words import fault_and_place
 from cdtool.report.writers import WRITERS, known_suffixes, own_writers, writer_of
 from cdtool.report.writers.base import Report, Subject, Writer

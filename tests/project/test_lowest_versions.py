@@ -62,14 +62,21 @@ def imports(tree: ast.AST, place: str = "module") -> Iterator[tuple[str, str]]:
         yield from imports(node, "typing" if is_typing else "function" if is_function else place)
 
 
+# A class of an extra's base class: its module is imported in functions only.
+IN_FUNCTIONS = "cdtool.base.remote.ranges"
+
+
 def imported() -> Iterator[tuple[str, str, str]]:
     """Yield (file, distribution, place) of each import of another package in cdtool/."""
     installed = {"pinocchio": ["pin"], **packages_distributions()}  # pin puts it where no record of files names it
     ours = {"cdtool", "_typeshed", *sys.stdlib_module_names}  # _typeshed is known to type checkers alone
     for path in sorted((ROOT / "cdtool").rglob("*.py")):
-        for name, place in imports(ast.parse(path.read_text(encoding="utf-8"))):
+        text, file = path.read_text(encoding="utf-8"), path.relative_to(ROOT)
+        assert not re.search(rf"^from {IN_FUNCTIONS} import", text, re.MULTILINE), f"{file}: import it in a function"
+        later = ".".join(file.with_suffix("").parts) == IN_FUNCTIONS
+        for name, place in imports(ast.parse(text)):
             if name not in ours:
-                yield str(path.relative_to(ROOT)), installed.get(name, [name])[0].lower(), place
+                yield str(file), installed.get(name, [name])[0].lower(), "function" if later else place
 
 
 def test_every_import_is_of_a_declared_dependency_and_every_dependency_is_imported():

@@ -13,8 +13,7 @@ ROOT = Path(__file__).parents[2]
 BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
 WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", "NamedTemporaryFile", "savefig"}
 ELSEWHERE = {
-    "cdtool/base/remote/staging.py": "locks a temporary folder of its own",
-    "cdtool/base/remote/transferred.py": "writes into that folder",
+    "cdtool/base/remote/session.py": "locks a temporary folder of its own, and notes in it what was read",
     "cdtool/commands/console/streams.py": "opens the null device",
     "cdtool/execution/in_worker.py": "opens the null device",
     "cdtool/execution/store/journal.py": "appends to a file that the next run takes over if this one is killed",

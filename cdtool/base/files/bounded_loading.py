@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.errors import CdtoolError
-from cdtool.base.remote.storage_error import StorageError
+from cdtool.base.remote.storage import StorageError
 
 MIB = 2**20
 # Text written by a person: a machine, benchmark, label or trigger file, a URDF.

@@ -26,12 +26,14 @@ from pathlib import Path
 from cdtool.base.errors import CdtoolError, OutputError, UsageError
 from cdtool.base.files.locks import holding, release_all, temporary_name
 from cdtool.base.plain_text import plain
+from cdtool.base.remote import staging, storage
 from cdtool.base.remote.remote_path import is_remote
-from cdtool.base.remote.storage_error import StorageError
-from cdtool.base.remote.uploads import expecting, upload
+from cdtool.base.remote.storage import StorageError
 
 _BINARY = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 _temporaries: set[Path] = set()
+# The ETag of each file at a URL that is being updated: `locked`.
+_expected: dict[Path, str] = {}
 _HERE = -100  # AT_FDCWD
 _EXCHANGE = 2  # RENAME_EXCHANGE
 _UNABLE = (errno.ENOSYS, errno.EINVAL, errno.EXDEV, errno.EBUSY, errno.EOPNOTSUPP, errno.EPERM)
@@ -45,8 +47,13 @@ def locked(path: Path) -> Iterator[Path]:
     lock for a minute, or the file system has no locks.
     """
     if is_remote(path):
-        with _explained(path, []), expecting(path):
-            yield path
+        with _explained(path, []):
+            found = staging.current_info(str(path)) if path.exists() else None
+            _expected[path] = found.etag if found else ""
+            try:
+                yield path
+            finally:
+                del _expected[path]
         return
     target = resolved(path)
     with _explained(path, []), holding(target, target.parent, path, needed=True):
@@ -55,9 +62,6 @@ def locked(path: Path) -> Iterator[Path]:
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a complete file; write to a device or pipe directly. Raises OutputError, UsageError."""
-    if is_remote(path):
-        _upload(path, content)
-        return
     _write(path, (content,))
 
 
@@ -83,7 +87,7 @@ def write_pieces(path: Path, pieces: Iterable[str]) -> None:
 
 
 def _write(path: Path, contents: Iterable[bytes]) -> None:
-    if _is_special(path):
+    if not is_remote(path) and _is_special(path):
         with _explained(path, []), path.open("wb") as stream:
             stream.writelines(contents)
         return
@@ -163,8 +167,6 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
 def made_folder(path: Path) -> Iterator[Path]:
     """Create a folder with its missing parents; on exit remove those that are still empty."""
     if is_remote(path):
-        with _explained(path, []):
-            path.mkdir(parents=True, exist_ok=True)
         yield path
         return
     target = resolved(path)
@@ -223,14 +225,17 @@ def _uploaded_folder(path: Path, may_replace: Callable[[Path], bool] | None) -> 
         for item in sorted(Path(folder).rglob("*")):
             if item.is_file():
                 _upload(path / item.relative_to(folder).as_posix(), item)
-        for old in list(path.rglob("*")) if whole else ():
+        for old in list(path.glob("**/*")) if whole else ():
             if old.is_file() and not (Path(folder) / old.relative_to(path)).exists():
                 old.unlink(missing_ok=True)
 
 
-def _upload(path: Path, content: bytes | Path) -> None:
+def _upload(path: Path, file: Path) -> None:
     with _explained(path, []):
-        upload(path, content)
+        try:
+            storage.put(str(path), file, _expected.get(path, ""))
+        finally:
+            staging.forget(str(path))
 
 
 def _checked(path: Path) -> Path:
@@ -290,28 +295,31 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
-    """Rename each file to its target; if one fails, undo the others."""
-    done: list[tuple[Path, Path, bool, Path]] = []
+    """Rename each file to its target; if one fails, undo the others.
+
+    Killed meanwhile, the process leaves no old file beside a new one: all but the first are set aside before that is
+    replaced.
+    """
+    old = {target: temporary_name(target, part.parent) for part, target in pairs if target.exists()}
+    _temporaries.update(old.values())
     try:
+        for _, target in pairs[1:]:
+            if target in old:
+                target.rename(old[target])
         for part, target in pairs:
-            existed, old = target.exists(), temporary_name(target, part.parent)
-            if existed and len(pairs) > 1:
-                _temporaries.add(old)
-                with suppress(OSError):  # a file system without hard links
-                    os.link(target, old)
-            done.append((part, target, existed, old))
+            if target in old and len(pairs) > 1:
+                with suppress(OSError):  # it is set aside; a file system without hard links
+                    os.link(target, old[target])
             part.replace(target)
     except BaseException:
-        for part, target, existed, old in reversed(done):
-            if part.exists():
-                continue  # it was not renamed
-            if not existed:
+        for part, target in reversed(pairs):
+            if target in old and old[target].exists():
+                old[target].replace(target)
+            elif target not in old and not part.exists():
                 _remove(target)
-            elif old.exists():
-                old.replace(target)
         raise
     finally:
-        _discard([old for *_, old in done])
+        _discard(list(old.values()))
 
 
 def _put_whole(part: Path, target: Path) -> bool:

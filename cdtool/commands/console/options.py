@@ -202,8 +202,7 @@ def limits_of(text: str) -> tuple[float, ...]:
 def figure_name(plot: Path, *, force: bool) -> Path:
     """Return the file of --plot; raises UsageError for a wrong suffix, a missing folder, or a file not from cdtool."""
     from cdtool.base.files.foreign import refuse_foreign_figure
-    from cdtool.base.remote.remote_path import is_remote
-    from cdtool.base.remote.uploads import check_place
+    from cdtool.base.remote.remote_path import check_place, is_remote
     from cdtool.report.plots.figures import SUFFIXES
 
     if plot.suffix.lower() not in SUFFIXES:

@@ -10,8 +10,7 @@ from typing import IO, TYPE_CHECKING
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.base.files.writing import replaced
 from cdtool.base.findings import Finding
-from cdtool.base.remote.remote_path import is_remote
-from cdtool.base.remote.uploads import check_place
+from cdtool.base.remote.remote_path import check_place, is_remote
 from cdtool.formats.channels.channel_assembly import file_digest
 
 if TYPE_CHECKING:

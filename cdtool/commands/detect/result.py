@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from os import PathLike
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, overload
 
@@ -261,13 +262,13 @@ class DetectionResults(Sequence[DetectionResult]):
         """Return a result by number, or by the name of its log or the end of it; of a slice, several."""
         if isinstance(number, slice):
             return DetectionResults(self.runs[number])
-        if isinstance(number, str | PurePath):
+        if isinstance(number, str | PathLike):
             left_out = {item.recording: item.reason for item in self._skipped}
             return self.runs[number_of(str(number), self.names, left_out)]
         return self.runs[number]
 
     def __contains__(self, item: object) -> bool:
-        if not isinstance(item, str | PurePath):
+        if not isinstance(item, str | PathLike):
             return item in self.runs
         try:
             number_of(str(item), self.names)
@@ -458,7 +459,7 @@ def detect(  # noqa: PLR0913  # the public function: a keyword for each setting
         activation=activation,
         rules=rules,
     )
-    if isinstance(logs, str | Path):
+    if isinstance(logs, str | PathLike):
         runs = detect_log(logs, options).runs
         if len(runs) > 1:
             ids = f"{runs[0].recording.source} to {runs[-1].recording.source}"

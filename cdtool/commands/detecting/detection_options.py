@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,7 +53,7 @@ class DetectionOptions:
         by_hand = own_threshold or cut or self.joints or self.activation or self.rules
         if self.machine is not None or by_hand:
             raise UsageError("settings cannot be combined with a benchmark file", "set them in the benchmark file")
-        if not isinstance(self.benchmark, str | Path):
+        if not isinstance(self.benchmark, str | PathLike):
             return self.benchmark
         from cdtool.commands.detecting.prepared_detector import prepare_benchmark
 
@@ -64,13 +65,13 @@ class DetectionOptions:
     def has_runs(self) -> bool:
         """Whether the log is cut into runs; a benchmark file must have been read."""
         benchmark = self.benchmark
-        if benchmark is not None and not isinstance(benchmark, str | Path):
+        if benchmark is not None and not isinstance(benchmark, str | PathLike):
             return benchmark.setup.has_runs
         return RunCut.of(self.operations) is not None
 
     def machine_file(self) -> MachineFile:
         """Return the machine file, read; raises UsageError if none is given."""
-        if self.benchmark is not None and not isinstance(self.benchmark, str | Path):
+        if self.benchmark is not None and not isinstance(self.benchmark, str | PathLike):
             return self.benchmark.setup.machine_file
         if self.machine is None:
             raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")

@@ -100,7 +100,7 @@ def made_before(setup: BenchmarkFile, section: InjectSection) -> InjectedLogs | 
     """Return the injected recordings of a section if its folder has all of them, and nothing has changed since."""
     folder = joined(setup.path.parent, section.folder)
     mark = folder / _DIGEST
-    if not (mark.is_file() and mark.read_text(encoding="utf-8").strip() == _digest(setup, section)):
+    if not (mark.is_file() and mark.read_bytes().decode().strip() == _digest(setup, section)):
         return None
     found = read_injected(folder)
     return found if all((folder / case.file).is_file() for case in found.cases) else None

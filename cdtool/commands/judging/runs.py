@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
 from glob import escape
+from os import PathLike
 from pathlib import Path
 
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, is_lasting, nearest
@@ -121,7 +122,7 @@ def read(
     ((7200, 1), 'm/s')
     """
     if machine is None:
-        name = Path(log).name
+        name = location(log).name
         raise UsageError(
             f"cdtool.read('{name}') needs a machine file: it states which column is which channel, and the units",
             f"cdtool.read('{name}', 'machine.toml'); cdtool.init('{name}', 'machine.toml') drafts one",
@@ -249,7 +250,7 @@ def several_logs(logs: Sequence[str | Path]) -> list[str | Path]:
 
     A text is a sequence of letters, and a pattern with a typing error matches nothing: neither is a list of logs.
     """
-    if isinstance(logs, str | Path):
+    if isinstance(logs, str | PathLike):
         raise UsageError(f"{logs}: a single path, not a list of logs", "give a list, as sorted(Path(...).glob(...))")
     if not (found := list(logs)):
         raise UsageError("no log is given", "check the folder and the pattern that the list is made from")
@@ -411,9 +412,10 @@ def shown_path(path: Path, base: Path | None = None) -> str:
     if base is None or not above:
         return path.as_posix()
     # Of many logs, in a third of the time of `relative_to`.
-    if type(path) is not type(base) or parts[: len(above)] != above:
-        return path.relative_to(base).as_posix() if path.is_relative_to(base) else path.as_posix()
-    return "/".join(parts[len(above) :]) or "."
+    if parts[: len(above)] == above:
+        return "/".join(parts[len(above) :]) or "."
+    is_below = not is_remote(path) and not is_remote(base) and path.is_relative_to(base)
+    return path.relative_to(base).as_posix() if is_below else path.as_posix()
 
 
 def check_joints(joints: Sequence[str], machine: Machine) -> None:

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.base.remote.remote_path import is_remote
+
 # Rooms of the code that do not determine the outcome of a recording.
 _ONLY_SHOWN = ("cli", "report", "simulation")
 
@@ -44,7 +46,7 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     if isinstance(value, set | frozenset):
         return sorted(json.dumps(_plain(item), sort_keys=True) for item in value)
-    if isinstance(value, PurePath):
+    if isinstance(value, PurePath) or is_remote(value):
         return value.as_posix()
     return [f"{type(value).__module__}.{type(value).__qualname__}", _inner(value)]
 

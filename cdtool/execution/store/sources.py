@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cdtool.base.remote.remote_path import RemotePath
+from cdtool.base.remote.remote_path import is_remote, version_of
 
 # Read at a time [bytes].
 _PIECE = 1 << 20
@@ -49,7 +49,7 @@ def read_sources(files: Sequence[Path]) -> tuple[SourceFile, ...] | None:
     if before is None:
         return None
     try:
-        digests = [path.digest() if isinstance(path, RemotePath) else file_sha256(path) for path in files]
+        digests = [version_of(path) if is_remote(path) else file_sha256(path) for path in files]
     except OSError:
         return None
     if state_of(files) != before:

@@ -159,4 +159,4 @@ def _rewrite(store: Store, used: set[bytes], oldest: float) -> tuple[int, int, i
 
 
 def _size(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    return sum(path.stat().st_size for path in folder.glob("**/*") if path.is_file())

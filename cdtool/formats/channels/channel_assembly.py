@@ -18,7 +18,7 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
-from cdtool.base.remote.remote_path import RemotePath
+from cdtool.base.remote.remote_path import is_read_by_ranges, version_of
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
 from cdtool.formats.channels.header_units import check_clock_unit, guessed_units, time_unit_findings, unit_findings
 from cdtool.formats.source import Source
@@ -94,8 +94,8 @@ def file_digest(path: Path) -> str:
 
     Of a file at a URL that is read by ranges it is "etag:" and the digest of its ETag and size: its version.
     """
-    if isinstance(path, RemotePath) and path.is_read_by_ranges():
-        return path.digest()
+    if is_read_by_ranges(path):
+        return version_of(path)
     with path.open("rb", buffering=0) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

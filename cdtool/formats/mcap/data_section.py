@@ -90,7 +90,7 @@ class DataSection:
     @property
     def is_partly_read(self) -> bool:
         """Return whether parts of a file at a URL are not read: a checksum of more than a chunk is not checked."""
-        return self._file.remote is not None and bool(self._unwanted)
+        return self._file.is_ranged and bool(self._unwanted)
 
     def _records(self) -> Iterator[Block]:
         at = len(MAGIC)

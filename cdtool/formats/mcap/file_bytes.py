@@ -8,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
-from cdtool.base.remote.ranges import RangedBytes
-from cdtool.base.remote.remote_path import RemotePath
 from cdtool.formats.mcap.chunks import Bytes
 from cdtool.formats.mcap.records import DamageError, crc32
 
@@ -26,9 +24,9 @@ class FileBytes:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.remote = RangedBytes(str(path)) if isinstance(path, RemotePath) and path.is_read_by_ranges() else None
-        self._file = path.open("rb", buffering=0) if self.remote is None else None
-        self.size = self._file.seek(0, 2) if self._file is not None else self._ranges.size
+        self._file: Any = path.open("rb", buffering=0)
+        self.is_ranged = hasattr(self._file, "expect")
+        self.size = self._file.seek(0, 2)
 
     def __enter__(self) -> Self:
         return self
@@ -40,23 +38,17 @@ class FileBytes:
 
     def close(self) -> None:
         """Close the file."""
-        if self._file is not None:
-            self._file.close()
-
-    @property
-    def _ranges(self) -> RangedBytes:
-        assert self.remote is not None, "a file is open, or at a URL"
-        return self.remote
+        self._file.close()
 
     def expect(self, ranges: Iterable[tuple[int, int]]) -> None:
         """Read these ranges of a file at a URL together, from where they are needed soon; raises OSError."""
-        if self.remote is not None:
-            self.remote.expect(ranges)
+        if self.is_ranged:
+            self._file.expect(ranges)
 
     def check_unchanged(self) -> None:
         """Raise OSError if a file at a URL was replaced since it was opened."""
-        if self.remote is not None:
-            self.remote.check_unchanged()
+        if self.is_ranged:
+            self._file.check_unchanged()
 
     def read(self, at: int, length: int) -> memoryview:
         """Return up to `length` bytes from `at`, fewer only at the file's end."""
@@ -72,18 +64,11 @@ class FileBytes:
         """Fill `target` with the bytes from `at`; raises DamageError if the file ends before."""
         view, filled = target.data, 0
         while filled < len(view):
-            count = self._fill(view[filled : filled + _MOST_AT_ONCE], at + filled)
+            self._file.seek(at + filled)
+            count = self._file.readinto(view[filled : filled + _MOST_AT_ONCE])
             if not count:
                 raise DamageError("the file became shorter while it was read")
             filled += count
-
-    def _fill(self, view: memoryview, at: int) -> int:
-        if self._file is None:
-            content = self._ranges.read(at, len(view))
-            view[: len(content)] = content
-            return len(content)
-        self._file.seek(at)
-        return self._file.readinto(view)
 
     def crc(self, at: int, end: int) -> int:
         """Return the CRC-32 of the bytes from `at` to before `end`."""

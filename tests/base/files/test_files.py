@@ -131,6 +131,40 @@ def test_of_several_files_all_are_replaced_or_none(tmp_path, monkeypatch, failin
     assert {(tmp_path / name).read_text() for name in ("a.md", "b.md")} == {"old"}
 
 
+KILLED = """
+import os, sys
+from pathlib import Path
+from cdtool.base.files.writing import write_texts
+left = [int(sys.argv[2])]
+def killing(call):
+    def counted(*arguments, **options):
+        if not left[0]:
+            os._exit(9)
+        left[0] -= 1
+        return call(*arguments, **options)
+    return counted
+Path.replace, Path.rename, Path.unlink, os.link = map(killing, (Path.replace, Path.rename, Path.unlink, os.link))
+write_texts({Path(sys.argv[1]) / name: "new" for name in ("log.csv", "log.csv.machine.toml")})
+"""
+
+
+@posix_only
+def test_a_killed_process_leaves_no_old_file_beside_a_new_one(tmp_path):
+    log, machine = tmp_path / "log.csv", tmp_path / "log.csv.machine.toml"
+    seen = set()
+    for calls in range(40):
+        log.write_text("old")
+        machine.write_text("old")
+        command = [sys.executable, "-c", KILLED, str(tmp_path), str(calls)]
+        status = subprocess.run(command, cwd=ROOT, check=False, timeout=60).returncode
+        state = log.read_text(), machine.read_text() if machine.exists() else "none"
+        assert state in {("old", "old"), ("old", "none"), ("new", "none"), ("new", "new")}, calls
+        seen.add(state)
+        if not status:
+            break
+    assert status == 0 and len(seen) == 4
+
+
 def test_an_interruption_right_after_a_rename_never_loses_the_file(tmp_path, monkeypatch):
     (tmp_path / "a.md").write_text("old")
     real = Path.replace

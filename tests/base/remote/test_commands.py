@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
-from cdtool.base.remote import staging
+from cdtool.base.remote import session, staging
+from cdtool.base.remote.remote_path import location
 from tests.command import cdtool
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
@@ -158,9 +159,8 @@ def test_runs_of_a_log_are_named_by_its_url(memory, tmp_path):
 
 def test_no_copy_is_left_after_a_command(gate):
     cdtool("benchmark", f"{gate}/benchmark.toml")
-    assert not staging._session.copies or staging._session.owned is not None
     staging.release()
-    assert not [path for path in staging._session.own_folder().iterdir() if path.is_file()]
+    assert {path.name for path in session.folder().iterdir()} <= {"lock", "read"}
 
 
 def test_a_store_at_a_url_is_used_again(gate, memory, tmp_path):
@@ -179,7 +179,6 @@ def test_a_store_at_a_url_is_used_again(gate, memory, tmp_path):
 
 
 def test_a_store_without_a_journal_writes_parts_more_often(memory, monkeypatch):
-    from cdtool.base.remote.remote_path import location
     from cdtool.execution.store import store as module
     from cdtool.execution.store.entry import Entry
 
@@ -219,3 +218,16 @@ def test_a_pattern_of_a_url_without_a_match_is_a_missing_file(gate):
     done = cdtool("info", f"{gate}/fre/*.csv")
     assert done.status == 2
     assert f"{gate}/fre/*.csv: no such file" in done.err
+
+
+def test_a_path_at_a_url_is_one_log_in_python(gate):
+    log = location(f"{gate}/stiff/03.csv")
+    one, several = [api.detect(logs, MACHINE, detector="pt", limit=[50.0]) for logs in (log, [log])]
+    assert several[log].alarms.equals(one.alarms) and log in several
+
+
+def test_what_the_program_that_started_a_command_has_read_is_not_counted(tmp_path, monkeypatch):
+    monkeypatch.setenv("CDTOOL_REMOTE_FOLDER", str(tmp_path))
+    (tmp_path / "read").write_text("1000\n", encoding="ascii")
+    assert session.amount_read() == (1000, 1)
+    assert "URL" not in cdtool("info", GATE / "stiff" / "03.csv", "-m", MACHINE).err

@@ -1,4 +1,4 @@
-"""A path at a URL behaves like a local path wherever cdtool uses one."""
+"""A file at a URL is asked as a local path is, wherever cdtool asks one."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.remote.remote_path import RemotePath, is_remote, joined, location
-from cdtool.base.remote.storage_error import StorageError
+from cdtool.base.remote.remote_path import is_remote, joined, location, version_of
 from cdtool.commands.judging.runs import find_logs
 
 NAMES = [
@@ -48,15 +47,12 @@ def test_a_text_is_a_local_path_or_a_url(tmp_path):
 
 def test_names_are_those_of_a_local_path():
     path, local = location("s3://bucket/one/two/log.tar.gz"), Path("/bucket/one/two/log.tar.gz")
-    for name in ("name", "stem", "suffix", "suffixes"):
+    for name in ("name", "stem", "suffix"):
         assert getattr(path, name) == getattr(local, name)
-    assert str(path.parent) == "s3://bucket/one/two" and [str(item) for item in path.parents][-1] == "s3://bucket"
-    assert str(path.with_suffix(".csv")) == "s3://bucket/one/two/log.tar.csv"
+    assert str(path.parent) == "s3://bucket/one/two" and path.parts == ("s3://bucket", *local.parts[2:])
     assert str(path.with_name("b#7.csv")) == "s3://bucket/one/two/b#7.csv"
     assert path.relative_to(location("s3://bucket/one")) == Path("two/log.tar.gz")
-    assert not path.is_relative_to(location("s3://bucket/other")) and not path.is_relative_to(Path("/bucket"))
-    assert not Path("/bucket").is_relative_to(path) and path.as_posix() == str(path) == path.as_uri()
-    assert path.is_absolute() and path.resolve() == path == path.absolute() == path.expanduser()
+    assert path.is_absolute() and path.resolve() == path == path.absolute() and path.as_posix() == str(path)
     assert location("s3://bucket").parent == location("s3://bucket/") and location("s3://bucket").name == ""
 
 
@@ -65,8 +61,8 @@ def test_paths_are_joined_as_local_ones():
     assert str(base / "../machine.toml") == "s3://bucket/machine.toml"
     assert str(base / "./a" / "b.csv") == "s3://bucket/one/a/b.csv"
     assert str(base / "s3://other/x.csv") == "s3://other/x.csv" and base / "/local/x.csv" == Path("/local/x.csv")
-    assert Path("local") / base == base and joined(Path("local"), "s3://b/x") == location("s3://b/x")
-    assert joined(Path("local"), "x") == Path("local/x") and base.joinpath("a", "b") == base / "a/b"
+    assert joined(Path("local"), "s3://b/x") == location("s3://b/x") and joined(Path("local"), "x") == Path("local/x")
+    assert str(location("s3://bucket//one")) == "s3://bucket//one" and str(base / "a//b") == "s3://bucket/one/a//b"
 
 
 def test_it_compares_hashes_sorts_and_travels_to_other_processes():
@@ -82,19 +78,7 @@ def test_it_compares_hashes_sorts_and_travels_to_other_processes():
 def test_credentials_travel_to_other_processes_but_not_into_texts():
     path = location("sftp://robot:geheim@host/a.csv")
     assert b"geheim" in pickle.dumps(path)
-    assert "geheim" not in f"{path} {path!r} {path.parent} {path.parts} {path.as_posix()} {bytes(path)!r}"
-
-
-def test_every_public_method_of_a_path_is_its_own():
-    inherited = {name for name in dir(Path) if not name.startswith("_")} - set(vars(RemotePath))
-    assert inherited <= {"cwd", "home", "from_uri", "info", "parser"}  # of the class, not of a path
-
-
-def test_what_is_not_possible_at_a_url_is_one_line(memory):
-    path = location("memory://logs/a.csv")
-    for refused in (path.touch, path.chmod, path.rename, lambda: path.open("w"), lambda: path.write_text("x")):
-        with pytest.raises(StorageError, match="not possible at a URL"):
-            refused()
+    assert "geheim" not in f"{path} {path!r} {path.parent} {path.parts} {path.as_posix()}"
 
 
 def test_content_is_read_by_any_way_of_opening(tree):
@@ -105,16 +89,23 @@ def test_content_is_read_by_any_way_of_opening(tree):
     handle = os.open(path, os.O_RDONLY)
     assert os.read(handle, 99) == b"a/01.csv"
     os.close(handle)
-    assert path.read_bytes() == b"a/01.csv" and path.read_text() == "a/01.csv"
+    assert path.read_bytes() == b"a/01.csv"
     assert path.stat().st_size == 8 and path.is_file() and not path.is_dir() and path.exists()
-    assert path.parent.is_dir() and not path.parent.is_file() and path.samefile("memory://logs/a/01.csv")
+    assert path.parent.is_dir() and not path.parent.is_file() and path.samefile(location("memory://logs/a/01.csv"))
     assert [item.name for item in (remote / "a").iterdir()] == [".hidden.csv", "01.csv", "02.csv", "deep"]
 
 
 def test_a_missing_file_is_missing_as_a_local_one(memory):
     path = location("memory://logs/none.csv")
     assert not path.exists() and not path.is_file() and not path.is_dir() and not list(path.parent.glob("*"))
-    for reading in (path.open, path.stat, path.read_bytes, path.unlink, lambda: os.fspath(path), path.digest):
+    for reading in (
+        path.open,
+        path.stat,
+        path.read_bytes,
+        path.unlink,
+        lambda: os.fspath(path),
+        lambda: version_of(path),
+    ):
         with pytest.raises(FileNotFoundError, match=r"memory://logs/none.csv: no such file"):
             reading()
     path.unlink(missing_ok=True)
@@ -160,11 +151,10 @@ def test_a_pattern_may_be_a_url_in_a_local_file(tree):
 def test_a_listing_is_asked_for_once_for_all_its_files(tree, monkeypatch):
     _, remote = tree
     asked = []
-    whole = type(tree[1])
     from cdtool.base.remote import storage
 
     info = storage.info
     monkeypatch.setattr(storage, "info", lambda url: asked.append(url) or info(url))
     found = find_logs(["a/*.csv"], remote, "logs")
-    assert len(found) == 2 and all(isinstance(path, whole) for path in found)
+    assert len(found) == 2 and all(is_remote(path) for path in found)
     assert not [url for url in asked if url.endswith(("01.csv", "02.csv"))]

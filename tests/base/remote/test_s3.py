@@ -342,11 +342,11 @@ def test_a_large_mcap_is_read_by_ranges(bucket, tmp_path):
     url = bucket.put("large.mcap", content)
     (tmp_path / "large.mcap").write_bytes(content)
     (tmp_path / "axis.toml").write_text(AXIS)
-    from cdtool.base.remote import transferred
+    from cdtool.base.remote import session
 
-    before = transferred.here()[0]
+    before = session.amount_read()[0]
     there = api.read(url, tmp_path / "axis.toml")
-    assert transferred.here()[0] - before < 0.1 * len(content)
+    assert session.amount_read()[0] - before < 0.1 * len(content)
     here = api.read(tmp_path / "large.mcap", tmp_path / "axis.toml")
     assert here["torque"].values.tobytes() == there["torque"].values.tobytes() and there.findings == here.findings
     assert there.digest.startswith("etag:") and there.digest == api.read(url, tmp_path / "axis.toml").digest

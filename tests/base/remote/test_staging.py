@@ -12,10 +12,9 @@ from pathlib import Path
 import pytest
 
 from cdtool.base.errors import is_lasting
-from cdtool.base.remote import staging, storage, transferred
-from cdtool.base.remote.ranges import RangedBytes
+from cdtool.base.remote import session, staging, storage
 from cdtool.base.remote.remote_path import location
-from cdtool.base.remote.storage_error import StorageError
+from cdtool.base.remote.storage import StorageError
 
 ROOT = Path(__file__).parents[3]
 MIB = 1 << 20
@@ -23,8 +22,7 @@ MIB = 1 << 20
 
 def copies() -> list[Path]:
     """Return the copies of this process."""
-    folder = staging._session.folder
-    return sorted(path for path in folder.iterdir() if path.is_file()) if folder is not None else []
+    return sorted(session.folder().glob(f"{os.getpid()}-*"))
 
 
 def test_a_file_is_copied_once_and_removed_after_use(memory, monkeypatch):
@@ -55,16 +53,15 @@ def _use_copies() -> None:
         os.fspath(location("memory://logs/a.csv"))
 
 
-def test_a_worker_notes_for_the_first_process_what_it_has_read(memory, monkeypatch, tmp_path):
-    monkeypatch.setenv("CDTOOL_REMOTE_FOLDER", str(tmp_path))
-    monkeypatch.setattr(staging, "_session", staging._Session())
-    monkeypatch.setattr(transferred, "_bytes", 0)
-    monkeypatch.setattr(transferred, "_requests", 0)
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_what_a_worker_reads_is_counted(memory):
     memory.pipe_file("/logs/a.mcap", b"x" * 100)
-    assert RangedBytes("memory://logs/a.mcap").read(10, 90) == b"x" * 90
-    staging.release()
-    transferred.forget()
-    assert transferred.altogether(tmp_path) == (90, 1)
+    assert location("memory://logs/a.mcap").exists()  # as a command does before it starts workers
+    before = session.amount_read()
+    child = os.fork()
+    if not child:
+        os._exit(0 if storage.read_range("memory://logs/a.mcap", 10, 90) == b"x" * 80 else 1)
+    assert os.waitpid(child, 0)[1] == 0 and session.amount_read() == (before[0] + 80, before[1] + 1)
 
 
 def test_the_copies_are_bounded(memory, monkeypatch):
@@ -75,7 +72,7 @@ def test_the_copies_are_bounded(memory, monkeypatch):
     os.fspath(paths[0]), os.fspath(paths[1]), os.fspath(paths[0])
     os.fspath(paths[2])  # makes room by removing the one that was used longest ago
     assert sum(path.stat().st_size for path in copies()) == 2 * MIB
-    assert staging.is_staged(str(paths[0])) and not staging.is_staged(str(paths[1]))
+    assert [path.read_bytes()[:1] for path in copies()] == [b"a", b"c"]
 
 
 def test_a_file_larger_than_the_bound_is_refused_before_it_is_read(memory, monkeypatch):
@@ -87,9 +84,13 @@ def test_a_file_larger_than_the_bound_is_refused_before_it_is_read(memory, monke
 
 
 @pytest.mark.parametrize("text", ["", "many", "-3", "0", "nan"])
-def test_an_invalid_bound_is_the_usual_one(monkeypatch, text):
+def test_an_invalid_bound_is_the_usual_one(memory, monkeypatch, text):
     monkeypatch.setenv("CDTOOL_CACHE_MIB", text)
-    assert staging.bound() == 4096 * MIB
+    memory.pipe_file("/logs/a.csv", b"1")
+    assert Path(os.fspath(location("memory://logs/a.csv"))).read_bytes() == b"1"
+    found = storage.ObjectInfo(4097 * MIB)
+    with pytest.raises(StorageError, match="the cache for local copies has 4096"):
+        staging._fetched("memory://logs/a.csv", found)
 
 
 def test_a_replaced_file_is_copied_again(memory, monkeypatch):

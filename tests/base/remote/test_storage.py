@@ -14,8 +14,7 @@ from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, 
 from cdtool.base.files.bounded_loading import read_bytes
 from cdtool.base.remote import storage
 from cdtool.base.remote.remote_path import location
-from cdtool.base.remote.storage import ObjectInfo
-from cdtool.base.remote.storage_error import MissingObjectError, StorageError
+from cdtool.base.remote.storage import MissingObjectError, ObjectInfo, StorageError
 from tests.command import cdtool
 
 
@@ -34,6 +33,7 @@ FAULTS = {
     ),
     "no space": (OSError(errno.ENOSPC, "No space left on device"), "No space left on device"),
     "precondition": (OSError("PreconditionFailed: If-Match"), "was changed by another process meanwhile"),
+    "port": (OSError("no answer of 127.0.0.1:34125"), "the storage cannot be used: no answer of 127.0.0.1:34125"),
     "folder": (IsADirectoryError("x"), "is a folder"),
     "without words": (TimeoutError(), "the storage cannot be used: TimeoutError"),
     "many lines": (OSError("one\n  two"), "the storage cannot be used: one two"),
@@ -132,7 +132,7 @@ def test_a_version_is_its_etag_and_size():
     ],
 )
 def test_storages_name_version_and_time_differently(found, etag, changed):
-    info = storage._info_of(found)
+    info = ObjectInfo.of(found)
     assert (info.size, info.etag, info.changed) == (found["size"] or 0, etag, changed)
 
 

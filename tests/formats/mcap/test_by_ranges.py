@@ -11,7 +11,7 @@ from mcap.writer import CompressionType, Writer
 
 import cdtool
 from cdtool.base.errors import CdtoolError, RecordingError, is_lasting
-from cdtool.base.remote import ranges, remote_path, staging, transferred
+from cdtool.base.remote import remote_path, session, staging
 from cdtool.formats.mcap.file_bytes import FileBytes
 
 MACHINE = """
@@ -73,9 +73,9 @@ def read_both(content, memory, machine, tmp_path):
     """Return the recording from a local file and from a URL, and the bytes that the second one has transferred."""
     (tmp_path / "large.mcap").write_bytes(content)
     memory.pipe_file("/logs/large.mcap", content)
-    before = transferred.here()[0]
+    before = session.amount_read()[0]
     there = cdtool.read(URL, machine)
-    return cdtool.read(tmp_path / "large.mcap", machine), there, transferred.here()[0] - before
+    return cdtool.read(tmp_path / "large.mcap", machine), there, session.amount_read()[0] - before
 
 
 @pytest.mark.parametrize("attachment", [False, True])
@@ -177,4 +177,4 @@ def test_a_converted_file_keeps_its_exact_times(memory, machine, tmp_path, monke
     here = cdtool.read(tmp_path / "log.mcap", tmp_path / "log.mcap.machine.toml")
     there = cdtool.read("memory://logs/log.mcap", tmp_path / "log.mcap.machine.toml")
     assert here["torque"].time.tobytes() == there["torque"].time.tobytes() and here.origin == there.origin
-    assert there.digest.startswith("modified:") and ranges.SMALLEST_BY_RANGES > 1
+    assert there.digest.startswith("modified:")
