@@ -12,7 +12,7 @@ import numpy as np
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import digits
-from cdtool.commands.judging.runs import read_log
+from cdtool.commands.judging.runs import read
 from cdtool.formats.groups import Group, Part, Parts
 from cdtool.formats.machine_file import MachineFile
 from cdtool.recordings.log_section import LogSection
@@ -87,6 +87,6 @@ def _times(log: Path, section: LogSection, machine_file: MachineFile | None) -> 
     if by_distance and machine_file is None:
         raise UsageError(f"{by_distance[0]} needs the log's position", "pass a machine file with -m, or give a time")
     if machine_file is not None and by_distance:
-        return section.times(read_log(log, machine_file))
+        return section.times(read(log, machine_file))
     begin, end = section.begin, section.end
     return -np.inf if begin is None else begin.value, np.inf if end is None else end.value

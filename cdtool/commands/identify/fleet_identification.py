@@ -19,7 +19,7 @@ from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.identifying import IdentifiedMachine, JointIdentification, identify
 from cdtool.commands.judging.log_groups import by_machine, day_in_path, day_of
-from cdtool.commands.judging.runs import find_logs, read_log, several_logs, shown_path
+from cdtool.commands.judging.runs import find_logs, read, several_logs, shown_path
 from cdtool.execution.workers import Progress, Workers, in_order
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.results.results import RecordingFinding, Skipped
@@ -400,6 +400,6 @@ def _day_of(log: Path, machine_file: MachineFile) -> str:
     if day := day_in_path(log):
         return day
     try:
-        return day_of(log, read_log(log, machine_file).began)
+        return day_of(log, read(log, machine_file).began)
     except CdtoolError:
         return ""

@@ -29,7 +29,7 @@ from cdtool.commands.init.unmapped import Unmapped, unmapped_columns
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.information import info
 from cdtool.commands.judging.log_findings import before_contact
-from cdtool.commands.judging.runs import read_log, several_logs
+from cdtool.commands.judging.runs import read, several_logs
 from cdtool.formats.channels.reading import choose_format, element_names, has_topics, log_parts, with_nanoseconds
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv_dialect.pins import read_pins
@@ -262,7 +262,7 @@ def _checked_together(logs: Sequence[Path], machine_file: MachineFile) -> tuple[
     parts = []
     for log in logs:
         with suppress(CdtoolError):
-            recording = with_scalar_force(read_log(log, machine_file), OnsetRule())
+            recording = with_scalar_force(read(log, machine_file), OnsetRule())
             parts.append(before_contact(recording, contacts_shown(recording, OnsetRule())))
     return check_channels(parts, machine_file.machine)
 
@@ -273,7 +273,7 @@ def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
     if csv and not is_table:
         raise UsageError(f"{path}: is {found.name}, not a text table", "remove --csv")
     try:
-        return Csv().columns_by(path, read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
+        return Csv().columns(path, pins=read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
     except RecordingError as fault:
         if not is_table or csv:
             raise

@@ -150,6 +150,7 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
     from cdtool.commands.judging.synchronisation import latency_findings
+    from cdtool.formats.channels.parts import join_details, join_topics
     from cdtool.formats.channels.reading import read_as_logged
     from cdtool.truth.synchronisation.audit import audit
 
@@ -172,8 +173,8 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     latencies = audit(recording, machine_file.machine, contacts)
     findings += latency_findings(latencies)
     found = worst_first(findings)
-    details, origin = logged.details, recording.origin
-    return Info(str(log), logged.format, details, tuple(channels), found, logged.dialect, latencies, origin)
+    details, last = in_words(join_details(logged.headers), join_topics(logged.headers)), logged.headers[-1]
+    return Info(str(log), last.format, details, tuple(channels), found, last.dialect, latencies, recording.origin)
 
 
 def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Finding]) -> list[Finding]:

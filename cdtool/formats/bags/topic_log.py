@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.formats.bags.sequence_jumps import SequenceJumps
 from cdtool.formats.channels.channel_map import ChannelMap
@@ -85,15 +85,17 @@ class TopicFormat(ABC):
         """Return the fields that `wanted` names, or all numeric fields; raises RecordingError."""
         if wanted is None:
             return join_pieces(self.pieces(path), sort=True)
-        log = self.log(path, {source.topic for source in wanted.sources}.__contains__)
-        topics = wanted_topics(path, wanted, log.exact)
-        for stream, batch, *_ in chain.from_iterable(log.blocks()):
-            topics[stream.topic].add(stream, batch)
-        return log.mapped_source(wanted, topics)
+        with naming(path):
+            log = self.log(path, {source.topic for source in wanted.sources}.__contains__)
+            topics = wanted_topics(path, wanted, log.exact)
+            for stream, batch, *_ in chain.from_iterable(log.blocks()):
+                topics[stream.topic].add(stream, batch)
+            return log.mapped_source(wanted, topics)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:  # noqa: ARG002  all keys
         """Yield all numeric fields, some MiB of the file at a time; raises RecordingError."""
-        return (yield from survey(self.log(path)))
+        with naming(path):
+            return (yield from survey(self.log(path)))
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """Return the names of array elements in a topic's first decodable message; () if it has none."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -39,14 +38,14 @@ def join_fields(source: Source, resolved: ChannelMap, wanted: ChannelMap) -> tup
         keys = [axis.described for axis in vector.by_axis]
         if not present.issuperset(keys):
             continue
-        column, notes = join_axes(source.path, vector, [source.columns[key] for key in keys])
+        column, notes = join_axes(vector, [source.columns[key] for key in keys])
         columns[vector.channel] = column
         findings += notes
         sources.append(replace(vector, keys=(vector.channel,)))
     return replace(source, columns=columns, findings=tuple(findings)), replace(resolved, sources=tuple(sources))
 
 
-def join_axes(path: Path, item: ChannelSource, axes: Sequence[Column]) -> tuple[Column, list[Finding]]:
+def join_axes(item: ChannelSource, axes: Sequence[Column]) -> tuple[Column, list[Finding]]:
     """Return the axes of a force as one column (n, axes), and a note if they have different clocks.
 
     The clock is then that of the axis with the longest period; of every other axis, each time has the last sample at or
@@ -56,14 +55,14 @@ def join_axes(path: Path, item: ChannelSource, axes: Sequence[Column]) -> tuple[
         if axis.time is None or axis.values.ndim != 1 or not len(axis.values):
             problem = "is not one number per sample" if axis.values.ndim != 1 else "has no sample with a time"
             raise RecordingError(
-                f"{path}: '{axis.name}' (channel '{item.channel}') {problem}",
+                f"'{axis.name}' (channel '{item.channel}') {problem}",
                 "name one element per axis, each with a clock",
                 channel=item.channel,
             )
     first = axes[0].time
     if all(axis.time is first or np.array_equal(axis.time, first) for axis in axes):  # type: ignore[arg-type]
         return Column(item.channel, np.column_stack([axis.values for axis in axes]), first), []
-    clean = [_cleaned(path, item, axis) for axis in axes]
+    clean = [_cleaned(item, axis) for axis in axes]
     slowest = max(range(len(axes)), key=lambda k: clean[k].period if np.isfinite(clean[k].period) else 0.0)
     clock = clean[slowest].time
     held = np.column_stack([previous_value(series, clock)[:, 0] for series in clean])
@@ -72,10 +71,10 @@ def join_axes(path: Path, item: ChannelSource, axes: Sequence[Column]) -> tuple[
     return Column(item.channel, held, clock), [Finding("axes_held", item.channel, fact)]
 
 
-def _cleaned(path: Path, item: ChannelSource, axis: Column) -> Series:
+def _cleaned(item: ChannelSource, axis: Column) -> Series:
     clean = clean_time(axis.time)  # type: ignore[arg-type]
     if not len(clean.time):
-        raise RecordingError(f"{path}: '{axis.name}' has no sample with a time", channel=item.channel)
+        raise RecordingError(f"'{axis.name}' has no sample with a time", channel=item.channel)
     return Series(clean.time, axis.values[clean.keep], "1")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Sequence
-from pathlib import Path
 from unicodedata import normalize
 
 import numpy as np
@@ -92,7 +91,7 @@ def _unit_text(item: ChannelSource, column: Column, factor: float) -> str | None
     return min(known, key=lambda text: known[text]) if known else column.unit or bare
 
 
-def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
+def check_clock_unit(time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
     """Return the warning on a clock whose steps are implausible in the unit that the machine file states.
 
     `origin`, in seconds according to that unit, has been subtracted from the time stamps. Raises RecordingError if the
@@ -108,7 +107,7 @@ def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float
         also = f", as its header says '{header}'" if header else ""
         readings = {"readings": both_readings(first, time.factor, stated, meant)}
         raise RecordingError(
-            f"{path}: the machine file states {stated} for the clock '{column.name}'{also}, but "
+            f"the machine file states {stated} for the clock '{column.name}'{also}, but "
             f"{Finding('header_unit_implausible', '', readings).words_for('readings')}",
             f'write time = {{ column = "{column.name}", unit = "{meant}" }} in [channels]',
         )

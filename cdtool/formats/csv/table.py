@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
-from pathlib import Path
 
 import numpy as np
 
@@ -22,8 +21,9 @@ from cdtool.formats.column_names import column_key
 from cdtool.formats.columns import Categories, Piece
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
-from cdtool.formats.csv.rows import RowReader, Rows
+from cdtool.formats.csv.rows import RowReader, Rows, plain_rows
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, Layout, seconds_since, unwrap
+from cdtool.formats.csv.text import BLOCK_BYTES
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import PieceRun
@@ -119,10 +119,35 @@ class TextTable:
 
 
 def read_table(
-    path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
+    dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> TextTable:
     """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
-    run = PieceRun(table_pieces(path, dialect, keys, clock, wanted))
+    table = None if wanted is None or wanted.worded else _plain_table(dialect, keys)
+    table = table or _joined_blocks(dialect, keys, clock, wanted)
+    if clock is not None and wanted is not None:
+        _set_clock(dialect, table, clock, wanted)
+    return table
+
+
+def _plain_table(dialect: Dialect, keys: Collection[str]) -> TextTable | None:
+    """Return a small table that has only numbers in plain rows, read at once; None if it may have anything else."""
+    text, names = dialect.text, dialect.names
+    if dialect.stamped or text.padding or text.content is None or not 0 < len(text.content) <= BLOCK_BYTES:
+        return None
+    rows, columns = (
+        text.content[text.mark + dialect.offset : text.size],
+        [i for i, name in enumerate(names) if name in keys],
+    )
+    plain = plain_rows(dialect, columns, (), rows, ended=True) if rows.endswith(b"\n") and columns else None
+    if plain is None:
+        return None
+    values = {names[column]: plain[1][column] for column in columns}
+    return TextTable(values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))])
+
+
+def _joined_blocks(dialect: Dialect, keys: Collection[str], clock: str | None, wanted: ChannelMap | None) -> TextTable:
+    """Return the columns of a table that is read block by block."""
+    run = PieceRun(table_pieces(dialect, keys, clock, wanted))
     first, *more = islice(pieces := iter(run), 2)
     values, count = first.values, first.rows
     if more:  # in one array per column: half the memory of a list of pieces
@@ -134,14 +159,11 @@ def read_table(
             count += piece.rows
     table = run.source
     table.values = {key: values[key][:count] for key in table.values}
-    if clock is not None and wanted is not None:
-        _set_clock(path, table, clock, wanted)
-        _set_exact(dialect, table, clock, wanted.time.factor)
     return table
 
 
 def table_pieces(
-    path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
+    dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> Generator[Piece, None, TextTable]:
     """Yield those of the columns `keys` that have numbers, block by block; return the table without its rows.
 
@@ -151,7 +173,7 @@ def table_pieces(
     names, worded = dialect.names, () if wanted is None else wanted.worded
     categories = {names.index(key): Categories() for name in worded if (key := column_key(name, names))}
     columns = [i for i, name in enumerate(names) if name in keys]
-    requested = _requested(path, dialect, columns, clock, survey=wanted is None)
+    requested = _requested(dialect, columns, clock, survey=wanted is None)
     reader = RowReader(dialect, replace(requested, categories=categories), survey=wanted is None)
     stamped = StampColumns(dialect, requested)
     rounded: Counter[str] = Counter()
@@ -168,7 +190,7 @@ def table_pieces(
     findings += stamped.findings()
     remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
     if wanted is None and not remaining:
-        raise RecordingError(f"{path}: no column has only numbers", str(findings[0]) if findings else "")
+        raise RecordingError("no column has only numbers", str(findings[0]) if findings else "")
     for key in names:
         findings += rounding_finding(key, rounded[key]) if key in remaining else []
     return TextTable(
@@ -181,9 +203,7 @@ def table_pieces(
     )
 
 
-def _requested(
-    path: Path, dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool
-) -> RequestedColumns:
+def _requested(dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool) -> RequestedColumns:
     """Return these columns by kind, with a finding on those that a survey leaves out.
 
     Raises RecordingError if their stamps can be read in two ways.
@@ -202,7 +222,7 @@ def _requested(
         elif stamped.layout is None:
             timed = stamped.layouts[0].timed or _beside(dialect, column, dated=False) is not None
             if not survey or timed:
-                raise _two_readings(path, dialect, column)
+                raise _two_readings(dialect, column)
             left_out[column] = Finding("ambiguous_times", "", {"column": name, "readings": stamped.readings})
         else:
             stamps.append(column)
@@ -212,7 +232,7 @@ def _requested(
         days = _beside(dialect, column, dated=True) if layout.timed and not layout.dated else None
         if days is not None:
             if dialect.stamped[days].layout is None:
-                raise _two_readings(path, dialect, days)
+                raise _two_readings(dialect, days)
             dates[column] = days
     return RequestedColumns(numeric, sorted({*stamps, *dates.values()}), dates, left_out)
 
@@ -226,19 +246,22 @@ def _beside(dialect: Dialect, column: int, dated: bool) -> int | None:
     return None
 
 
-def _two_readings(path: Path, dialect: Dialect, column: int) -> RecordingError:
+def _two_readings(dialect: Dialect, column: int) -> RecordingError:
     stamped = dialect.stamped[column]
     return RecordingError(
-        f"{path}: column '{dialect.names[column]}': {stamped.readings}", "pin time_format in [csv] of the machine file"
+        f"column '{dialect.names[column]}': {stamped.readings}", "pin time_format in [csv] of the machine file"
     )
 
 
-def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> None:
-    """Check the machine file's unit against the clock's column, and convert days of Excel to seconds."""
+def _set_clock(dialect: Dialect, table: TextTable, clock: str, wanted: ChannelMap) -> None:
+    """Check the machine file's unit against the clock's column, and convert days of Excel to seconds.
+
+    It is read again if its stamps have more digits than float64 can represent.
+    """
     if clock in table.stamped:
         if wanted.time.factor != 1.0:
             raise RecordingError(
-                f"{path}: column '{clock}' has dates or times of day, which are read in s",
+                f"column '{clock}' has dates or times of day, which are read in s",
                 'write unit = "s" in [channels] time',
             )
         return
@@ -253,16 +276,9 @@ def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> 
     readings = "" if wanted.pins.time_format else two_readings(values, wanted.time.factor)
     if readings:
         raise RecordingError(
-            f"{path}: column '{clock}' {readings}",
-            'pin time_format = "excel" or "number" in [csv] of the machine file',
+            f"column '{clock}' {readings}", 'pin time_format = "excel" or "number" in [csv] of the machine file'
         )
-
-
-def _set_exact(dialect: Dialect, table: TextTable, clock: str, factor: float) -> None:
-    """Read the clock again if its stamps have more digits than float64 can represent."""
-    if clock in table.stamped or table.origin:
-        return
-    exact = exact_differences(dialect, dialect.names.index(clock), table.values[clock], factor)
+    exact = exact_differences(dialect, dialect.names.index(clock), values, wanted.time.factor)
     if exact is not None:
         table.values[clock], table.origin = exact
         table.findings = [

@@ -23,13 +23,13 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import counted
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, split_line
-from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
+from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text, open_table
 from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.csv_dialect.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
 from cdtool.formats.exports.timed_text import (
@@ -39,7 +39,6 @@ from cdtool.formats.exports.timed_text import (
     details_of,
     dialect_of_rows,
     number_in_head,
-    opened,
 )
 from cdtool.formats.source import Source
 
@@ -84,7 +83,8 @@ class TwincatScope:
         pins = TablePins() if wanted is None else wanted.pins
         if pins.header is not None or pins.skip_lines > 0:
             return Csv().columns(path, wanted)
-        return _read_export(path, pins).source(path, self.name, wanted)
+        with naming(path):
+            return _read_export(path, pins).source(path, self.name, wanted)
 
 
 @dataclass(frozen=True)
@@ -122,10 +122,10 @@ class _Head:
 
 
 def _read_export(path: Path, pins: TablePins) -> TimedText:
-    text, lines = opened(path, pins, _MOST_HEAD)
-    head, findings = _read_head(path, text, lines), list[Finding]()
+    text, stream = open_table(path, pins.encoding, _MOST_HEAD)
+    head, findings = _read_head(text, stream.split(text.line_end)), list[Finding]()
     if head.separator == " ":
-        _refuse_empty_cells(path, text, head)
+        _refuse_empty_cells(text, head)
         head = _between_blanks(head, findings)
     # A line in which a cell contains the separator is wider than the others: it would be read in the wrong columns.
     usual = Counter(map(len, head.of_channels.values())).most_common(1)[0][0]
@@ -133,7 +133,7 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     clocks, width = head.clocks, len(head.names)
     if not clocks or clocks[0] != 0 or len(head.rows[0]) <= width - len(clocks) or len(clocks) == width:
         raise RecordingError(
-            f"{path}: line {head.line} has {counted(len(head.rows[0]), 'cell')} for {counted(width, 'name')}: "
+            f"line {head.line} has {counted(len(head.rows[0]), 'cell')} for {counted(width, 'name')}: "
             "no columns of times?",
             "export it again with 'Timelines' set to 'For each sampletime' or 'All'",
         )
@@ -164,10 +164,10 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, tuple(findings))
 
 
-def _read_head(path: Path, text: Text, raw: Sequence[bytes]) -> _Head:
+def _read_head(text: Text, raw: Sequence[bytes]) -> _Head:
     separator = scope_separator([text.decode(line).rstrip("\r") for line in raw[:_MOST_FILE_LINES]])
     if separator is None:
-        raise RecordingError(f"{path}: is not an export of TwinCAT Scope", "see cdtool list formats")
+        raise RecordingError("is not an export of TwinCAT Scope", "see cdtool list formats")
     of_file: dict[str, list[str]] = {}
     of_channels: dict[str, list[str]] = {}
     start = 0
@@ -184,21 +184,20 @@ def _read_head(path: Path, text: Text, raw: Sequence[bytes]) -> _Head:
             of_channels[cells[0]] = cells
         start += len(line) + 1
     if start >= _MOST_HEAD - 4:
-        raise RecordingError(f"{path}: has no row of numbers in its first {_MOST_HEAD >> 20} MiB", "export it again")
+        raise RecordingError(f"has no row of numbers in its first {_MOST_HEAD >> 20} MiB", "export it again")
     if not of_channels:
         raise RecordingError(
-            f"{path}: has no line with the names of channels",
-            "export it again with a header that has at least the names",
+            "has no line with the names of channels", "export it again with a header that has at least the names"
         )
-    raise RecordingError(f"{path}: has no row of numbers", "was the export stopped, or the copy cut off?")
+    raise RecordingError("has no row of numbers", "was the export stopped, or the copy cut off?")
 
 
-def _refuse_empty_cells(path: Path, text: Text, head: _Head) -> None:
+def _refuse_empty_cells(text: Text, head: _Head) -> None:
     """Raise RecordingError if a table that is separated by blanks has empty cells, which are blanks too."""
     for block in text.blocks(head.start):
         if block[:1] == b" " or b"  " in block or text.line_end + b" " in block:
             raise RecordingError(
-                f"{path}: is separated by blanks and has empty cells, which are blanks too",
+                "is separated by blanks and has empty cells, which are blanks too",
                 "export it again with tabs or semicolons",
             )
 

@@ -44,7 +44,7 @@ def read_variables(path: Path) -> Variables:
     """Return the variables of a file; raises RecordingError, with the byte, if it is cut off or damaged."""
     content = path.read_bytes()
     if not content.startswith(MAGIC) or len(content) < _HEADER:
-        raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
+        raise RecordingError("is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
     reader, variables = _Reader(path, ">" if content[126:128] == b"MI" else "<"), dict[str, Value]()
     reader.check_unpacked(memoryview(content))
     at = _HEADER
@@ -58,9 +58,7 @@ def read_variables(path: Path) -> Variables:
                 if name:  # the objects of the file are stored in an array without a name
                     variables[_unique(name, variables)] = value
         except (ValueError, struct.error, zlib.error, OverflowError) as fault:
-            raise RecordingError(
-                f"{path}: damaged at byte {at}: {fault}", "copy the file again or save it again"
-            ) from fault
+            raise RecordingError(f"damaged at byte {at}: {fault}", "copy the file again or save it again") from fault
         at = end
     return variables
 
@@ -70,7 +68,7 @@ class _Reader:
 
     def __init__(self, path: Path, order: str) -> None:
         self._path, self.order = path, order
-        self._count = ValueCount(path)
+        self._count = ValueCount()
 
     def element(self, content: memoryview, at: int) -> tuple[int, memoryview, int]:
         """Return kind, content and end of the element at a byte; raises ValueError if it extends beyond `content`."""

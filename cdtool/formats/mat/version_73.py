@@ -40,7 +40,7 @@ def read_variables(path: Path, h5py: Any, file: Any) -> Variables:
 class _Reader:
     def __init__(self, path: Path, h5py: Any, file: Any) -> None:
         self._path, self._h5py, self._file = path, h5py, file
-        self._count = ValueCount(path)
+        self._count = ValueCount()
 
     def member(self, group: Any, name: str, level: int) -> Value:
         """Return a member of a group; links are not followed, as they may form a cycle or point to another file."""
