@@ -23,6 +23,7 @@ from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.scoring.gathering import Gathering
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
+from cdtool.commands.scoring.pieces import PieceScoring
 from cdtool.commands.scoring.scoring import Detections, ScoredLog, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.execution.workers import Progress, Workers
@@ -126,7 +127,7 @@ def _run(
         if listed_only:
             work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
     scoring = _TriggerScoring(setup, given.path, said, clock, listed_only)
-    gathered.score(lambda: scoring, work, workers, progress)
+    gathered.score(PieceScoring(setup, scoring), work, workers, progress)
     if runs:
         gathered.skipped += _without_run(said, known, gathered.scored)
     gathered.findings += unchecked(setup.limits, names, str(setup.path))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,7 @@ from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.commands.scoring.counting import Exposure, SweepRows
 from cdtool.commands.scoring.force_rows import point_rows
 from cdtool.commands.scoring.log_outcome import LogOutcome, OfOperation, slowest_of, striking_of
-from cdtool.commands.scoring.pieces import Piece, PieceOutcome, PieceScoring, ScoreLog, lost
-from cdtool.commands.scoring.store.stored_outcomes import Planned, StoredOutcomes, same_content
+from cdtool.commands.scoring.pieces import Piece, PieceOutcome, lost, same_content
 from cdtool.execution.store.sources import SourceFile
 from cdtool.execution.workers import Progress, Workers, in_order
 from cdtool.results.results import (
@@ -41,24 +40,13 @@ Logs = Sequence[tuple[str, Path]]
 
 @dataclass
 class _Place:
-    """A log, its files, and the number of its operations so far; its traces are kept in the store if there is one."""
+    """A log, its files, and the number of its operations so far."""
 
     number: int
     group: str
     path: Path
     sources: tuple[SourceFile, ...] | None = None
-    stored: StoredOutcomes | None = None
     operations: int = 0
-
-    @property
-    def log(self) -> tuple[str, Path]:
-        """Return the group and the path of the log."""
-        return self.group, self.path
-
-    def keep(self, operation: int, trace: Trace) -> None:
-        """Store the trace of an operation."""
-        if self.stored:
-            self.stored.add_trace(self.log, self.sources, operation, trace)
 
 
 class Gathering:
@@ -102,96 +90,60 @@ class Gathering:
             sum(len(setup.impacts[group].logs) for group in setup.groups),
             frozenset(item.group for item in setup.conditions),
         )
+        # Logs of which nothing was computed.
+        self.stored = 0
         # Time that all logs took [s].
         self.reading = self.detecting = 0.0
 
     def score(
         self,
-        scoring: Callable[[], ScoreLog],
+        scoring: Callable[[Piece], PieceOutcome],
         logs: Logs,
         workers: Workers | None = None,
         progress: Progress | None = None,
-        stored: StoredOutcomes | None = None,
-        plan: Sequence[Planned] = (),
     ) -> None:
-        """Score the logs that are not `stored`, and add the rows of all; one that ends its workers is left out.
+        """Score the logs, and add the rows of all; one that ends its workers is left out.
 
-        `plan` is what is stored of each log; `scoring` is called if one has to be scored. Raises ConfigurationError if
-        the same log, under any name, was learned from or given twice.
+        Raises ConfigurationError if the same log, under any name, was learned from or given twice.
         """
-        workers = workers or Workers()
-        plan = plan or [Planned()] * len(logs)
-        missing = [log for log, planned in enumerate(plan) if not planned.is_known]
-
-        @cache
-        def work() -> PieceScoring:
-            return PieceScoring(self.setup, scoring(), with_sources=stored is not None)
-
-        pieces = self._pieces(missing, logs, plan, stored)
-        of_lost = partial(lost, self.setup)
-        computed: Iterator[PieceOutcome] = iter(())
-        if missing:
-            computed = in_order(work(), pieces, len(missing), workers, of_lost=of_lost)
-        for log, ((group, path), planned) in enumerate(zip(logs, plan, strict=True)):
-            made = None if planned.is_known else next(computed)
-            outcomes = self._complete(group, path, planned, made, stored)
-            if outcomes is None:  # what was stored of it is gone
-                planned, made = Planned(), work()(Piece(log, group, path, self._choice))
-                outcomes = self._complete(group, path, planned, made, stored)
-            assert outcomes is not None, "all of it was computed"
-            self._place = _Place(log, group, path, planned.sources if made is None else made.sources, stored)
-            for outcome in outcomes:
+        workers, of_lost = workers or Workers(), partial(lost, self.setup)
+        made = in_order(scoring, self._pieces(logs), len(logs), workers, progress=progress, of_lost=of_lost)
+        for log, ((group, path), piece) in enumerate(zip(logs, made, strict=True)):
+            self.stored += piece.is_stored
+            self._place = _Place(log, group, path, piece.sources)
+            for outcome in piece.outcomes:
                 self._add(log, group, outcome)
-            if progress:
-                progress(log + 1, len(logs))
-        for _ in computed:  # their processes end
-            pass
-        self._make_absent_traces(work, workers)
+        self._make_absent_traces(scoring, workers)
 
-    @staticmethod
-    def _complete(
-        group: str, path: Path, planned: Planned, made: PieceOutcome | None, stored: StoredOutcomes | None
-    ) -> Sequence[LogOutcome] | None:
-        """Return the outcomes of a log with what is stored of them; None if that is gone meanwhile."""
-        if stored is None:
-            return made.outcomes if made else None
-        return stored.known(path, planned) if made is None else stored.add(group, path, planned, made)
-
-    def _pieces(
-        self, missing: Sequence[int], logs: Logs, plan: Sequence[Planned], stored: StoredOutcomes | None
-    ) -> Iterator[Piece]:
-        # Known now: more traces are made than are kept at the logs' turn, never fewer. Those of a batch share a choice.
+    def _pieces(self, logs: Logs) -> Iterator[Piece]:
+        # Known now: more traces are made than are kept at the logs' turn, never fewer.
         choice = self._choice.copy()
-        for log in missing:
+        for log, (group, path) in enumerate(logs):
             if choice.offered != self._choice.offered:
                 choice = self._choice.copy()
-            group, path = logs[log]
-            yield stored.piece(log, group, path, plan[log], choice) if stored else Piece(log, group, path, choice)
+            yield Piece(log, group, path, choice)
 
-    def _make_absent_traces(self, work: Callable[[], PieceScoring], workers: Workers) -> None:
+    def _make_absent_traces(self, scoring: Callable[[Piece], PieceOutcome], workers: Workers) -> None:
         """Make the traces that are kept and were not made when the logs were scored, as of logs that were stored."""
         absent: dict[int, list[tuple[int, _Place, int]]] = {}
         for number in self._choice.kept():
             if number not in self._traces:
                 place, operation = self._places[number]
-                trace = place.stored.trace(place.log, place.sources, operation) if place.stored else None
-                if trace is not None:
-                    self._traces[number] = trace
-                else:
-                    absent.setdefault(place.number, []).append((number, place, operation))
+                absent.setdefault(place.number, []).append((number, place, operation))
         wanted = list(absent.values())
-        if not wanted:
-            return
-        pieces = (Piece(log[0][1].number, *log[0][1].log, operations=tuple(item[2] for item in log)) for log in wanted)
-        made = in_order(work(), pieces, len(wanted), workers, of_lost=partial(lost, self.setup))
-        for log, outcome in zip(wanted, made, strict=True):
+        pieces = (
+            Piece(place.number, place.group, place.path, operations=tuple(operation for _, _, operation in of_log))
+            for of_log in wanted
+            for _, place, _ in of_log[:1]
+        )
+        made = in_order(scoring, pieces, len(wanted), workers, of_lost=partial(lost, self.setup))
+        for of_log, outcome in zip(wanted, made, strict=True):
             traces = [trace for of_run in outcome.outcomes for trace in of_run.traces]
-            for number, place, operation in log:
+            for number, place, operation in of_log:
                 trace = traces[operation] if operation < len(traces) else None
                 # The log may have changed since its rows were stored.
                 if trace is not None and same_content(outcome.sources, place.sources):
                     self._traces[number] = trace
-                    place.keep(operation, trace)
 
     def _add(self, log: int, group: str, outcome: LogOutcome) -> None:
         self.reading += outcome.reading
@@ -233,7 +185,6 @@ class Gathering:
         self._places[number] = self._place, operation
         if trace is not None:
             self._traces[number] = trace
-            self._place.keep(operation, trace)
 
     @property
     def traces(self) -> tuple[Trace, ...]:
