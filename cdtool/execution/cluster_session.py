@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
+from multiprocessing import active_children, resource_tracker
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -264,6 +264,7 @@ def _started(jobs: int, attempts: int = 2) -> Any:
     import distributed
 
     start: Any = distributed.LocalCluster
+    before = set(active_children())
     try:
         return start(
             n_workers=jobs,
@@ -275,8 +276,11 @@ def _started(jobs: int, attempts: int = 2) -> Any:
             silence_logs=logging.CRITICAL + 1,
             # Dask calls its function dask_setup.
             preload=["cdtool.execution.starting"],
+            death_timeout=_JOINED_WITHIN,
         )
-    except RuntimeError as fault:
+    except (RuntimeError, TimeoutError, AssertionError) as fault:  # the last one by a nanny whose process is stopped
+        for process in set(active_children()) - before:
+            process.kill()
         if attempts > 1:
             return _started(jobs, attempts - 1)
         raise WorkerError(f"--cluster {LOCAL}: a worker ended while it was started", "run it again") from fault

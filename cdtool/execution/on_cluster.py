@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+from cdtool.base.remote.remote_path import location
 from cdtool.execution.environment import environment
 from cdtool.execution.in_worker import attempt, keep_freed_memory, sendable
 
@@ -47,7 +48,7 @@ class Sight:
     @property
     def is_same(self) -> bool:
         """Whether it is seen so in this process."""
-        path = Path(self.path)
+        path = location(self.path)
         try:
             return path.is_dir() if self.size is None else path.stat().st_size == self.size
         except OSError:

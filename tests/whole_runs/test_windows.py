@@ -17,8 +17,6 @@ from cdtool.commands.console import streams
 from cdtool.commands.judging.runs import shown_path
 from cdtool.execution import processes
 from cdtool.execution.in_worker import Done
-from cdtool.execution.store.entry import Entry
-from cdtool.execution.store.journal import Journal, left_behind
 from cdtool.formats.mcap import file_bytes
 from cdtool.report.plots.figures import slug
 from tests.command import cdtool
@@ -109,19 +107,6 @@ def test_an_existing_folder_is_replaced_without_the_mount_points_that_python_311
         with replaced_folder(tmp_path / "report", lambda _: True) as part:
             write_text(part / "a.md", text)
     assert (tmp_path / "report" / "a.md").read_text() == "new"
-
-
-def test_a_journal_is_removed_at_its_end_and_when_it_is_taken_over(on_windows, tmp_path):
-    entry = Entry("ab" * 32, "detector", "stiff/1.csv", "momentum", "[1.5]")
-    own = Journal(tmp_path)
-    own.add([entry])
-    own.close()
-    assert list(tmp_path.iterdir()) == []
-    killed = Journal(tmp_path)
-    killed.add([entry])
-    killed._file.close()
-    assert [entries for _, entries in left_behind(tmp_path)] == [[entry]]
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_commands_write_replace_and_reuse_their_files(on_windows, tmp_path):

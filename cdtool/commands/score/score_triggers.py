@@ -23,6 +23,7 @@ from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.scoring.gathering import recordings_in, results_before, results_of
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
+from cdtool.commands.scoring.pieces import PieceScoring
 from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import Detections, ScoredLog, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
@@ -129,7 +130,7 @@ def _run(
     findings += unchecked(setup.limits, names, str(setup.path))
     before = results_before(setup, _provenance(setup, given, clock), names, findings=findings)
     scoring = _TriggerScoring(setup, given.path, said, clock, listed_only)
-    scored = ScoredLogs(setup, lambda: scoring, work, workers, progress)
+    scored = ScoredLogs(setup, PieceScoring(setup, scoring), work, workers, progress)
     results = results_of(setup, before, scored, {}, {})
     without = _without_run(said, known, results) if runs else []
     results = replace(results, skipped=(*results.skipped, *without), findings=(*results.findings, *scored.left_out))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -26,17 +24,20 @@ from cdtool.commands.scoring.benchmark_file import (
     with_detectors,
     with_only,
 )
-from cdtool.commands.scoring.benchmark_result import BenchmarkResult
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult, StoreReport
 from cdtool.commands.scoring.gathering import recordings_in, results_before, results_of
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
+from cdtool.commands.scoring.pieces import PieceScoring
 from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import ScoredLog, detect_with, score_runs
-from cdtool.commands.scoring.store.stored_learned import StoreOfRun
+from cdtool.commands.scoring.store.determinants import Determinants
+from cdtool.commands.scoring.store.stored_learned import learned_with_store
+from cdtool.commands.scoring.store.stored_scoring import StoredScoring
 from cdtool.detectors.base import Detector
-from cdtool.execution.store.use import StoreUse
+from cdtool.execution.store.store import Store
 from cdtool.execution.workers import Progress, Workers
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.plausible import LearnedRanges
@@ -56,7 +57,7 @@ def benchmark(
     false_alarm_budget: str | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
-    store: StoreUse | None = None,
+    store: Store | None = None,
     progress: Progress | None = None,
 ) -> BenchmarkResult:
     """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
@@ -75,7 +76,7 @@ def benchmark(
     workers : Workers, optional
         In place of `jobs`: also the longest time for a log, and how often one that ended its worker is tried again;
         or a Dask cluster.
-    store : StoreUse, optional
+    store : Store, optional
         Where outcomes are kept: a log is computed only if something that determines its outcome has changed.
     progress : callable, optional
         Called after each log with the number done and the total.
@@ -107,13 +108,11 @@ def benchmark(
     workers = workers or Workers(jobs)
     work = BenchmarkWork.of(file, detectors, false_alarm_budget)
     work = replace(work, setup=work.setup.with_made(workers, progress))
-    with ExitStack() as stack:
-        folder = stack.enter_context(store.opened()) if store else None
-        logs = [path for item in work.setup.impacts.values() for path in item.logs]
-        stack.enter_context(workers.ready(to_be_seen([*work.setup.learn, *logs])))
-        if store is None or folder is None:
-            return _run(work, workers, None, progress)
-        return _run(work, workers, StoreOfRun(folder, store, workers), progress)
+    if store is not None:
+        store.create()
+    logs = [path for item in work.setup.impacts.values() for path in item.logs]
+    with workers.ready([*to_be_seen([*work.setup.learn, *logs]), *([store.mark] if store else [])]):
+        return _run(work, workers, store, progress)
 
 
 @dataclass(frozen=True)
@@ -137,11 +136,11 @@ class BenchmarkWork:
         return cls(setup, limits, list(detectors) == ["all"])
 
 
-def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> BenchmarkResult:
+def _run(work: BenchmarkWork, workers: Workers, store: Store | None, progress: Progress | None) -> BenchmarkResult:
     begin = perf_counter()
     setup, measured = with_synchronisation(work.setup, workers)
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
-    learned = store.learned(teaching) if store else teaching.learned
+    learned, runs = learned_with_store(store, teaching) if store else (teaching.learned, {})
     setup = with_only(setup, learned.about.detectors)
     seconds = perf_counter() - begin
     factors = sweep_factors(setup, learned.thresholds)
@@ -160,9 +159,9 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
         (*measured, *learned.about.findings, *of_limits),
     )
     logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-    stored = store.outcomes(setup, learned, factors) if store else None
-    scoring = partial(_scoring, setup, learned, teaching, factors)
-    scored = ScoredLogs(setup, scoring, logs, workers, progress, stored)
+    scoring = scoring_of(setup, learned, teaching, factors)
+    with_store = StoredScoring(scoring, store, Determinants(setup, learned, runs, factors)) if store else None
+    scored = ScoredLogs(setup, with_store or scoring, logs, workers, progress)
     results = results_of(setup, before, scored, factors, learned.about.sources)
     results = replace(
         results,
@@ -170,10 +169,9 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
         skipped=(*results.skipped, *_labels_without_run(setup, results)),
         findings=(*results.findings, *scored.left_out),
     )
-    traces = scored.traces
-    report = stored.finish() if stored else None
+    report = StoreReport(len(logs) - scored.stored, scored.stored) if store else None
     times = {"reading": learned.seconds + scored.reading, "detecting": seconds - learned.seconds + scored.detecting}
-    return BenchmarkResult(evaluate(results, setup.limits), traces, setup.inputs, times, report)
+    return BenchmarkResult(evaluate(results, setup.limits), scored.traces, setup.inputs, times, report)
 
 
 @dataclass(frozen=True)
@@ -212,11 +210,11 @@ class _LogScoring:
         return NormalsWithout(self.runs, scored.recording.name, self.setup.rule)
 
 
-def _scoring(
+def scoring_of(
     setup: BenchmarkFile, learned: Learned, teaching: Teaching, factors: Mapping[str, FloatArray]
-) -> _LogScoring:
+) -> PieceScoring:
     """Return how a log is scored; the runs themselves are needed only for a log that is learned from, too."""
-    return _LogScoring(
+    score = _LogScoring(
         setup,
         tuple(setup.machine_file.detector(name) for name in setup.detectors),
         ThresholdsByLog(setup, learned.thresholds, teaching.pairs if setup.both else {}),
@@ -226,6 +224,7 @@ def _scoring(
         learned.normals,
         teaching.operations if setup.both else (),
     )
+    return PieceScoring(setup, score)
 
 
 def _labels_without_run(setup: BenchmarkFile, results: Results) -> list[Skipped]:
