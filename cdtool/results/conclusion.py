@@ -322,11 +322,8 @@ def _of_forces(checks: Sequence[ForceCheck]) -> Iterator[Statement]:
 
 def _force_reasons(checks: Sequence[ForceCheck], verdict: str, what: str) -> tuple[str, ...]:
     """Return a line for each group and profile with this verdict, and its first reason."""
-    parts: dict[Pair, list[ForceCheck]] = {}
-    for item in checks:
-        parts.setdefault((item.group, item.profile), []).append(item)
     lines = []
-    for (group, profile), items in parts.items():
+    for (group, profile), items in grouped(checks, "group", "profile").items():
         those = [item for item in items if item.verdict == verdict]
         if those and not those[0].name:
             lines.append(plain(f"force, {group}, {profile}: not assessable: {those[0].reason}"))
@@ -422,11 +419,8 @@ def _why_unassessed(results: Results, item: Summary, reasons: Mapping[Pair, Sequ
 
 def _reasons_of_contacts(results: Results) -> dict[Pair, Sequence[str]]:
     """Return the different reasons in the rows of the contacts, by detector and group."""
-    found: dict[Pair, dict[str, None]] = {}
-    for item in results.contacts:
-        if item.reason:
-            found.setdefault((item.detector, item.group), {})[item.reason] = None
-    return {pair: list(reasons) for pair, reasons in found.items()}
+    found = grouped([item for item in results.contacts if item.reason], "detector", "group")
+    return {pair: list(dict.fromkeys(item.reason for item in items if item.reason)) for pair, items in found.items()}
 
 
 def _reasons_in_words(results: Results, item: Summary, of_contacts: Mapping[Pair, Sequence[str]]) -> str:

@@ -13,7 +13,6 @@ from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
-from operator import attrgetter
 from sys import intern
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -99,14 +98,12 @@ def _plain(kind: type[Any]) -> Callable[[Any], Any]:
 
 
 def _word(known: tuple[Any, ...]) -> _Form:
-    words = {word: word for word in known}
-
     def typed(value: Any) -> Any:
         if type(value) is not str:
             raise _mistaken(value, "a text")
-        if value not in words:
+        if value not in known:
             raise ValueError(f" is '{value}', not one of {', '.join(known)}")
-        return words[value]
+        return intern(value)
 
     return _Form(None, typed)
 
@@ -119,8 +116,10 @@ def _either(inner: tuple[Any, ...]) -> _Form:
             return _Form(None, lambda value: value)
         raise TypeError(f"{known} have no common JSON form")
     encode, decode = _form(known[0])
-    optional = None if encode is None else lambda value: None if value is None else encode(value)
-    return _Form(optional, lambda value: None if value is None else decode(value))
+    return _Form(
+        encode and (lambda value: None if value is None else encode(value)),
+        lambda value: None if value is None else decode(value),
+    )
 
 
 def _sequence(inner: tuple[Any, ...]) -> _Form:
@@ -185,16 +184,13 @@ def _array(inner: tuple[Any, ...]) -> _Form:
 
 def _record(kind: type[Any]) -> _Form:
     hints = get_type_hints(kind, include_extras=True)
-    items = [item for item in fields(kind) if item.init]
-    names = tuple(item.name for item in items)
-    required = {item.name for item in items if item.default is MISSING and item.default_factory is MISSING}
-    forms = {name: _form(hints[name]) for name in names}
+    forms = {item.name: _form(hints[item.name]) for item in fields(kind)}
+    required = [item.name for item in fields(kind) if item.default is MISSING and item.default_factory is MISSING]
     encoders = [(name, form.plain) for name, form in forms.items() if form.plain]
     decoders = {name: form.typed for name, form in forms.items()}
-    read = attrgetter(*names) if len(names) > 1 else lambda value: (getattr(value, names[0]),)
 
     def encode(value: Any) -> dict[str, Any]:
-        values = dict(zip(names, read(value), strict=True))
+        values = {name: getattr(value, name) for name in forms}
         for name, one in encoders:
             values[name] = one(values[name])
         return values
@@ -205,7 +201,7 @@ def _record(kind: type[Any]) -> _Form:
         if values.keys() != decoders.keys():
             if unknown := values.keys() - decoders.keys():
                 raise ValueError(f" has an unknown field '{min(unknown)}'")
-            if missing := [name for name in names if name in required and name not in values]:
+            if missing := [name for name in required if name not in values]:
                 raise ValueError(f": {', '.join(missing)} missing")
         made = {}
         for name, value in values.items():

@@ -14,7 +14,7 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.base.files.bounded_loading import parse_own_json
-from cdtool.base.files.typed_json import decoded, encoded
+from cdtool.base.files.typed_json import plain, typed
 from cdtool.base.findings import Finding
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.runs import Runs, load_runs, shown_path
@@ -69,7 +69,7 @@ class Learned:
     def to_text(self, rule: Threshold) -> str:
         """Return it as JSON; `rule` is that of the thresholds."""
         values = {
-            "about": encoded(self.about, AboutLearning),
+            "about": plain(self.about),
             "thresholds": {
                 name: [fitted_to_dict(rule, item) for item in items] for name, items in self.thresholds.items()
             },
@@ -87,7 +87,7 @@ class Learned:
             values = parse_own_json(text)
             ranges = {name: PlausibleRanges.from_dict(item) for name, item in values["ranges_without"].items()}
             return cls(
-                decoded(values["about"], AboutLearning),
+                typed(AboutLearning, values["about"], "about"),
                 {
                     name: tuple(fitted_from_dict(rule, item) for item in items)
                     for name, items in values["thresholds"].items()

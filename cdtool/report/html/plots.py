@@ -20,7 +20,6 @@ from cdtool.report.number_text import number, spoken, with_interval
 from cdtool.report.plots.style import look_of
 from cdtool.report.table import Log
 from cdtool.report.table import shown as named
-from cdtool.report.tables.recordings import log_of, logs_of
 from cdtool.report.tables.results import part_of
 from cdtool.report.writers.base import Report
 from cdtool.results.results import ContactResult, ForceResult, Results, SweepResult, grouped
@@ -76,12 +75,11 @@ def css_colour(colour: str) -> str:
     return f"#{round(255.0 * float(colour)):02x}" + 2 * f"{round(255.0 * float(colour)):02x}"
 
 
-def traces_of(results: Results, traces: Sequence[Trace]) -> dict[Log, list[int]]:
+def traces_of(traces: Sequence[Trace]) -> dict[Log, list[int]]:
     """Return the numbers of the traces of each log: one per operation that was kept."""
-    logs = logs_of(results)
     numbers: dict[Log, list[int]] = {}
     for number_of, trace in enumerate(traces):
-        numbers.setdefault(log_of(trace.group, trace.recording, logs), []).append(number_of)
+        numbers.setdefault((trace.group, trace.log), []).append(number_of)
     return numbers
 
 
@@ -228,13 +226,12 @@ def _curve(points: Sequence[SweepResult]) -> dict[str, Any]:
 def _force(report: Report) -> list[dict[str, Any]]:
     """Return for each group with a force profile its limits, and which contacts of which traces have a verdict."""
     results = report.evaluated.results
-    logs = logs_of(results)
-    traced = {log_of(trace.group, trace.recording, logs) for trace in report.traces}
+    traced = {(trace.group, trace.log) for trace in report.traces}
     numbers = {(*log, item.onset_s): item.contact for item in results.contacts if (log := _log(item)) in traced}
     verdicts = {(*log, item.contact): item for item in results.forces if (log := _log(item)) in traced}
     curves: dict[str, list[dict[str, Any]]] = {}
     for i, trace in enumerate(report.traces):
-        log = log_of(trace.group, trace.recording, logs)
+        log = trace.group, trace.log
         for place, contact in enumerate(trace.contacts):
             verdict = verdicts.get((*log, numbers.get((*log, contact.start), 0)))
             if verdict is None or not len(trace.force):

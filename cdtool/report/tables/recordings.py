@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -28,7 +27,6 @@ from cdtool.report.tables.results import detector_cell, part_of
 from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results, grouped
 from cdtool.results.summary import later_ms
 
-_OPERATION = re.compile(r"#\d+\Z")
 _MOST_LISTED = 3
 _DIGEST = 12
 _FORCE_ORDER = ("fail", "not_assessable", "pass")
@@ -166,18 +164,6 @@ def reasons_tables(results: Results) -> list[Table]:
         tabulate("damaged", "Damaged but used", fields, alike(results.losses), "findings", (), most_rows(results)),
         tabulate("findings", "Warnings", fields, alike(results.warnings), "findings", (), most_rows(results)),
     ]
-
-
-def log_of(group: str, operation: str, logs: frozenset[Log]) -> Log:
-    """Return the log that an operation belongs to: its name, without the "#2" where it was cut into several."""
-    if (group, operation) in logs:
-        return group, operation
-    return group, _OPERATION.sub("", operation)
-
-
-def logs_of(results: Results) -> frozenset[Log]:
-    """Return every log that was scored."""
-    return frozenset((item.group, item.recording) for item in results.recordings)
 
 
 def _outcomes(results: Results) -> dict[tuple[str, str, str], _Outcome]:

@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING
 from cdtool.report.table import Cell, Column, Fields, Log, Table, empty_cell, name_cell, number_cell, shown, tabulate
-from cdtool.report.tables.recordings import log_of, logs_of
 from cdtool.report.tables.results import detector_cell
 from cdtool.results.results import ContactResult, FalseAlarmResult, ForceResult, Results, grouped
 
@@ -56,7 +55,7 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
     results : Results
         The results of a benchmark.
     traced : collection of (str, str)
-        Group and name of the recordings, and of their operations, with a trace.
+        Group and name of the recordings with a trace.
 
     Returns
     -------
@@ -69,15 +68,13 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
     --------
     `cdtool.benchmark` returns the results.
     """
-    logs = logs_of(results)
-    wanted = dict.fromkeys(log_of(*log, logs) for log in traced)
     cases: list[_Case] = []
     counts = []
-    for words, made, total in _kinds(results, {**wanted, **dict.fromkeys(traced)}):
+    for words, made, total in _kinds(results, traced):
         cases += made
         counts += [f"{len(made)} of {total} {words}"] if total else []
     listed = {case.log for case in cases}
-    cases += _examples(results, [log for log in wanted if log not in listed])
+    cases += _examples(results, [log for log in traced if log not in listed])
     fields: Fields[_Case] = (
         (Column("recording"), lambda item: name_cell(item.log[1])),
         (Column("group", choice=True), lambda item: name_cell(item.log[0])),

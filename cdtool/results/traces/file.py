@@ -9,6 +9,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -27,6 +28,7 @@ from cdtool.results.traces.trace import ContactOutcome, Panel, StatisticCurve, T
 
 SCHEMA_VERSION = 3
 NO_LIMIT = 1_000_000_000
+_OPERATION = re.compile(r"(?<=#)\d+\Z")
 # The name of the file in a results.parquet.
 TRACES_IN_FOLDER = "results.traces.json.gz"
 
@@ -202,6 +204,7 @@ def trace_values(trace: Trace) -> dict[str, Any]:
     time_step = max(_TIME_STEP, 10.0 ** (math.floor(math.log10(max(trace.end - trace.start, 1.0))) - 8))
     return {
         "recording": trace.recording,
+        "operation": trace.operation,
         "group": trace.group,
         "start": trace.start,
         "end": trace.end,
@@ -239,8 +242,9 @@ def _panel_values(panel: Panel, start: float, time_step: float) -> dict[str, Any
 
 
 def _trace(values: dict[str, Any]) -> Trace:
+    recording = str(values["recording"])
     return Trace(
-        recording=str(values["recording"]),
+        recording=recording,
         group=str(values["group"]),
         start=float(values["start"]),
         end=float(values["end"]),
@@ -252,6 +256,8 @@ def _trace(values: dict[str, Any]) -> Trace:
         panels=tuple(_panel(item) for item in values["panels"]),
         joints=int(values["joints"]),
         chosen=str(values["chosen"]),
+        # In files of earlier versions only the name has it.
+        operation=int(values.get("operation", (_OPERATION.search(recording) or "0")[0])),
     )
 
 

@@ -102,7 +102,8 @@ def free_trace(named: Naming, group: str) -> Trace:
         _panel(named, "quick", None, (1.0,)),
         _panel(named, "slow", None, (), verdict="not_assessable", reason=named("start-up 100 %")),
     )
-    return Trace(f"{named('free.csv')}#2", group, 0.0, 4.0, (), -1, (0.0, 4.0), np.empty(0), np.empty(0), panels)
+    name, nothing = f"{named('free.csv')}#2", np.empty(0)
+    return Trace(name, group, 0.0, 4.0, (), -1, (0.0, 4.0), nothing, nothing, panels, operation=2)
 
 
 def _panel(
