@@ -75,7 +75,7 @@ class NothingValidError(SignatureError):
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Put the file at the beginning of an error that is raised inside, unless it is there already.
+    """Put the file at the beginning of an error that is raised inside, unless it begins with it.
 
     What raises an error knows the row or key and the value; only what opens a file needs to know its path.
     """

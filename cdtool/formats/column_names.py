@@ -111,10 +111,11 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
 
 def _resolved(channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
     """Return the map with the file's own column names, and the ground truth that is missing from the file."""
+    asked = [(each, (each.described,) if channels.topics else each.columns) for each in channels.sources]
     absent = [
         source
-        for source in channels.sources
-        if source.channel in GROUND_TRUTH and any(is_absent(column, names) for column in _requested(source, channels))
+        for source, columns in asked
+        if source.channel in GROUND_TRUTH and any(is_absent(column, names) for column in columns)
     ]
     time = channels.time
     if time.column is not None:
@@ -122,19 +123,11 @@ def _resolved(channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, l
     if time.nanoseconds is not None:
         time = replace(time, nanoseconds_key=find_key("time", time.nanoseconds, names))
     sources = tuple(
-        replace(
-            source,
-            keys=tuple(find_key(source.channel, column, names) for column in _requested(source, channels)),
-        )
-        for source in channels.sources
+        replace(source, keys=tuple(find_key(source.channel, column, names) for column in columns))
+        for source, columns in asked
         if source not in absent
     )
     return replace(channels, time=time, sources=sources), absent
-
-
-def _requested(source: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
-    """Return the columns of a channel by their names in the machine file."""
-    return (source.described,) if channels.topics else source.columns
 
 
 def _similar(source: ChannelSource, names: Sequence[str]) -> str:

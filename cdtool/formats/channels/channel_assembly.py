@@ -20,7 +20,7 @@ from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.remote.remote_path import is_read_by_ranges, version_of
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
-from cdtool.formats.channels.header_units import check_clock_unit, guessed_units, time_unit_findings, unit_findings
+from cdtool.formats.channels.header_units import clock_unit_findings, guessed_units, unit_findings
 from cdtool.formats.source import Source
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.clock import CleanTime, clean_time, differentiate, epoch_start, previous_value
@@ -124,8 +124,7 @@ def _table_clock(source: Source, channels: ChannelMap, findings: list[Finding]) 
         times = _as_series(clean.time)
     else:
         column = source.columns[time.key]
-        findings += check_clock_unit(time, column, origin)
-        findings += time_unit_findings(time, column, origin)
+        findings += clock_unit_findings(time, column, origin)
         start = epoch_start(column.values, time.factor)
         origin += start * time.factor
         clean = _clean((column.values - start) * time.factor, "time", source.first_row, counted=column.values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -43,6 +43,8 @@ from cdtool.recordings.recording import Recording, Series
 
 # The parts of a log in a folder; the first kind that is there is read.
 _PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
+# What a part of a log is that cannot be read.
+Unread = Literal["error", "loss"]
 # Opens a file of a format, for some or all of its columns.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
 
@@ -166,16 +168,32 @@ def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRange
     return read_as_logged(path, machine_file).on_load_side(machine_file.machine, ranges)
 
 
-def read_as_logged(
-    path: Path, machine_file: MachineFile, unread: Literal["error", "loss"] = "error"
-) -> LoggedRecording:
+def read_as_logged(path: Path, machine_file: MachineFile, unread: Unread = "error") -> LoggedRecording:
     """Return one log, a file or a folder of parts, as logged; raises RecordingError or ConfigurationError.
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
-    logged = _read_log_itself(path, machine_file, unread)
-    if not (machine_file.columns.beside or machine_file.topics.beside):
-        return logged
+    paths, lost = _parts_of(path, unread) if path.is_dir() else ([path], [])
+    parts: list[Recording] = []
+    headers: list[Source] = []
+    factors: dict[str, tuple[float, ...]] = {}
+    for part in paths:
+        source, channels = mapped_source(part, machine_file)
+        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
+        with naming(part):
+            parts.append(assemble_recording(source, channels, machine_file.machine))
+        headers.append(replace(source, columns={}))
+    name = path.name if path.is_dir() else log_stem(path)
+    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
+    if path.is_dir():
+        whole = replace(whole, source=str(path), findings=(*lost, *whole.findings))
+    if machine_file.columns.beside or machine_file.topics.beside:
+        whole = _with_files_beside(whole, path, machine_file, unread)
+    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
+
+
+def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFile, unread: Unread) -> Recording:
+    """Return the recording of a log with the channels in files beside it."""
     by_topics = has_topics(choose_format(log_parts(path)[0]))
     channels = machine_file.topics if by_topics else machine_file.columns
 
@@ -185,35 +203,20 @@ def read_as_logged(
             topic, _, field = str(name).rpartition(" ")
             source = ChannelSource("trigger", topic=topic, field=field)
         only = replace(channels, sources=(source,), beside=())
-        return _read_log_itself(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
+        return read_as_logged(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
 
-    recording = logged.recording
-    recording = add_files_beside(recording, path, channels, machine_file.machine, mapped_source, read_trigger)
-    return replace(logged, recording=recording)
+    return add_files_beside(recording, path, channels, machine_file.machine, mapped_source, read_trigger)
 
 
-def _read_log_itself(path: Path, machine_file: MachineFile, unread: Literal["error", "loss"]) -> LoggedRecording:
-    """Return one log without the channels in files beside it; its parts are in the order of their times."""
-    paths, name, lost = [path], log_stem(path), list[Finding]()
-    if path.is_dir():
-        folder, name = LogFolder.of(path) if unread == "loss" else None, path.name
-        paths = log_parts(path) if folder is None else list(folder.filled)
-        lost = missing_part_findings(path, paths) if folder is None else list(folder.findings)
-    if not paths:
-        raise RecordingError(f"{path}: no part of the log contains a message", "was the recording stopped at once?")
-    parts: list[Recording] = []
-    headers: list[Source] = []
-    factors: dict[str, tuple[float, ...]] = {}
-    for each in paths:
-        source, channels = mapped_source(each, machine_file)
-        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
-        with naming(each):
-            parts.append(assemble_recording(source, channels, machine_file.machine))
-        headers.append(replace(source, columns={}))
-    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
-    if path.is_dir():
-        whole = replace(whole, source=str(path), findings=(*lost, *whole.findings))
-    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
+def _parts_of(folder: Path, unread: Unread) -> tuple[list[Path], Sequence[Finding]]:
+    """Return the files of a folder in the order of their times or names, and the losses; raises RecordingError."""
+    if unread == "error":
+        parts = log_parts(folder)
+        return parts, missing_part_findings(folder, parts)
+    log = LogFolder.of(folder)
+    if not log.filled:
+        raise RecordingError(f"{folder}: no part of the log contains a message", "was the recording stopped at once?")
+    return list(log.filled), log.findings
 
 
 @dataclass(frozen=True)

@@ -280,7 +280,7 @@ class _CutLog:
 
 
 def _by_id(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
-    """Cut a log by the ids in the last column of the map, which is no channel; raises RecordingError."""
+    """Cut a log by the ids in the last column of the map, beside the channels; raises RecordingError."""
     *others, last = channels.sources
     channels = replace(channels, sources=tuple(others))
     ids = source.columns[last.keys[0]]
