@@ -324,8 +324,22 @@ class Results:
 
 
 def grouped(rows: Sequence[Row], *names: str) -> dict[Any, list[Row]]:
-    """Return rows by the value of a field, or the values of several, in the order of their first rows.
+    """Return rows by the value of a field, or the values of several.
 
+    Parameters
+    ----------
+    rows : sequence
+        The rows.
+    *names : str
+        The fields.
+
+    Returns
+    -------
+    dict of object to list
+        The rows by the value, or by the values as a tuple, in the order of the first rows.
+
+    Examples
+    --------
     >>> grouped([Skipped("a", "empty"), Skipped("b", "empty")], "reason")["empty"][1].recording
     'b'
     """
@@ -340,6 +354,13 @@ def grouped(rows: Sequence[Row], *names: str) -> dict[Any, list[Row]]:
 def tables() -> Mapping[str, Any]:
     """Return the class of the rows of each table; the tables are the fields of `Results` with rows.
 
+    Returns
+    -------
+    mapping of str to type
+        The class by the name of the field.
+
+    Examples
+    --------
     >>> list(tables())[:3]
     ['contacts', 'false_alarms', 'exposure']
     """
@@ -349,8 +370,20 @@ def tables() -> Mapping[str, Any]:
 
 
 def scalar_of(hint: Any) -> type | None:
-    """Return str, float, int or bool where a field has such values, or null; None for any other field.
+    """Return which plain values a field has.
 
+    Parameters
+    ----------
+    hint : type
+        The type of the field.
+
+    Returns
+    -------
+    type or None
+        str, float, int or bool, also where a value may be missing; None for any other field.
+
+    Examples
+    --------
     >>> scalar_of(float | None), scalar_of(Literal["above"]), scalar_of(tuple[float, ...])
     (<class 'float'>, <class 'str'>, None)
     """

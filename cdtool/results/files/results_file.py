@@ -24,8 +24,6 @@ from cdtool.results.summary import kind_group
 # Rows that are in memory as text at once.
 _AT_ONCE = 256
 _as_json = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False).encode
-# Rows of a detector, of a group or of both.
-_NAMED = ("contacts", "false_alarms", "exposure", "recordings", "forces", "points", "sweep", "calibration", "limits")
 _NEXT_STEP = "write one with cdtool benchmark -o results.json"
 
 
@@ -171,7 +169,7 @@ def _refuse_unlisted(results: Results) -> None:
     """Raise ValueError for a row of a detector or group that the results do not list."""
     known = {"detectors": results.detectors, "groups": results.every_group}
     kinds = tuple(kind_group(group, " ")[:-1] for group in results.groups)  # STIFF/ in STIFF/KIND
-    for table in _NAMED:
+    for table in tables():
         for i, row in enumerate(getattr(results, table)):
             for name, listed in (("detector", "detectors"), ("group", "groups")):
                 value = getattr(row, name, None)

@@ -11,7 +11,6 @@ import hashlib
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.base.files.strict_json import finite, strict_json
-from cdtool.base.files.typed_json import typed
+from cdtool.base.files.typed_json import plain, typed
 from cdtool.recordings.recording import Contact
 from cdtool.results.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 
@@ -208,7 +207,7 @@ def trace_values(trace: Trace) -> dict[str, Any]:
         "group": trace.group,
         "start": trace.start,
         "end": trace.end,
-        "contacts": [finite(asdict(contact)) for contact in trace.contacts],
+        "contacts": finite(plain(trace.contacts, tuple[Contact, ...])),
         "contact": trace.contact,
         "view": list(trace.view),
         "joints": trace.joints,
@@ -228,7 +227,7 @@ def _panel_values(panel: Panel, start: float, time_step: float) -> dict[str, Any
         "joint": panel.joint,
         "verdict": panel.verdict,
         "reason": panel.reason,
-        "seen": [finite(asdict(seen)) for seen in panel.seen],
+        "seen": finite(plain(panel.seen, tuple[ContactOutcome, ...])),
         "alarms": list(panel.alarms),
         "false_alarms": list(panel.false_alarms),
         "why": list(panel.why),
