@@ -38,7 +38,7 @@ class ClusterWorkers:
         self.session, self._limit = session, limit
         self._work = pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
         self._begun: dict[Worker, Any] = {}
-        # The number of the item that a worker has, since when, and what becomes of it.
+        # The number of the item that a worker has, since when, and its outcome.
         self._has: dict[Worker, tuple[int, float, Future[Any]]] = {}
         self._looked = self._last_worker = monotonic()
 
@@ -78,7 +78,7 @@ class ClusterWorkers:
         self._has[worker] = number, monotonic(), self.session.result(task)
 
     def ended(self, *, wait_for_one: bool) -> list[tuple[int, Outcome]]:
-        """Return what has become of items; raises WorkerError if the scheduler or all workers have ended."""
+        """Return outcomes of items; raises WorkerError if the scheduler or all workers have ended."""
         results = [result for _, _, result in self._has.values()]
         if results:
             wait(results, _LOOK if wait_for_one else 0.0, FIRST_COMPLETED)

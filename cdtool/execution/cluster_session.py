@@ -102,7 +102,7 @@ class Session:
         return gone
 
     def _asked(self, question: Callable[..., Any], **arguments: Any) -> Any:
-        """Return the answer of the scheduler; raises WorkerError if there is none."""
+        """Return the answer of the scheduler; raises WorkerError without an answer."""
         try:
             return self.client.sync(question, callback_timeout=_ANSWERED_WITHIN, **arguments)
         except Exception as fault:

@@ -1,4 +1,4 @@
-"""What runs in a worker process: one item at a time, and what becomes of it."""
+"""What runs in a worker process: one item at a time; its outcome is the result, or why there is no result."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def keep_freed_memory() -> None:
 
 
 def attempt(work: Callable[[Any], Any], item: Any) -> Outcome:
-    """Return what becomes of an item."""
+    """Return the outcome of an item."""
     try:
         return Done(work(item))
     except MemoryError:

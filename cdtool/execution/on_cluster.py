@@ -77,7 +77,7 @@ def begin(work: bytes, folder: str, limit: float | None) -> Begun:
 
 
 def do(begun: Begun, process: str, item: bytes) -> bytes | None:
-    """Return what becomes of a pickled item, pickled; None if another process has the address now."""
+    """Return the outcome of a pickled item, pickled; None if another process has the address now."""
     if process != _PROCESS:
         return None
     with _one_at_a_time, _in_folder(begun.folder), _time_limit(begun.limit):

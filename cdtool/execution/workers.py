@@ -93,7 +93,7 @@ class Pool(Protocol):
         ...
 
     def ended(self, *, wait_for_one: bool) -> list[tuple[int, Outcome]]:
-        """Return what has become of items by their numbers; without any, wait for some time if that is asked for."""
+        """Return outcomes of items by their numbers; without any, wait for some time if that is asked for."""
         ...
 
     def __enter__(self) -> Any:
@@ -247,7 +247,7 @@ class _Ordered:
             self._under_way.update([item])
 
     def _settle(self, *, wait_for_one: bool) -> None:
-        """Note what has become of items, and which of them are to be tried again."""
+        """Note the outcomes of items, and which of them are to be tried again."""
         for number, outcome in self.pool.ended(wait_for_one=wait_for_one):
             item = self._under_way.pop(number)
             self._tried[number] += isinstance(outcome, Failed)
