@@ -41,8 +41,8 @@ from cdtool.commands.identify.contact.load_cell_contact import load_cell_contact
 from cdtool.commands.identify.identifying import IdentifiedMachine  # noqa: E402
 from cdtool.commands.inject.assumption import ControllerReaction, assumptions_of  # noqa: E402
 from cdtool.commands.inject.axis_contact import axis_contact  # noqa: E402
-from cdtool.commands.inject.injected_recording import injected_recording  # noqa: E402
-from cdtool.commands.inject.refusal import refusal  # noqa: E402
+from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
+from cdtool.commands.inject.with_injected import refusal  # noqa: E402
 from cdtool.commands.simulate.gate_model import Impact, simulate_gate_run  # noqa: E402
 from cdtool.commands.simulate.gate_recordings import as_recording  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402

@@ -11,8 +11,8 @@ import pytest
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
 from cdtool.commands.inject.axis_contact import Doubt, InjectedContact, axis_contact
-from cdtool.commands.inject.injected_recording import injected_recording
-from cdtool.commands.inject.refusal import Refusal, refusal
+from cdtool.commands.inject.injected_logs import injected_recording
+from cdtool.commands.inject.with_injected import Refusal, refusal
 from cdtool.commands.simulate.gate_model import GateRun, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import USED, AxisRun, axis_run

@@ -12,8 +12,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.commands.convert.converting import convert
 from cdtool.formats.channels.channel_map import ChannelSource
-from cdtool.formats.channels.force_axes import join_axes
-from cdtool.formats.channels.reading import read_as_logged
+from cdtool.formats.channels.reading import join_axes, read_as_logged
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap

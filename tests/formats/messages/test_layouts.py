@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from cdtool.formats.messages.decoded_batch import UndecodableError
-from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.layout import Array, Message, Number, SchemaError, Text
 from cdtool.formats.messages.ros_definitions import parse_definitions
 from cdtool.formats.messages.schemas import DEFINITIONS
