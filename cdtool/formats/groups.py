@@ -80,7 +80,7 @@ Parts = Iterable[Sequence[Part | None]]
 WrittenNames = list[list[list[str]]]
 
 
-class Writer(Protocol):
+class GroupWriter(Protocol):
     """Write groups with their provenance to a file; return the name of each column for the machine file."""
 
     def __call__(

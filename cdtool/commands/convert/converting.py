@@ -21,7 +21,7 @@ from cdtool.base.findings import Finding
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import location
 from cdtool.base.version import __version__
-from cdtool.commands.convert.log_rows import LogRows
+from cdtool.commands.convert.log_rows import ColumnRows
 from cdtool.commands.judging.runs import read
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.parts import join_digests
@@ -221,7 +221,7 @@ def convert(
     machine_file = (
         None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     )
-    rows: Rows = ChannelRows(log, machine_file) if machine_file else LogRows(log)
+    rows: Rows = ChannelRows(log, machine_file) if machine_file else ColumnRows(log)
     if not rows.groups:
         raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
     rows = SectionRows(log, rows, section, machine_file) if section else rows

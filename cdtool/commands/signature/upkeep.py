@@ -20,7 +20,7 @@ from cdtool.commands.learning.fitting import Pair, signals_of
 from cdtool.commands.learning.learning import learned_run
 from cdtool.commands.learning.normal_runs import with_operation
 from cdtool.commands.signature.audit import DriftAudit
-from cdtool.commands.signature.coverage import Coverage, check_coverage
+from cdtool.commands.signature.coverage import SignatureCoverage, check_coverage
 from cdtool.commands.signature.drift import audit_drift
 from cdtool.commands.signature.words import place_of
 from cdtool.execution.workers import Progress, Workers
@@ -40,7 +40,7 @@ from cdtool.thresholds.signature import Signature
 from cdtool.truth.onset import OnsetRule
 
 
-def advice(coverage: Coverage | None, drift: DriftAudit | None) -> str:
+def advice(coverage: SignatureCoverage | None, drift: DriftAudit | None) -> str:
     """Return what to do with a signature, the most urgent step first.
 
     Parameters
@@ -92,7 +92,7 @@ def _inspect(drift: DriftAudit) -> list[str]:
     return [f"inspect the machine {' and '.join(places)} before anything is learned"] if places else []
 
 
-def _more(coverage: Coverage) -> str:
+def _more(coverage: SignatureCoverage) -> str:
     if coverage.more_runs is None:
         return "raise the safety factor, or add runs and check again"
     return f"add at least {coverage.more_runs} runs, or raise the safety factor"
@@ -111,7 +111,7 @@ class CheckedClass:
 
     signature: FittedSignature
     first: FittedSignature
-    coverage: Coverage | None
+    coverage: SignatureCoverage | None
     drift: DriftAudit | None
 
     @property

@@ -28,7 +28,7 @@ from cdtool.formats.column_names import column_key
 from cdtool.formats.columns import Categories, Piece
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.rows import RowReader, Rows, plain_rows
-from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, Layout, seconds_since, unwrap
+from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, StampLayout, seconds_since, unwrap
 from cdtool.formats.csv.text import BLOCK_BYTES
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
@@ -159,7 +159,7 @@ class StampColumns:
     def _dated(self, column: int) -> bool:
         return self._layout(column).dated or column in self._dates
 
-    def _layout(self, column: int) -> Layout:
+    def _layout(self, column: int) -> StampLayout:
         return self._dialect.stamped[column].layouts[0]
 
     def _start(self, column: int) -> int:

@@ -48,7 +48,7 @@ _TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
 
 
 @dataclass(frozen=True)
-class Split:
+class LineSplit:
     """The result of splitting lines at a separator: cells per line, share of such lines, share of numbers in them."""
 
     separator: str
@@ -57,7 +57,7 @@ class Split:
     numeric: float
 
 
-def find_separator(lines: Sequence[Line], pinned: str = "", decimal: str = "") -> Split:
+def find_separator(lines: Sequence[Line], pinned: str = "", decimal: str = "") -> LineSplit:
     """Return the separator that splits the lines into equal numbers of cells, most of which are numbers.
 
     Raises RecordingError if a pinned separator splits no line but another one does. With a pinned decimal comma a table
@@ -110,7 +110,7 @@ def _is_part_of_times(lines: Sequence[Line]) -> bool:
     return any(len({text.count(mark) for text in alike} | {0}) == 2 and mark in alike[0] for mark in ",\t|")
 
 
-def _split(texts: Sequence[str], separator: str) -> Split:
+def _split(texts: Sequence[str], separator: str) -> LineSplit:
     rows = [split_line(text, separator) for text in texts]
     if separator == " ":
         rows = [_no_blank_separator(text, row) for text, row in zip(texts, rows, strict=True)]
@@ -121,11 +121,11 @@ def _split(texts: Sequence[str], separator: str) -> Split:
         if 2 * seen >= count:
             width, count = wider, seen
     if width < 2:
-        return Split(separator, 1, 1.0, 0.0)
+        return LineSplit(separator, 1, 1.0, 0.0)
     shares = [sum(_is_number(cell, separator) for cell in row) / len(row) for row in rows if len(row) == width]
     missing = [sum(kind(cell) == "M" for cell in row) / len(row) for row in rows if len(row) == width]
     numeric = sum(share / max(1.0 - lost, 1.0 / width) for share, lost in zip(shares, missing, strict=True))
-    return Split(separator, width, count / len(rows), numeric / len(shares))
+    return LineSplit(separator, width, count / len(rows), numeric / len(shares))
 
 
 def _no_blank_separator(text: str, row: list[str]) -> list[str]:

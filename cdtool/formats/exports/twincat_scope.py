@@ -88,7 +88,7 @@ class TwincatScope:
 
 
 @dataclass(frozen=True)
-class _Head:
+class _ScopeHead:
     """The lines above the rows: about the file by their key, and about the channels with their cells.
 
     The first row is line `line` (from 1), at byte `start`; `rows` are the cells of the first rows.
@@ -164,7 +164,7 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, tuple(findings))
 
 
-def _read_head(text: Text, raw: Sequence[bytes]) -> _Head:
+def _read_head(text: Text, raw: Sequence[bytes]) -> _ScopeHead:
     separator = scope_separator([text.decode(line).rstrip("\r") for line in raw[:_MOST_FILE_LINES]])
     if separator is None:
         raise RecordingError("is not an export of TwinCAT Scope", "see cdtool list formats")
@@ -176,7 +176,7 @@ def _read_head(text: Text, raw: Sequence[bytes]) -> _Head:
         if of_channels and _is_row(cells):
             rows = [_cells(text.decode(each), separator) for each in raw[i : i + _SAMPLE_ROWS]]
             wide = [row for row in rows[: max(1, len(raw) - i - 1)] if len(row) > 1]
-            return _Head(separator, of_file, of_channels, i + 1, start, wide)
+            return _ScopeHead(separator, of_file, of_channels, i + 1, start, wide)
         if cells[0] in _FILE_KEYS and i < _MOST_FILE_LINES:
             of_file[cells[0]] = cells
             of_channels.clear()  # a line Name above is that of the file
@@ -192,7 +192,7 @@ def _read_head(text: Text, raw: Sequence[bytes]) -> _Head:
     raise RecordingError("has no row of numbers", "was the export stopped, or the copy cut off?")
 
 
-def _refuse_empty_cells(text: Text, head: _Head) -> None:
+def _refuse_empty_cells(text: Text, head: _ScopeHead) -> None:
     """Raise RecordingError if a table that is separated by blanks has empty cells, which are blanks too."""
     for block in text.blocks(head.start):
         if block[:1] == b" " or b"  " in block or text.line_end + b" " in block:
@@ -202,7 +202,7 @@ def _refuse_empty_cells(text: Text, head: _Head) -> None:
             )
 
 
-def _between_blanks(head: _Head, findings: list[Finding]) -> _Head:
+def _between_blanks(head: _ScopeHead, findings: list[Finding]) -> _ScopeHead:
     """Return the head with the cells of lines that are separated by blanks, which names and units may contain.
 
     Data types have no blanks: their line shows how many channels follow each column of times. Names that cannot be told
@@ -232,7 +232,7 @@ def _between_blanks(head: _Head, findings: list[Finding]) -> _Head:
     return replace(head, of_channels={**whole, NAME: names, **({_UNIT: units} if is_clear else {})})
 
 
-def _keys(head: _Head) -> dict[int, str]:
+def _keys(head: _ScopeHead) -> dict[int, str]:
     """Return the names of the channels by column; equal names are replaced by the symbols' names, or get a number."""
     clocks = {*head.clocks}
     names = {at: name for at, name in enumerate(head.names) if at not in clocks and name}
@@ -245,7 +245,7 @@ def _keys(head: _Head) -> dict[int, str]:
     return {at: unique.get(at, f"{name}#{at}" if counts[name] > 1 else name) for at, name in names.items()}
 
 
-def _start(head: _Head) -> float:
+def _start(head: _ScopeHead) -> float:
     """Return the start of the export since 1970 [s]; 0 if it is not stated."""
     stated = next((head.of_file[key] for key in SCOPE_STARTS if key in head.of_file), [])
     ticks = stated[1] if len(stated) > 1 else ""
@@ -259,7 +259,7 @@ def _is_tick(row: Sequence[str], at: int) -> bool:
     return cell.isascii() and cell.isdigit() and len(cell) <= len(str(_TICKS_1970)) and int(cell) >= _FEWEST_TICKS
 
 
-def _decimal_mark(text: Text, head: _Head) -> str:
+def _decimal_mark(text: Text, head: _ScopeHead) -> str:
     """Return the decimal mark: the first mark in the rows. Scope writes no thousands separators."""
     if head.separator == ",":
         return "."

@@ -26,7 +26,7 @@ from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
-from cdtool.formats.mat.layout import Layout, arrange_columns
+from cdtool.formats.mat.layout import MatLayout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables
 from cdtool.formats.source import Source
 
@@ -68,7 +68,7 @@ class Mat:
         return Source(path, self.name, columns, reader.origin, findings, details, names)
 
 
-def _details(layout: Layout) -> dict[str, str]:
+def _details(layout: MatLayout) -> dict[str, str]:
     """Return the first single numbers and texts of a file, and how many more there are."""
     shown = list(islice((*layout.numbers, *layout.texts), _MOST_DETAILS))
     numbers = {name: f"{layout.numbers[name].read().ravel()[0]:g}" for name in shown if name in layout.numbers}
@@ -97,7 +97,7 @@ def _variables(path: Path) -> Iterator[Variables]:
 class _Reader:
     """Reads columns of a file; `complex` are those that are complex."""
 
-    def __init__(self, path: Path, layout: Layout) -> None:
+    def __init__(self, path: Path, layout: MatLayout) -> None:
         self._path, self._layout = path, layout
         self.findings: list[Finding] = []
         self.complex: list[str] = []

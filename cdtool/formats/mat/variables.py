@@ -55,7 +55,7 @@ class Numbers:
 
 
 @dataclass(frozen=True)
-class Section:
+class VariableSection:
     """The rows of a column that a variable contains: column `index` of its table."""
 
     variable: str
@@ -71,7 +71,7 @@ class Section:
 class MatColumn:
     """A column: its sections, one after the other, and the name of the column that is its clock; empty if unknown."""
 
-    sections: tuple[Section, ...]
+    sections: tuple[VariableSection, ...]
     clock: str = ""
 
 

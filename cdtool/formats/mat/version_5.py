@@ -45,7 +45,7 @@ def read_variables(path: Path) -> Variables:
     content = path.read_bytes()
     if not content.startswith(MAGIC) or len(content) < _HEADER:
         raise RecordingError("is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
-    reader, variables = _Reader(path, ">" if content[126:128] == b"MI" else "<"), dict[str, Value]()
+    reader, variables = _Version5Reader(path, ">" if content[126:128] == b"MI" else "<"), dict[str, Value]()
     reader.check_unpacked(memoryview(content))
     at = _HEADER
     while at < len(content):
@@ -63,7 +63,7 @@ def read_variables(path: Path) -> Variables:
     return variables
 
 
-class _Reader:
+class _Version5Reader:
     """Reads the elements of one file, whose byte order is `order`."""
 
     def __init__(self, path: Path, order: str) -> None:
@@ -178,7 +178,7 @@ class _Reader:
 class _Parts:
     """The parts of an array, one after the other."""
 
-    def __init__(self, reader: _Reader, content: memoryview) -> None:
+    def __init__(self, reader: _Version5Reader, content: memoryview) -> None:
         self._reader, self._content, self._at = reader, content, 0
 
     def next(self) -> tuple[int, memoryview]:

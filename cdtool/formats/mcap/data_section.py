@@ -33,7 +33,7 @@ from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss, Losses
 from cdtool.formats.mcap.messages import Positions, Walk
 from cdtool.formats.mcap.records import LARGEST, MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
-from cdtool.formats.mcap.summary import Summary, matches_header
+from cdtool.formats.mcap.summary import McapSummary, matches_header
 from cdtool.formats.messages.batch import Batch
 
 _LONGEST_TEXT = 1 << 16
@@ -89,7 +89,7 @@ class DataSection:
     the first message with a valid one.
     """
 
-    def __init__(self, file: FileBytes, summary: Summary, definitions: Definitions, unwanted: set[int]) -> None:
+    def __init__(self, file: FileBytes, summary: McapSummary, definitions: Definitions, unwanted: set[int]) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}
         self.extras: dict[tuple[int, int, int], None] = {}
@@ -343,7 +343,7 @@ class Resync:
     back is limited, because a file may consist of such lengths.
     """
 
-    def __init__(self, file: FileBytes, summary: Summary) -> None:
+    def __init__(self, file: FileBytes, summary: McapSummary) -> None:
         self.verified_to = len(MAGIC)
         self._file = file
         self._known = sorted(summary.chunks) if summary.verified else []

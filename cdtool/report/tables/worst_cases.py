@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING
-from cdtool.report.table import Cell, Column, Fields, Log, Table, empty_cell, name_cell, number_cell, shown, tabulate
+from cdtool.report.table import Cell, Fields, Heading, Log, Table, empty_cell, name_cell, number_cell, shown, tabulate
 from cdtool.report.tables.results import detector_cell
 from cdtool.results.results import ContactResult, FalseAlarmResult, ForceResult, Results, grouped
 
@@ -76,15 +76,15 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
     listed = {case.log for case in cases}
     cases += _examples(results, [log for log in traced if log not in listed])
     fields: Fields[_Case] = (
-        (Column("recording"), lambda item: name_cell(item.log[1])),
-        (Column("group", choice=True), lambda item: name_cell(item.log[0])),
-        (Column("detector", choice=True), lambda item: _detector_cell(results, item)),
-        (Column("outcome", choice=True), lambda item: Cell(item.outcome, tone=item.tone)),
-        (Column("contact", numeric=True), _number_of),
-        (Column("at [s]", numeric=True), _time_of),
-        (Column("latency [ms]", numeric=True), lambda item: number_cell(item.latency_ms)),
-        (Column("peak force [N]", numeric=True), lambda item: number_cell(item.peak_n)),
-        (Column("why"), lambda item: Cell(item.why or NOTHING)),
+        (Heading("recording"), lambda item: name_cell(item.log[1])),
+        (Heading("group", choice=True), lambda item: name_cell(item.log[0])),
+        (Heading("detector", choice=True), lambda item: _detector_cell(results, item)),
+        (Heading("outcome", choice=True), lambda item: Cell(item.outcome, tone=item.tone)),
+        (Heading("contact", numeric=True), _number_of),
+        (Heading("at [s]", numeric=True), _time_of),
+        (Heading("latency [ms]", numeric=True), lambda item: number_cell(item.latency_ms)),
+        (Heading("peak force [N]", numeric=True), lambda item: number_cell(item.peak_n)),
+        (Heading("why"), lambda item: Cell(item.why or NOTHING)),
     )
     table = tabulate("cases", "Worst and failed cases", fields, cases, "contacts", [case.log for case in cases])
     marks = {"missed by every detector": [case.missed_by_all for case in cases]}

@@ -17,7 +17,7 @@ from typing import Literal
 from cdtool.commands.protocol.assessment.plan import Instrument, MeasuringPoint, TestPlan, empty_entries
 from cdtool.commands.protocol.assessment.pressure import PressureAssessment, PressureRecord
 from cdtool.commands.protocol.assessment.pressure_reasons import pressure_reasons
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Value, Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind, Value
 from cdtool.commands.protocol.assessment.same_measurement import hold_same_measurement
 from cdtool.commands.protocol.assessment.sampling import above_between_samples, equal_readings_at_peak, sample_rate
 from cdtool.truth.force.curve import ForceTimeCurve
@@ -163,7 +163,7 @@ class PointAssessment:
     @property
     def outcome(self) -> str:
         """Return pass, fail or incomplete."""
-        return Verdict(self.reasons).outcome
+        return ProtocolVerdict(self.reasons).outcome
 
 
 def required_record(profile: ForceProfile) -> float:
@@ -310,7 +310,7 @@ def check_point(
     return PointAssessment(point, profile, (), None, tuple(reasons))
 
 
-def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Sequence[Reason] = ()) -> Verdict:
+def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Sequence[Reason] = ()) -> ProtocolVerdict:
     """Return the verdict of a whole protocol.
 
     Parameters
@@ -326,7 +326,7 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
 
     Returns
     -------
-    Verdict
+    ProtocolVerdict
         Fail if a point fails; otherwise incomplete if anything is missing; otherwise pass. All reasons are listed.
 
     Examples
@@ -343,7 +343,7 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
         *([] if plan.points else [Reason(ReasonKind.NO_POINT, {"file": file})]),
         *(Reason(ReasonKind.NO_VALUE, {"key": item.key, "file": file}, due=item.due) for item in empty_entries(plan)),
     ]
-    return Verdict(tuple(sorted(reasons, key=lambda reason: reason.kind.outcome != "fail")))
+    return ProtocolVerdict(tuple(sorted(reasons, key=lambda reason: reason.kind.outcome != "fail")))
 
 
 def _reason(kind: ReasonKind, point: MeasuringPoint, **values: str | float) -> Reason:
