@@ -134,11 +134,12 @@ def score(folder: Path, reach: float, tallies: dict[str, Tally]) -> None:
         if contact.latency_ms is not None:
             tallies[contact.detector].latencies[contact.group].append(contact.latency_ms)
         tallies[contact.detector].missed += contact.outcome == "missed"
-    alarming = {(alarm.detector, alarm.recording) for alarm in results.false_alarms if alarm.group == "holdout"}
+    holdout = [alarm for alarm in results.false_alarms if alarm.group == "holdout"]
+    alarming = {(alarm.detector, alarm.recording, alarm.operation) for alarm in holdout}
     for exposure in results.exposure:
         if exposure.group == "holdout":
             tallies[exposure.detector].runs += exposure.operations
-            tallies[exposure.detector].alarming += sum(name == exposure.detector for name, _ in alarming)
+            tallies[exposure.detector].alarming += sum(name == exposure.detector for name, *_ in alarming)
 
 
 def shown(tally: Tally) -> list[str]:

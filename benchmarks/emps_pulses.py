@@ -31,7 +31,7 @@ sys.path.insert(0, str(ROOT))
 
 import cdtool  # noqa: E402
 from cdtool.commands.inject.channel_change import ChannelChange  # noqa: E402
-from cdtool.commands.inject.injected_recording import injected_recording  # noqa: E402
+from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
 from cdtool.detectors.momentum import Momentum  # noqa: E402
 from cdtool.formats.channels.logged_recording import LoggedRecording  # noqa: E402
 from cdtool.formats.channels.reading import read_as_logged  # noqa: E402

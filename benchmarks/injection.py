@@ -41,8 +41,8 @@ from cdtool.commands.identify.contact.load_cell_contact import load_cell_contact
 from cdtool.commands.identify.identifying import IdentifiedMachine  # noqa: E402
 from cdtool.commands.inject.assumption import ControllerReaction, assumptions_of  # noqa: E402
 from cdtool.commands.inject.axis_contact import axis_contact  # noqa: E402
-from cdtool.commands.inject.injected_recording import injected_recording  # noqa: E402
-from cdtool.commands.inject.refusal import refusal  # noqa: E402
+from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
+from cdtool.commands.inject.with_injected import refusal  # noqa: E402
 from cdtool.commands.simulate.gate_model import Impact, simulate_gate_run  # noqa: E402
 from cdtool.commands.simulate.gate_recordings import as_recording  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402
@@ -51,7 +51,7 @@ from cdtool.machines.axis import Axis  # noqa: E402
 from cdtool.machines.axis_model.axis_run import axis_run  # noqa: E402
 from cdtool.machines.axis_model.model_table import axis_model  # noqa: E402
 from cdtool.machines.axis_model.obstacle import Obstacle  # noqa: E402
-from cdtool.machines.axis_model.parameters import AxisModel, Drive, Sensors  # noqa: E402
+from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Sensors  # noqa: E402
 from cdtool.machines.linear_axis import LinearAxis  # noqa: E402
 from cdtool.recordings.operations import operations_of  # noqa: E402
 from cdtool.recordings.recording import Recording  # noqa: E402
@@ -152,7 +152,7 @@ def identified_model(seed: int, references: bool, contacts: int = 0) -> AxisMode
     )
     fit = identify_two_mass(runs, TwoMassSettings(motor_mass=GATE.motor_mass, sensors=sensors))
     model = fit.model
-    drive = Drive(
+    drive = ElasticDrive(
         motor_mass=model.drive.motor_mass,
         load_mass=model.drive.load_mass,
         stiffness=model.drive.stiffness,

@@ -30,7 +30,7 @@ sys.path.insert(0, str(ROOT))
 
 from cdtool.alarms.pipeline import detect_operation  # noqa: E402
 from cdtool.base.errors import CdtoolError  # noqa: E402
-from cdtool.commands.inject.injected_recording import injected_recording  # noqa: E402
+from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
 from cdtool.commands.inject.robot_contact import RobotLog, robot_contact  # noqa: E402
 from cdtool.commands.learning.fitting import fit_operations  # noqa: E402
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile  # noqa: E402

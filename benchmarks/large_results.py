@@ -30,13 +30,17 @@ sys.path.insert(0, str(ROOT))
 from timing import environment, table  # noqa: E402
 
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file  # noqa: E402
-from cdtool.commands.scoring.gathering import Gathering  # noqa: E402
+from cdtool.commands.scoring.gathering import results_before, results_of  # noqa: E402
 from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, OperationOutcome, Wanted  # noqa: E402
+from cdtool.commands.scoring.scored_logs import ScoredLogs  # noqa: E402
 from cdtool.commands.scoring.scoring import LogRows  # noqa: E402
+from cdtool.execution.workers import Workers  # noqa: E402
 from cdtool.report.outputs import write_outputs  # noqa: E402
 from cdtool.report.writers.base import Report  # noqa: E402
 from cdtool.results.curves.sweep import MULTIPLES, Swept  # noqa: E402
 from cdtool.results.evaluated import evaluate  # noqa: E402
+from cdtool.results.results import Results  # noqa: E402
+from cdtool.results.traces.trace import Trace  # noqa: E402
 from tests.report.html.html_case import trace_of  # noqa: E402
 from tests.synthetic.many_results import DETECTORS, RowsOfLog, rows_of_logs  # noqa: E402
 
@@ -84,8 +88,8 @@ class _Drawn:
 
 def measured(recordings: int, detectors: int, folder: Path) -> dict[str, list[float]]:
     """Seconds of the processor, peak of memory [MB] and size [MB] of each step with that many recordings."""
-    warm = _gathered(60, detectors)
-    write_outputs(Report(evaluate(warm.results({"tool": "cdtool"})), warm.traces), [folder / name for name in REPORTS])
+    warm, traces = _gathered(60, detectors)
+    write_outputs(Report(evaluate(warm), traces), [folder / name for name in REPORTS])
     shutil.rmtree(folder / "results.parquet")
     steps: dict[str, list[float]] = {"before": [0.0, _peak_mb(), 0.0]}
 
@@ -95,25 +99,24 @@ def measured(recordings: int, detectors: int, folder: Path) -> dict[str, list[fl
         steps[name] = [process_time() - begin, _peak_mb(), _megabytes(target) if target else 0.0]
         return made
 
-    gathered = step("gathering", lambda: _gathered(recordings, detectors))
-    results = gathered.results({"tool": "cdtool", "tool_version": "0", "machine": "door"})
-    report = Report(step("statistics", lambda: evaluate(results)), gathered.traces)
+    results, traces = step("gathering", lambda: _gathered(recordings, detectors))
+    report = Report(step("statistics", lambda: evaluate(results)), traces)
     for name in REPORTS:
         target = folder / name
         step(name, lambda target=target: write_outputs(report, [target]), target)
     return steps
 
 
-def _gathered(recordings: int, detectors: int) -> Gathering:
+def _gathered(recordings: int, detectors: int) -> tuple[Results, tuple[Trace, ...]]:
     setup = read_benchmark_file(ROOT / "sample_logs" / "gate" / "benchmark.toml")
     names = DETECTORS[:detectors]
-    gathered = Gathering(setup, names, dict.fromkeys(names, MULTIPLES), {})
     groups = (drawn.recording.group for drawn in rows_of_logs(min(recordings, 3), detectors))
     of_three = list(islice(groups, 3))
     logs = [(of_three[i % 3], Path(f"{i:06d}.mcap")) for i in range(recordings)]
     drawn = _Drawn(rows_of_logs(recordings, detectors), names)
-    gathered.score(lambda: drawn, logs)
-    return gathered
+    scored = ScoredLogs(setup, lambda: drawn, logs, Workers())
+    before = results_before(setup, {"tool": "cdtool", "tool_version": "0", "machine": "door"}, names)
+    return results_of(setup, before, scored, dict.fromkeys(names, MULTIPLES), {}), scored.traces
 
 
 def _peak_mb() -> float:

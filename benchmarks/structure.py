@@ -11,6 +11,9 @@
   caller knows only its contract, and so is `messages`, by which formats decode; `every module` counts the modules
   inside them, too. `UTILITIES` are passed over. Only
   the main thread is recorded.
+* **Reach.** The distinct functions of the package and their modules that run, and how deeply their calls are nested,
+  while the CSV log `sample_logs/gate/stiff/03.csv` is read with the machine file already read, and while
+  `sample_logs/gate` is benchmarked with one detector. Comprehensions and bodies of classes do not count.
 * **Import cycles.** Groups of modules that import one another, directly or through others; imports for the type checker
   count. Imports inside functions close further cycles, which are counted separately.
 * **Single callers.** Modules that only one module imports, if it is in the same folder. A module that a table names in
@@ -54,6 +57,9 @@ BOUNDS = Path(__file__).parents[1] / "tests" / "project" / "house.toml"
 MOST_STAYS, MOST_RETURNS, MOST_SINGLE_CALLERS = 12, 2, 40
 GOAL_LINES = 52_000  # what the package is to have at most once its files are in the rooms of the measuring chain
 MOST_COMPLEX, MOST_ARGUMENTS = 10, 7
+GATE = Path(__file__).parents[1] / "sample_logs" / "gate"
+# The most functions, modules and nested calls of one read, and functions and modules of one benchmark.
+MOST_READ, MOST_BENCHMARK = (60, 20, 9), (650, 120, None)
 # Modules whose calls are no step of a recording's walk, and why.
 UTILITIES: Mapping[str, str] = {
     "cdtool.base.errors": "how any module reports an error",
@@ -408,6 +414,43 @@ def calls_of(run: Callable[[], object], package: Path, utilities: Iterable[str] 
     return found
 
 
+@dataclass(frozen=True)
+class Reach:
+    """What of the package a piece of work runs: functions as module:name, and how deeply their calls are nested."""
+
+    functions: tuple[str, ...]
+    depth: int
+
+    @property
+    def modules(self) -> int:
+        return len({name.partition(":")[0] for name in self.functions})
+
+
+def reach_of(run: Callable[[], object], package: Path) -> Reach:
+    """The functions of the package that `run` calls in the main thread; comprehensions count as their function's."""
+    names = {str(module.path): name for name, module in modules_of(package).items()}
+    found: dict[str, None] = {}
+    depth = deepest = 0
+
+    def record(frame: FrameType, event: str, _: object) -> None:
+        nonlocal depth, deepest
+        code = frame.f_code
+        if event not in ("call", "return") or not code.co_flags & CO_OPTIMIZED or frame.f_back is None:
+            return
+        if code.co_name in ("<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>") or code.co_filename not in names:
+            return
+        depth += 1 if event == "call" else -1
+        deepest = max(deepest, depth)
+        found.setdefault(f"{names[code.co_filename]}:{code.co_qualname}")
+
+    sys.setprofile(record)
+    try:
+        run()
+    finally:
+        sys.setprofile(None)
+    return Reach(tuple(found), deepest)
+
+
 def _is_public(qualname: str) -> bool:
     """No part of the name is private or local, nor the check of a new value; `__init__` and its kin are public."""
     if qualname.endswith(".__post_init__"):
@@ -539,6 +582,23 @@ def recorded() -> dict[str, list[Call]]:
     return found
 
 
+def reached() -> dict[str, tuple[Reach, tuple[int | None, ...]]]:
+    """What one read of a log and one benchmark with one detector reach, with their targets."""
+    import cdtool
+    from cdtool.formats.machine_file import read_machine_file
+
+    machine = read_machine_file(GATE / "machine.toml")
+    works: dict[str, tuple[Callable[[], object], tuple[int | None, ...]]] = {
+        "read of a CSV log": (lambda: cdtool.read(GATE / "stiff" / "03.csv", machine), MOST_READ),
+        "benchmark": (lambda: cdtool.benchmark(GATE / "benchmark.toml", detectors=["momentum"]), MOST_BENCHMARK),
+    }
+    found = {}
+    for name, (run, most) in works.items():
+        run()  # loads its modules and compiles its kernels
+        found[name] = reach_of(run, PACKAGE), most
+    return found
+
+
 def measure(show: bool) -> bool:
     """Print all of it; returns whether every target is met."""
     modules = modules_of(PACKAGE)
@@ -560,6 +620,12 @@ def measure(show: bool) -> bool:
         add("  every module counted: returns", fine.returns)
         add("  every module counted: modules", fine.rooms)
         lists[f"Walk of the {kind} log ({len(walk.stays)} stays, {walk.returns} returns)"] = _shown(walk)
+    for work, (reach, most) in reached().items():
+        for what, value, target in zip(
+            ("functions", "modules", "depth"), (len(reach.functions), reach.modules, reach.depth), most, strict=True
+        ):
+            add(f"{work}: {what}", value, target)
+        lists[f"Functions of a {work}"] = list(reach.functions)
     groups, more = cycles(imports), cycles(imports, ("module", "types", "function"))
     lists["Import cycles, type checking included"] = [", ".join(group) for group in groups]
     lists["Import cycles with imports in functions"] = [", ".join(group) for group in more]

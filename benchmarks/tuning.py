@@ -75,7 +75,7 @@ def check(folder: Path, seed: int, free: int, impacts: int, fresh: int, budget: 
         {name: item.mean_ms for name, item in tuned.honest.groups.items()},
         {name: fmean(values) for name, values in latencies.items()},
         sum(contact.outcome == "missed" for contact in results.contacts),
-        len({alarm.recording for alarm in results.false_alarms if alarm.group == HOLDOUT}),
+        len({(alarm.recording, alarm.operation) for alarm in results.false_alarms if alarm.group == HOLDOUT}),
         fresh,
         seconds,
     )

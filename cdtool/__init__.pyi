@@ -15,7 +15,7 @@ from .commands.init.drafting import init_study as init_study
 from .commands.inject.coverage.coverage import coverage as coverage
 from .commands.inject.injecting import inject as inject
 from .commands.judging.information import info as info
-from .commands.judging.reading import read as read
+from .commands.judging.runs import read as read
 from .commands.learning.learning import learn_signature as learn_signature
 from .commands.protocol.making import protocol as protocol
 from .commands.report.read_results import read_results as read_results

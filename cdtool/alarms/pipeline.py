@@ -32,7 +32,7 @@ _AT_REST = 0.01
 
 
 @dataclass(frozen=True)
-class Section:
+class UnassessableSection:
     """A section of an operation that is not assessable: reason, start and end [s], and positions [load unit]."""
 
     reason: str
@@ -104,7 +104,7 @@ class Detection:
             return 0.0
         return self.statistic.period * float(np.count_nonzero(self.statistic.valid, axis=0).max())
 
-    def not_assessable_sections(self) -> list[Section]:
+    def not_assessable_sections(self) -> list[UnassessableSection]:
         """Return the sections in which the leading joint's signal is not assessable, in order of time."""
         joint = self.operation.motion.joint
         status, time = self.statistic.status[:, self.leading], self.statistic.time
@@ -118,7 +118,7 @@ class Detection:
             else np.full(len(time), np.nan)
         )
         return [
-            Section(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
+            UnassessableSection(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
             for a, b in found
         ]
 

@@ -5,13 +5,14 @@ Conventions: one line with the file, the row or key and the value, then a hint w
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from difflib import get_close_matches
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
 
 class CdtoolError(Exception):
@@ -70,6 +71,20 @@ class WorkerError(CdtoolError):
 
 class NothingValidError(SignatureError):
     """The detector cannot assess any sample of the runs to learn from, because of detector and motion."""
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Put the file at the beginning of an error that is raised inside, unless it begins with it.
+
+    What raises an error knows the row or key and the value; only what opens a file needs to know its path.
+    """
+    try:
+        yield
+    except CdtoolError as fault:
+        if not fault.message.startswith(str(path)):
+            fault.message = f"{path}: {fault.message}"
+        raise
 
 
 def installing(extra: str) -> str:

@@ -173,7 +173,7 @@ def _end_of(number: int) -> BaseException:
     return KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
 
 
-class _Line(logging.Handler):
+class _LineHandler(logging.Handler):
     """Print each message as a line on stderr, above a progress bar if there is one."""
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -184,7 +184,7 @@ class _Line(logging.Handler):
 @contextmanager
 def showing_first_use() -> Iterator[None]:
     """Show in the block that kernels are compiled; nothing is shown if stderr is not a terminal."""
-    before, handler = _LOGGER.level, _Line()
+    before, handler = _LOGGER.level, _LineHandler()
     if sys.stderr.isatty():
         _LOGGER.addHandler(handler)
         _LOGGER.setLevel(logging.INFO)

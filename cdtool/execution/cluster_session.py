@@ -11,22 +11,22 @@ import logging
 import pickle
 import re
 import socket
-import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
+from multiprocessing import active_children, resource_tracker
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 from urllib.parse import urlsplit
 
-from cdtool.base.errors import CdtoolError, UsageError, WorkerError, installing
+from cdtool.base.errors import UsageError, WorkerError, installing
 from cdtool.base.plain_text import one_line, shorten
 from cdtool.execution.environment import difference, environment
-from cdtool.execution.interruption import without_interruption
 from cdtool.execution.on_cluster import Described, Sight, describe
+from cdtool.execution.starting import without_interruption
 
 LOCAL = "local"
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss)://[^\s/@?#]+:\d+")
@@ -34,6 +34,7 @@ _ADDRESS = re.compile(r"(tcp|tls|ws|wss)://[^\s/@?#]+:\d+")
 _CONNECTED_WITHIN, _JOINED_WITHIN, _DESCRIBED_WITHIN = 8.0, 30.0, 15.0
 # A scheduler that has not answered for so long has ended [s].
 _ANSWERED_WITHIN = 30.0
+_SAME = "use the same environment on all machines"
 _LOGGERS = ("distributed", "dask", "tornado", "asyncio", "bokeh")
 _SETTINGS = {
     "distributed.comm.timeouts.connect": f"{_CONNECTED_WITHIN}s",
@@ -42,14 +43,18 @@ _SETTINGS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Worker:
-    """A worker process that is used: its address, its own name and number, and the address of its nanny if any."""
+    """A worker process, by its address, the address of its nanny if any, and what it says that it is.
+
+    It was last not paused at the time `worked` [s]: with little free memory it pauses, and begins nothing.
+    """
 
     address: str
-    process: str
-    number: int
     nanny: str | None
+    describing: Future[Described | None]
+    worked: float = 0.0
+    described: Described | None = None
 
 
 def checked_address(cluster: str) -> None:
@@ -60,151 +65,123 @@ def checked_address(cluster: str) -> None:
         )
 
 
-class NoResultError(Exception):
-    """A worker process ended before the result of a task."""
-
-
 class Session:
-    """A client of a cluster, and those of its workers that are used, by address."""
+    """A client of a cluster, and its workers by address."""
 
     def __init__(self, client: Any, words: str, sights: Sequence[Sight]) -> None:
-        self.client = client
-        self.words = words
-        self.loop: asyncio.AbstractEventLoop = client.loop.asyncio_loop
+        self.client, self.words = client, words
         self.workers: dict[str, Worker] = {}
         # Addresses of workers that were ended because of their memory.
         self.over_memory: set[str] = set()
+        self._refused: dict[Worker, WorkerError] = {}
         self._sights = pickle.dumps(tuple(sights))
-        self._described: dict[str, asyncio.Task[None] | None] = {}
-        self._refused: dict[str, CdtoolError] = {}
-        client.subscribe_topic("worker-restart-memory", self._note_memory)
+        client.subscribe_topic("worker-restart-memory", lambda event: self.over_memory.add(event[1]["worker"]))
 
-    def _note_memory(self, event: tuple[float, Any]) -> None:
-        self.over_memory.add(event[1]["worker"])
+    @property
+    def usable(self) -> list[Worker]:
+        """Return the workers that may be used."""
+        return [worker for worker in self.workers.values() if worker.described is not None]
 
-    async def present(self) -> set[str]:
-        """Return the addresses of all workers; those that are new are asked to describe themselves."""
+    def look(self) -> list[Worker]:
+        """Notice workers that have come, and return those that have gone; raises WorkerError without the scheduler."""
         if self.client.status != "running":
             raise self.lost()
-        threads = await asyncio.wait_for(self.client.nthreads(asynchronous=True), _ANSWERED_WITHIN)
-        for address in set(self._described) - set(threads):
-            self.forget(address)
-        for address in threads:
-            if address not in self._described:
-                self._described[address] = asyncio.get_running_loop().create_task(self._describe(address))
-        return set(threads)
+        known = self._asked(self.client.scheduler.identity, n_workers=-1)["workers"]
+        gone = [worker for address, worker in self.workers.items() if address not in known]
+        for worker in gone:
+            self.forget(worker)
+        for address, state in known.items():
+            if address not in self.workers:
+                task = self.task(address, describe, self._sights)
+                self.workers[address] = Worker(address, state.get("nanny"), self.result(task), monotonic())
+            if state["status"] != "paused":
+                self.workers[address].worked = monotonic()
+        for worker in list(self.workers.values()):
+            if worker.described is None and worker not in self._refused and worker.describing.done():
+                self._accept(worker)
+        return gone
 
-    async def _describe(self, address: str) -> None:
+    def _asked(self, question: Callable[..., Any], **arguments: Any) -> Any:
+        """Return the answer of the scheduler; raises WorkerError without an answer."""
         try:
-            found: Described = await self.result(self.task(address, describe, self._sights))
-            known = await self.client.scheduler.identity(n_workers=-1)
-        except asyncio.CancelledError:
-            raise
-        except (NoResultError, OSError):
-            self._described.pop(address, None)  # if it is still there, it is asked again
-            return
+            return self.client.sync(question, callback_timeout=_ANSWERED_WITHIN, **arguments)
         except Exception as fault:
-            if self.client.status != "running":
-                return
-            words = shorten(one_line(f"{type(fault).__name__}: {fault}"), 120)
-            self._refuse(address, f"cdtool cannot be used there: {words}", "install the same there as here")
-            return
-        if words := difference(environment(), found.versions):
-            self._refuse(address, words, "use the same environment on all machines")
-        elif found.unseen:
-            self._refuse(address, f"{found.unseen[0]} is not the same there", "mount the folder at the same path there")
-        else:
-            nanny = known["workers"].get(address, {}).get("nanny")
-            self.workers[address] = Worker(address, found.process, found.number, nanny)
+            raise self.lost(fault) from fault
 
-    def _refuse(self, address: str, words: str, hint: str) -> None:
-        self._refused[address] = WorkerError(f"--cluster {self.words}: worker {address}: {words}", hint)
-        if self.workers:
-            warnings.warn(f"worker {address} is not used: {words}", UserWarning, stacklevel=2)
+    def _accept(self, worker: Worker) -> None:
+        """Use a worker that has described itself, unless it is another one or sees other files."""
+        hint = _SAME
+        try:
+            described = worker.describing.result()
+        except Exception as fault:
+            words = f"cdtool cannot be used there: {shorten(one_line(f'{type(fault).__name__}: {fault}'), 120)}"
+        else:
+            if described is None:  # it has ended; if it is still there, it is asked again
+                self.forget(worker)
+                return
+            words = difference(environment(), described.versions)
+            if not words and described.unseen:
+                words, hint = f"{described.unseen[0]} is not the same there", "mount the folder at the same path there"
+        if not words:
+            worker.described = described
+            return
+        self._refused[worker] = WorkerError(f"--cluster {self.words}: worker {worker.address}: {words}", hint)
+        if self.usable:
+            warnings.warn(f"worker {worker.address} is not used: {words}", UserWarning, stacklevel=2)
 
     def wait_for_workers(self) -> None:
         """Wait until workers can be used; raises WorkerError if there is no worker, or if one must not be used."""
-        begin = monotonic()
-        described = begin + _DESCRIBED_WITHIN
-        while True:
-            try:
-                present = asyncio.run_coroutine_threadsafe(self.present(), self.loop).result()
-            except CdtoolError:
-                raise
-            except Exception as fault:
-                raise self.lost(fault) from fault
+        begin = described = monotonic()
+        while not self.workers or len(self.usable) < len(self.workers):
             now = monotonic()
-            if self._refused:
-                raise next(iter(self._refused.values()))
-            if present and (len(self.workers) == len(present) or (self.workers and now > described)):
+            if self.usable and now - described > _DESCRIBED_WITHIN:
                 return
-            if not present:
-                described = now + _DESCRIBED_WITHIN
-                if now - begin > _JOINED_WITHIN:
-                    raise self.without_workers()
+            if not self.workers and now - begin > _JOINED_WITHIN:
+                raise self.without_workers()
+            described = described if self.workers else now
+            self.look()
+            for fault in self._refused.values():
+                raise fault
             sleep(0.05)
 
     def task(self, address: str, work: Callable[..., Any], *arguments: Any) -> Any:
         """Return Dask's future of a call on one worker process, and on no other."""
         return self.client.submit(work, *arguments, workers=[address], allow_other_workers=False, pure=False, retries=0)
 
-    async def result(self, task: Any) -> Any:
-        """Return the result of a task, or raise its error.
+    def result(self, task: Any) -> Future[Any]:
+        """Return the future result of a task; None if its worker has ended, as far as Dask reports it."""
 
-        Raises NoResultError if its worker has ended, WorkerError if the scheduler has.
-        """
-        try:
-            found = await self.client.gather([task], errors="skip", asynchronous=True)
-        except OSError as lost:  # of the connection to the scheduler: an error of the task is asked for below
-            raise self.lost(lost) from lost
-        if found:
-            return found[0]
-        fault = await task.exception(asynchronous=True)
-        if fault is None or type(fault).__name__ == "KilledWorker":
-            raise NoResultError
-        raise fault
+        async def gathered() -> Any:
+            if found := await self.client.gather([task], errors="skip", asynchronous=True):
+                return found[0]
+            fault = await task.exception(asynchronous=True)
+            if fault is not None and type(fault).__name__ != "KilledWorker":
+                raise fault
+            return None
 
-    def forget(self, address: str) -> None:
+        return asyncio.run_coroutine_threadsafe(gathered(), self.client.loop.asyncio_loop)
+
+    def forget(self, worker: Worker) -> None:
         """Use a worker no more; a process that has its address later is another one."""
-        self.workers.pop(address, None)
-        self._refused.pop(address, None)
-        describing = self._described.pop(address, None)
-        if describing is not None and not describing.done():
-            describing.cancel()
+        worker.describing.cancel()
+        if self.workers.get(worker.address) is worker:
+            del self.workers[worker.address]
 
-    async def last_reports(self) -> dict[str, tuple[float, bool]]:
-        """Return when each worker has last reported to its scheduler, by its clock [s], and whether it has paused.
-
-        A worker with little free memory pauses: it begins nothing until it has more.
-        """
-        known = await asyncio.wait_for(self.client.scheduler.identity(n_workers=-1), _ANSWERED_WITHIN)
-        return {address: (item["last_seen"], item["status"] == "paused") for address, item in known["workers"].items()}
-
-    def restart(self, address: str) -> None:
+    def restart(self, worker: Worker) -> None:
         """Let the nanny of a worker that does not respond end it, and start another one."""
+        self.forget(worker)
+        with suppress(Exception):
+            self.client.restart_workers([worker.address], timeout=_ANSWERED_WITHIN, raise_for_error=False)
 
-        def end() -> None:
-            with suppress(Exception):
-                self.client.restart_workers([address], timeout=30, raise_for_error=False)
-
-        threading.Thread(target=end, daemon=True).start()
-
-    def successor(self, worker: Worker) -> str | None:
-        """Return the address of the worker process that the nanny of one that has ended has started after it."""
-        if worker.nanny is None:
-            return None
-        return next((item.address for item in list(self.workers.values()) if item.nanny == worker.nanny), None)
-
-    def exit_status(self, worker: Worker, successor: str) -> int | None:
+    def exit_status(self, worker: Worker) -> int | None:
         """Return the exit status of a worker process that has ended, negative for a signal, if its nanny reports it."""
-        try:
-            logs = self.client.get_worker_logs(workers=[successor], nanny=True)
-        except Exception:
+        if worker.nanny is None or worker.described is None:
             return None
-        said = re.compile(rf"Worker process {worker.number} (was killed by signal|exited with status) (\d+)")
-        for _, line in (item for lines in logs.values() for item in lines):
-            if found := said.search(line):
-                return -int(found[2]) if "signal" in found[1] else int(found[2])
+        said = re.compile(rf"Worker process {worker.described.number} (was killed by signal|exited with status) (\d+)")
+        with suppress(Exception):
+            for _, line in self.client.sync(self.client.rpc(worker.nanny).get_logs, callback_timeout=_CONNECTED_WITHIN):
+                if found := said.search(line):
+                    return -int(found[2]) if "signal" in found[1] else int(found[2])
         return None
 
     def lost(self, fault: BaseException | None = None) -> WorkerError:
@@ -270,29 +247,43 @@ def _closed(client: Any) -> None:
 @contextmanager
 def _local(jobs: int) -> Iterator[Any]:
     """Start a scheduler and worker processes on this machine, and end them after the block."""
-    import distributed
-
-    start: Any = distributed.LocalCluster
     resource_tracker.ensure_running()  # its start would end the block below for the thread that starts processes
     cluster = None
     try:
         with without_interruption():
-            cluster = start(
-                n_workers=jobs,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,
-                # Its other pages have a free port.
-                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-                silence_logs=logging.CRITICAL + 1,
-                # Dask calls its function dask_setup.
-                preload=["cdtool.execution.local_worker"],
-            )
+            cluster = _started(jobs)
         yield cluster
     finally:
         if cluster is not None:
             with suppress(Exception):
                 cluster.close(timeout=10)
+
+
+def _started(jobs: int, attempts: int = 2) -> Any:
+    """Start a scheduler and worker processes; again if one of them ends meanwhile."""
+    import distributed
+
+    start: Any = distributed.LocalCluster
+    before = set(active_children())
+    try:
+        return start(
+            n_workers=jobs,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            # Its other pages have a free port.
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            silence_logs=logging.CRITICAL + 1,
+            # Dask calls its function dask_setup.
+            preload=["cdtool.execution.starting"],
+            death_timeout=_JOINED_WITHIN,
+        )
+    except (RuntimeError, TimeoutError, AssertionError) as fault:  # the last one by a nanny whose process is stopped
+        for process in set(active_children()) - before:
+            process.kill()
+        if attempts > 1:
+            return _started(jobs, attempts - 1)
+        raise WorkerError(f"--cluster {LOCAL}: a worker ended while it was started", "run it again") from fault
 
 
 @contextmanager

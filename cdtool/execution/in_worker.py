@@ -1,48 +1,58 @@
-"""What runs in a worker process: the pieces of a batch, one after the other, each within its time limit.
-
-A worker notes which piece it is working on in memory that it shares with the first process, so that a piece that ends
-the worker is known.
-"""
+"""What runs in a worker process: one item at a time; its outcome is the result, or why there is no result."""
 
 from __future__ import annotations
 
-import faulthandler
 import os
 import pickle
 import signal
-import sys
+import socket
+import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
-from time import monotonic_ns
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdtool.execution.interruption import ignore_interruption
+from cdtool.execution.starting import ignore_interruption
 
-# A worker that another process ends exits with this status.
-TOLD_TO_END = 143
-# Entries of a claim: the process, the number of the piece counted from 1 (0: none; negative: it is done, and its result
-# is being sent or was sent), when it began, and when the process was asked to end (0: not) [ns].
-CLAIM = 4
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
 # The arrays of a log are smaller [bytes].
 _KEPT = 4 << 20
+# Bytes before each message that state its length.
+HEADER = 8
 
-# What is done with each piece, the claim of this worker, and the time limit [s].
-_work: Callable[[Any], Any] | None = None
-_claim: Any = None
-_limit: float | None = None
-_nowhere: Any = None
+
+@dataclass(frozen=True)
+class Done:
+    """The result of an item."""
+
+    value: Any
 
 
 @dataclass(frozen=True)
 class Failed:
-    """A piece of work that may succeed when it is repeated, with the reason why it did not."""
+    """An item that may succeed when it is repeated, with the reason why it did not."""
 
     reason: str
+
+
+@dataclass(frozen=True)
+class Raised:
+    """The error that the work on an item raised: it ends all work."""
+
+    fault: Exception
+
+
+@dataclass(frozen=True)
+class NotBegun:
+    """An item whose worker ended before it began."""
+
+
+Outcome = Done | Failed | Raised | NotBegun
 
 
 def limit_words(seconds: float) -> str:
@@ -71,96 +81,60 @@ def keep_freed_memory() -> None:
     np.empty(_KEPT, np.uint8)
 
 
-def begin(work: Callable[[Any], Any], claims: Any, free_claims: Any, limit: float | None) -> None:
-    """Prepare a worker: it leaves Ctrl-C to the first process, and ends with it even if that is killed."""
-    global _work, _claim, _limit
-    _work, _limit = work, limit
-    first = CLAIM * free_claims.get()
-    _claim = memoryview(claims).cast("B").cast("q")[first : first + CLAIM]
-    _claim[0] = os.getpid()
-    keep_freed_memory()
-    ignore_interruption()
-    signal.signal(signal.SIGTERM, _end)
-    sys.unraisablehook = _end_from_callback
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end(*_: object) -> None:
-    _claim[3] = monotonic_ns()
-    if _claim[1] <= 0:  # waiting for work, in code that would print where it was interrupted
-        os._exit(TOLD_TO_END)
-    raise SystemExit(TOLD_TO_END)  # temporary files of the piece are removed
-
-
-def _end_from_callback(unraisable: sys.UnraisableHookArgs) -> None:
-    """End a worker that gets the signal in a callback from C, as while LLVM compiles: no exception passes C code."""
-    if unraisable.exc_type is SystemExit:
-        os._exit(TOLD_TO_END)
-    sys.__unraisablehook__(unraisable)
-
-
-def _end_with_parent() -> None:
-    from multiprocessing import parent_process
-
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(TOLD_TO_END)
-
-
-def do(batch: Sequence[tuple[int, Any]]) -> list[Any]:
-    """Return the result of each of the numbered pieces, or `Failed`."""
-    assert _work is not None
+def attempt(work: Callable[[Any], Any], item: Any) -> Outcome:
+    """Return the outcome of an item."""
     try:
-        return [_done(_work, number, item) for number, item in batch]
-    except SystemExit as end:  # temporary files are removed by now
-        os._exit(exit_code(end))
-    except Exception as fault:
-        raise sendable(fault) from None
-
-
-def exit_code(end: SystemExit) -> int:
-    """Return the exit status of a process that ends so."""
-    return end.code if isinstance(end.code, int) else int(end.code is not None)
-
-
-def sendable(fault: Exception) -> Exception:
-    """Return an error that arrives in another process: itself, or its words if it cannot be copied."""
-    try:
-        pickle.loads(pickle.dumps(fault))
-    except Exception:
-        return RuntimeError(f"{type(fault).__name__}: {fault}")
-    return fault
-
-
-def _done(work: Callable[[Any], Any], number: int, item: Any) -> Any:
-    _claim[2] = monotonic_ns()
-    _claim[1] = number + 1
-    try:
-        with time_limit(_limit):
-            result = work(item)
+        return Done(work(item))
     except MemoryError:
-        result = Failed("not enough memory")
-    except (KeyboardInterrupt, GeneratorExit) as fault:  # raised by the piece: Ctrl-C is ignored here
-        result = Failed(f"it was ended by {type(fault).__name__}")
-    except Exception:
-        _claim[1] = -_claim[1]
-        raise
-    _claim[1] = -_claim[1]
-    return result
+        return Failed("not enough memory")
+    except SystemExit as end:
+        return Failed(ended_words(end.code if isinstance(end.code, int) else int(end.code is not None)))
+    except (KeyboardInterrupt, GeneratorExit) as fault:  # raised by the work: Ctrl-C is ignored in a worker
+        return Failed(f"it was ended by {type(fault).__name__}")
+    except Exception as fault:
+        return Raised(fault)
 
 
-@contextmanager
-def time_limit(seconds: float | None) -> Iterator[None]:
-    """End this process if the block takes longer, also if it does not return to Python; None: no limit."""
-    global _nowhere
-    if seconds is None:
-        yield
-        return
-    if _nowhere is None:
-        _nowhere = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  open until the process ends
-    faulthandler.dump_traceback_later(seconds, exit=True, file=_nowhere)
+def sendable(outcome: Outcome) -> bytes:
+    """Return an outcome as bytes; an error that cannot be copied to another process is replaced by its words."""
     try:
-        yield
-    finally:
-        faulthandler.cancel_dump_traceback_later()
+        content = pickle.dumps(outcome, pickle.HIGHEST_PROTOCOL)
+        if isinstance(outcome, Raised):
+            pickle.loads(content)
+        return content
+    except Exception as fault:
+        fault = outcome.fault if isinstance(outcome, Raised) else fault
+        return pickle.dumps(Raised(RuntimeError(f"{type(fault).__name__}: {fault}")))
+
+
+def serve(
+    pipe: socket.socket, work: Callable[[Any], Any], folder: str, first: Connection, inherited: Connection | None
+) -> None:
+    """Do the work on each item that comes through the pipe; end with the first process, even if that is killed.
+
+    Temporary files are made in `folder`, which the first process removes. `first` is closed at its other end when the
+    first process ends; a forked worker has inherited that end, too.
+    """
+    if inherited is not None:
+        inherited.close()
+    ignore_interruption()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with, args=(first,), daemon=True).start()
+    tempfile.tempdir = folder
+    keep_freed_memory()
+    items = pipe.makefile("rb")
+    _send(pipe, b"")
+    with suppress(EOFError, ConnectionError):
+        while True:
+            outcome = attempt(work, pickle.load(items))
+            _send(pipe, sendable(outcome))
+
+
+def _send(pipe: socket.socket, content: bytes) -> None:
+    pipe.sendall(len(content).to_bytes(HEADER) + content)
+
+
+def _end_with(first: Connection) -> None:
+    with suppress(EOFError, OSError):
+        first.recv_bytes()
+    os._exit(1)

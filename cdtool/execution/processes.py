@@ -1,200 +1,189 @@
-"""Processes of this machine that do pieces of work, and which piece is to blame if one of them ends.
+"""Worker processes of this machine, each with a pipe of its own and one item at a time.
 
-On Linux they are forked from this process, so that they share its modules and compiled kernels; elsewhere, and if this
-process has several threads, they are new processes of Python.
+So it is known which item a process had when it ended, and when it began; a process that ends is replaced. On Linux they
+are forked from this process, so that they share its modules and compiled kernels; elsewhere, and if this process has
+several threads, they are new processes of Python.
 """
 
 from __future__ import annotations
 
 import os
-import signal
+import pickle
+import socket
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import CancelledError, Future
-from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+import tempfile
+from collections.abc import Callable
+from math import inf
 from multiprocessing import get_context
 from multiprocessing.connection import wait
-from multiprocessing.context import BaseContext
-from multiprocessing.process import BaseProcess
-from time import monotonic, monotonic_ns
+from time import monotonic
 from typing import Any
 
 from cdtool.base.errors import WorkerError
-from cdtool.execution.forking import shares_memory
-from cdtool.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, ended_words, limit_words
-from cdtool.execution.interruption import without_interruption
+from cdtool.execution.in_worker import HEADER, Failed, NotBegun, Outcome, ended_words, limit_words, serve
+from cdtool.execution.starting import shares_memory, without_interruption
 
-# On Windows, a process is ended in one way only.
-_KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 # Windows waits for no more processes at a time.
 _MOST_PROCESSES = 61 if os.name == "nt" else sys.maxsize
-# So many times in a row processes may end although none of them has begun a piece.
+# So many times in a row processes may end before they are ready for work.
 _MOST_RESTARTS = 3
-_JOINED_WITHIN, _ENDED_WITHIN = 10.0, 3.0
-# After the time limit, a process has this long to end itself; processes and pieces are looked at so often [s].
-_GRACE, _CHECKED_EVERY = 2.0, 1.0
-# The pool notices within this time that a process has ended, unless it waits for the rest of what that one sent [s].
-_NOTICED_WITHIN = 2.0
+# A process is ready within this time, if there is a time limit [s].
+_READY_WITHIN = 60.0
+# Of an outcome, at most so much is read at once [bytes].
+_AT_ONCE = 1 << 20
+
+
+class _Process:
+    """A worker process: whether it is ready for work, the number of its item, and since when it has it."""
+
+    def __init__(self, start: Callable[[socket.socket], Any]) -> None:
+        self.pipe, other = socket.socketpair()
+        with other:
+            self.process = start(other)
+        self.number: int | None = None
+        self.since = monotonic()
+        self.is_ready = False
+        self._received = bytearray()
+
+    def send(self, number: int, item: Any) -> None:
+        """Give it an item."""
+        self.number, self.since = number, monotonic()
+        content = pickle.dumps(item, pickle.HIGHEST_PROTOCOL)
+        self.pipe.settimeout(None)
+        try:
+            self.pipe.sendall(content)
+        except OSError:  # it has ended, which is noticed when its outcome is waited for
+            self.is_ready = False
+        self.pipe.setblocking(False)
+
+    def received(self) -> list[bytes]:
+        """Return the messages of which all is there; raises EOFError if the process has ended.
+
+        Nothing waits for a process that is ended, or stopped, while it sends.
+        """
+        try:
+            content = self.pipe.recv(_AT_ONCE)
+        except BlockingIOError:
+            return []
+        except OSError as fault:
+            raise EOFError from fault
+        if not content:
+            raise EOFError
+        self._received += content
+        messages = []
+        while len(self._received) >= HEADER:
+            end = HEADER + int.from_bytes(self._received[:HEADER])
+            if len(self._received) < end:
+                break
+            messages.append(bytes(self._received[HEADER:end]))
+            del self._received[:end]
+        return messages
+
+    def end(self) -> int:
+        """End it, and return its exit status."""
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+        code: int = self.process.exitcode
+        return code
 
 
 class Processes:
-    """A `ProcessPoolExecutor` for one kind of work that is replaced when one of its processes ends.
-
-    `size` processes do the work, on Windows at most 61; a piece that takes longer than `limit` [s] ends its process.
-    """
-
-    broken: tuple[type[BaseException], ...] = (BrokenProcessPool, CancelledError)
-    isolates = False
+    """At most `size` processes for one kind of work; one whose item takes longer than `limit` [s] is ended."""
 
     def __init__(self, work: Callable[[Any], Any], size: int, limit: float | None) -> None:
         self.size = min(size, _MOST_PROCESSES)
-        self._work = work
-        self._limit = limit
+        self._work, self._limit = work, limit
+        self._context: Any = get_context("fork" if shares_memory() else "spawn")
+        self._processes: list[_Process] = []
         self._restarts = 0
-        self._start()
 
-    def _start(self) -> None:
-        context = _context()
-        try:
-            self._claims: Any = context.RawArray("q", CLAIM * self.size)
-            free: Any = context.SimpleQueue()
-        except OSError as fault:
-            words = f"no shared memory for processes: {fault.strerror or fault}"
-            raise WorkerError(words, "free space in /dev/shm, or use --jobs 1 without --timeout") from fault
-        for number in range(self.size):
-            free.put(number)
-        self._children: set[BaseProcess] = set()
-        self._ended_at: float | None = None  # when it was first seen that a process has ended
-        self._ended_here: set[int] = set()
-        self._pool = ProcessPoolExecutor(
-            self.size, context, initializer=begin, initargs=(self._work, self._claims, free, self._limit)
-        )
-        self._results: Any = self._pool._result_queue  # shutting the pool down drops it
+    def __enter__(self) -> Processes:
+        """Begin: processes are started when there is an item for them."""
+        self._folder = tempfile.TemporaryDirectory(prefix="cdtool-")
+        self._first, self._own = self._context.Pipe(duplex=False)
+        return self
 
-    def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:  # noqa: ARG002
-        """Return the future results of some numbered pieces; a pool whose process has ended gives a failed one."""
-        try:
-            with without_interruption():  # it starts processes
-                future = self._pool.submit(do, batch)
-        except BrokenProcessPool as fault:
-            future = Future()
-            future.set_exception(fault)
-        # The pool's own list: another pool may be at work in this program, and a process that has ended is in no other.
-        self._children |= set((self._pool._processes or {}).values())
-        return future
+    def __exit__(self, *_: object) -> None:
+        """End all processes, whatever they do, and remove their temporary files."""
+        for each in self._processes:
+            each.process.kill()
+        for each in self._processes:
+            each.end()
+        self._first.close()
+        self._own.close()
+        self._folder.cleanup()
 
-    def blamed(self, lost: Future[list[Any]]) -> dict[int, str]:  # noqa: ARG002  the claims show it
-        """Return the numbers of the pieces that ended their processes, with the reasons, and start new processes.
+    @property
+    def free(self) -> int:
+        """Return how many items can be begun."""
+        return self.size - sum(each.number is not None for each in self._processes)
 
-        Raises WorkerError if the processes end again and again before they have begun a piece.
+    def begin(self, number: int, item: Any) -> None:
+        """Give an item to a process without one."""
+        idle = next((each for each in self._processes if each.number is None), None)
+        if idle is None:
+            idle = _Process(self._start)
+            self._processes.append(idle)
+        idle.send(number, item)
+
+    def _start(self, pipe: socket.socket) -> Any:
+        inherited = self._own if self._context.get_start_method() == "fork" else None
+        arguments = (pipe, self._work, self._folder.name, self._first, inherited)
+        process = self._context.Process(target=serve, args=arguments, daemon=True)
+        with without_interruption():
+            process.start()
+        return process
+
+    def ended(self, *, wait_for_one: bool) -> list[tuple[int, Outcome]]:
+        """Return the items that are done or whose processes have ended, if there are any or it has waited for one.
+
+        Raises WorkerError if processes end again and again before they are ready for work.
         """
-        now = monotonic_ns()
-        self._end(self._children)
-        self._pool.shutdown(wait=True, cancel_futures=True)
-        status: dict[int, int | None] = {}
-        for child in self._children:
-            child.join(_JOINED_WITHIN)
-            status[child.pid or 0] = child.exitcode
-        for process in self._ended_here & set(status):
-            status[process] = TOLD_TO_END
-        found: dict[int, str] = {}
-        asked: list[tuple[int, int]] = []
-        for process, number, since, told in self._each_claim():
-            code = status.get(process, 1)
-            if code in (TOLD_TO_END, -signal.SIGTERM):
-                asked += [(told, number)] if told else []
-            elif number > 0 and code is not None:
-                found[number - 1] = self._reason(code, 1e-9 * (now - since))
-            elif number and code is not None:  # its result may not have arrived
-                found[-number - 1] = ended_words(code)
-        # The pool asks all processes to end when one of them has ended; if none has, the first one was asked by others.
-        if not found and asked and all(code in (TOLD_TO_END, -signal.SIGTERM) for code in status.values()):
-            _, number = min(asked)
-            found |= {number - 1: ended_words(-signal.SIGTERM)} if number > 0 else {}
-        self._restarts = 0 if found else self._restarts + 1
+        timeout: float | None = 0.0
+        if wait_for_one:
+            end = min(map(self._end_of, self._processes), default=inf)
+            timeout = None if end == inf else max(0.0, end - monotonic())
+        found = []
+        for pipe in wait([each.pipe for each in self._processes], timeout):
+            each = next(item for item in self._processes if item.pipe is pipe)
+            found += self._outcomes(each)
+        for each in [item for item in self._processes if monotonic() > self._end_of(item)]:
+            assert self._limit is not None, "without a limit, none is too late"
+            found += self._removed(each, Failed(limit_words(self._limit)))
+        return found
+
+    def _end_of(self, process: _Process) -> float:
+        """Return when the item of a process has taken too long [s]."""
+        if self._limit is None or process.number is None:
+            return inf
+        return process.since + (self._limit if process.is_ready else self._limit + _READY_WITHIN)
+
+    def _outcomes(self, process: _Process) -> list[tuple[int, Outcome]]:
+        """Return the outcome of the item of a process, if it is there or if the process has ended."""
+        try:
+            messages = process.received()
+        except EOFError:
+            return self._removed(process)
+        found: list[tuple[int, Outcome]] = []
+        for message in messages:
+            if message:
+                assert process.number is not None, "it had an item"
+                found.append((process.number, pickle.loads(message)))
+                process.number = None
+            else:
+                process.is_ready, process.since, self._restarts = True, monotonic(), 0
+        return found
+
+    def _removed(self, process: _Process, outcome: Outcome | None = None) -> list[tuple[int, Outcome]]:
+        """Remove a process that has ended or is to end, and return the outcome of its item."""
+        self._processes.remove(process)
+        code = process.end()
+        if not process.is_ready:
+            self._restarts += 1
+            outcome = NotBegun()
         if self._restarts > _MOST_RESTARTS:
             raise WorkerError(
                 "worker processes end before they begin their work", "with too little memory, use a smaller --jobs"
             )
-        self._start()
-        return found
-
-    def _reason(self, code: int, seconds: float) -> str:
-        if self._limit is not None and code in (1, -_KILL) and seconds >= self._limit:
-            return limit_words(self._limit)
-        return ended_words(code)
-
-    def check(self) -> float:
-        """End a process whose piece takes too long and did not end itself; let the pool notice one that has ended."""
-        self._release()
-        if self._limit is None:
-            return _CHECKED_EVERY
-        now = monotonic_ns()
-        too_long = {
-            process
-            for process, number, since, _ in self._each_claim()
-            if number > 0 and 1e-9 * (now - since) > self._limit + _GRACE
-        }
-        for child in self._children:
-            if child.pid in too_long and not _has_ended(child):
-                child.kill()
-        return _CHECKED_EVERY
-
-    def _release(self) -> None:
-        """End all processes if one has ended and the pool did not notice it.
-
-        A process that is killed while it sends a result leaves the pool waiting for the rest of it, and the other
-        processes for the right to send theirs.
-        """
-        ended = set(filter(_has_ended, self._children))
-        if not ended:
-            self._ended_at = None
-        elif self._ended_at is None:
-            self._ended_at = monotonic()
-        elif monotonic() - self._ended_at > _NOTICED_WITHIN:
-            self._end(self._children - ended)
-            self._ended_at = None
-
-    def _end(self, children: Iterable[BaseProcess]) -> None:
-        """End processes, by force if they ignore the signal, and the wait of the pool for what they did not send."""
-        for child in children:
-            if not _has_ended(child):
-                self._ended_here.add(child.pid or 0)
-                child.terminate()
-        until = monotonic() + _ENDED_WITHIN
-        for child in children:
-            child.join(max(0.0, until - monotonic()))
-            if not _has_ended(child):
-                child.kill()
-                child.join(_JOINED_WITHIN)
-        # The pool holds an end of the pipe for sending, too: without this it never sees that nobody else does.
-        with suppress(AttributeError, OSError):
-            self._results._writer.close()
-
-    def _each_claim(self) -> Iterator[Sequence[int]]:
-        return (self._claims[first : first + CLAIM] for first in range(0, len(self._claims), CLAIM))
-
-    def progressed(self) -> None:
-        """Note that a piece was done: the processes work."""
-        self._restarts = 0
-
-    @contextmanager
-    def __call__(self) -> Iterator[Processes]:
-        """End the processes after the block; if it ends early, without waiting for the work that has begun."""
-        try:
-            yield self
-        except BaseException:
-            self._pool.shutdown(wait=False, cancel_futures=True)
-            self._end(self._children)
-            raise
-        self._pool.shutdown(wait=True)
-
-
-def _has_ended(child: BaseProcess) -> bool:
-    """Return whether a process has ended; `is_alive` may be wrong while a thread of the pool waits for it."""
-    return bool(wait([child.sentinel], 0.0))
-
-
-def _context() -> BaseContext:
-    return get_context("fork" if shares_memory() else "spawn")
+        return [] if process.number is None else [(process.number, outcome or Failed(ended_words(code)))]

@@ -1,26 +1,23 @@
 """Work on many independent items, in this process, in several or on a cluster, with the results in the items' order.
 
 Reading and judging a log hold Python's interpreter lock most of the time, so threads would not save time: jobs are
-processes. They receive the work once, and the items in batches: sending one costs
-as much as a twentieth of scoring a log. An item that ends its worker or takes too long is tried again in another
-worker; the items that were under way beside it are repeated without being counted.
+processes. They receive the work once, and one item at a time, so that it is known which item ended its worker or takes
+too long: it is tried again in another worker.
 """
 
 from __future__ import annotations
 
 import gc
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, wait
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cdtool.base.errors import UsageError, WorkerError
 from cdtool.base.remote.staging import copies_in_use
-from cdtool.execution.in_worker import Failed, keep_freed_memory
+from cdtool.execution.in_worker import Done, Failed, Outcome, Raised, keep_freed_memory
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -29,8 +26,8 @@ Progress = Callable[[int, int], None]
 # Returns what is made of an item that could not be worked on, given the reason.
 OfLost = Callable[[Any, str], Any]
 
-_AHEAD = 2  # batches per worker
-_SHARES = 4  # of what is left, per worker
+# Items per worker that are under way or wait for the result before them: a long one does not stop the others.
+_AHEAD = 8
 # Python 3.12.1 itself leaves some hundred objects out of garbage collection; a caller that does so leaves out all.
 _LEFT_OUT_BY_PYTHON = 10_000
 
@@ -79,39 +76,32 @@ class Workers:
 
 
 class Pool(Protocol):
-    """The contract of a pool of workers for one kind of work; called, it is a context in which it works."""
-
-    # Exceptions of futures whose worker has ended.
-    broken: tuple[type[BaseException], ...]
-    # Whether `submit` can do an item alone; otherwise it is alone if nothing else is under way.
-    isolates: bool
+    """The contract of a pool of workers for one kind of work, which works in its context."""
 
     @property
     def size(self) -> int:
-        """Return the number of items that it works on at a time."""
+        """Return the number of workers."""
         ...
 
-    def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:
-        """Return the future results of some numbered items; `alone`: if it isolates, on a worker with nothing else."""
+    @property
+    def free(self) -> int:
+        """Return how many items can be begun."""
         ...
 
-    def blamed(self, lost: Future[list[Any]]) -> dict[int, str]:
-        """After an exception in `broken`: return the items that ended their workers, and why; make the pool usable.
-
-        Where it is not known which item of a batch ended its worker, it is known when they are done alone.
-        """
+    def begin(self, number: int, item: Any) -> None:
+        """Give an item to a worker without one."""
         ...
 
-    def check(self) -> float | None:
-        """End what takes too long and does not end itself; return when to call this again [s], None: never."""
+    def ended(self, *, wait_for_one: bool) -> list[tuple[int, Outcome]]:
+        """Return outcomes of items by their numbers; without any, wait for some time if that is asked for."""
         ...
 
-    def progressed(self) -> None:
-        """Note that an item was done."""
+    def __enter__(self) -> Any:
+        """Begin."""
         ...
 
-    def __call__(self) -> AbstractContextManager[Any]:
-        """Return the context."""
+    def __exit__(self, *_: object) -> None:
+        """End all workers."""
         ...
 
 
@@ -123,12 +113,11 @@ def in_order(
     *,
     progress: Progress | None = None,
     of_lost: OfLost | None = None,
-    together: int = 1,
 ) -> Iterator[Made]:
     """Yield `work` of each item, in order, whatever the workers.
 
     With several workers, `work` and the items must be picklable. An item is taken from `items` when its work begins, a
-    few batches before its result is yielded, so that waiting items and results need little memory.
+    few items before its result is yielded, so that waiting items and results need little memory.
 
     Parameters
     ----------
@@ -144,8 +133,6 @@ def in_order(
         Called after each item with the number done and the total.
     of_lost : callable, optional
         Returns the result of an item that ended its workers or took too long, given the item and the reason.
-    together : int, optional
-        The most items of a batch. At the beginning and at the end batches are smaller, so that no worker waits.
 
     Yields
     ------
@@ -165,7 +152,7 @@ def in_order(
     workers = workers or Workers()
     if total > 1:
         keep_freed_memory()
-    made = _made(_Releasing(work), items, total, workers, of_lost, together)
+    made = _made(_Releasing(work), items, total, workers, of_lost)
     with _without_earlier_garbage():
         for number, result in enumerate(made, 1):
             yield result
@@ -174,40 +161,24 @@ def in_order(
 
 
 def _made(
-    work: Callable[[Item], Made],
-    items: Iterable[Item],
-    total: int,
-    workers: Workers,
-    of_lost: OfLost | None,
-    together: int,
+    work: Callable[[Item], Made], items: Iterable[Item], total: int, workers: Workers, of_lost: OfLost | None
 ) -> Iterator[Made]:
     if not total:
-        return iter(())
+        return
     if workers.cluster is not None:
-        return _on_cluster(work, items, total, workers, of_lost, together)
-    if workers.timeout is None and min(workers.jobs, total - 1) <= 1:
-        return map(work, items)
-    from cdtool.execution.processes import Processes
+        from cdtool.execution.cluster import ClusterWorkers
+        from cdtool.execution.cluster_session import session_of
 
-    pool = Processes(work, min(workers.jobs, total), workers.timeout)
-    return _Ordered(pool, total, workers.retries, of_lost, together).results(items)
+        with session_of(workers.cluster, workers.jobs) as session:
+            pool: Pool = ClusterWorkers(session, work, workers.timeout)
+            yield from _Ordered(pool, items, workers.retries, of_lost).results(total)
+    elif workers.timeout is None and min(workers.jobs, total - 1) <= 1:
+        yield from map(work, items)
+    else:
+        from cdtool.execution.processes import Processes
 
-
-def _on_cluster(
-    work: Callable[[Item], Made],
-    items: Iterable[Item],
-    total: int,
-    workers: Workers,
-    of_lost: OfLost | None,
-    together: int,
-) -> Iterator[Made]:
-    from cdtool.execution.cluster import ClusterWorkers
-    from cdtool.execution.cluster_session import session_of
-
-    assert workers.cluster is not None, "the work is done on a cluster"
-    with session_of(workers.cluster, workers.jobs) as session:
-        pool = ClusterWorkers(session, work, workers.timeout)
-        yield from _Ordered(pool, total, workers.retries, of_lost, together).results(items)
+        pool = Processes(work, min(workers.jobs, total), workers.timeout)
+        yield from _Ordered(pool, items, workers.retries, of_lost).results(total)
 
 
 @dataclass(frozen=True)
@@ -239,117 +210,58 @@ def _without_earlier_garbage() -> Iterator[None]:
         gc.unfreeze()
 
 
-@dataclass
-class _Batch:
-    """Consecutive numbered items, and their results once they are there; with neither, an item to be done alone."""
-
-    items: Sequence[tuple[int, Any]]
-    future: Future[list[Any]] | None = None
-    results: list[Any] | None = None
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether its workers have ended before its results."""
-        return self.future is not None and self.future.done() and bool(self.future.exception())
-
-
 class _Ordered:
-    """Results of a pool in the order of the items, whichever of them end their workers."""
+    """The results of a pool in the order of the items, whichever of them end their workers."""
 
-    def __init__(self, pool: Pool, total: int, retries: int, of_lost: OfLost | None, together: int) -> None:
-        self.pool, self.total, self.retries, self.of_lost, self.together = pool, total, retries, of_lost, together
-        self._ahead: deque[_Batch] = deque()
+    def __init__(self, pool: Pool, items: Iterable[Any], retries: int, of_lost: OfLost | None) -> None:
+        self.pool, self.retries, self.of_lost = pool, retries, of_lost
+        self._items = enumerate(items)
+        self._again: deque[tuple[int, Any]] = deque()
+        self._under_way: dict[int, Any] = {}
         self._tried: Counter[int] = Counter()
+        self._done: dict[int, Done | Raised] = {}
 
-    def results(self, items: Iterable[Any]) -> Iterator[Any]:
+    def results(self, total: int) -> Iterator[Any]:
         """Yield the result of each item."""
-        numbered = enumerate(items)
-        with self.pool():
-            yielded = 0
-            self._fill(numbered, yielded)
-            while self._ahead:
-                results = self._results_of_first()
-                if results is None:
-                    continue
-                self._ahead.popleft()
-                yield from results
-                yielded += len(results)
-                self._fill(numbered, yielded)
+        with self.pool:
+            for number in range(total):
+                self._begin()
+                self._settle(wait_for_one=number not in self._done)
+                while number not in self._done:
+                    self._begin()
+                    self._settle(wait_for_one=True)
+                self._begin()
+                done = self._done.pop(number)
+                if isinstance(done, Raised):
+                    raise done.fault
+                yield done.value
 
-    def _fill(self, numbered: Iterator[tuple[int, Any]], yielded: int) -> None:
-        """Submit batches until enough are under way."""
-        while len(self._ahead) < _AHEAD * self.pool.size:
-            taken = yielded + sum(len(batch.items) for batch in self._ahead)
-            batch = list(islice(numbered, self._size(taken)))
-            if not batch:
+    def _begin(self) -> None:
+        """Give items to all workers without one."""
+        while self.pool.free:
+            is_enough = len(self._under_way) + len(self._done) >= _AHEAD * self.pool.size
+            item = self._again.popleft() if self._again else None if is_enough else next(self._items, None)
+            if item is None:
                 return
-            self._ahead.append(_Batch(batch, self.pool.submit(batch)))
+            self.pool.begin(*item)
+            self._under_way.update([item])
 
-    def _size(self, taken: int) -> int:
-        most = min(taken, self.total - taken) // (_SHARES * self.pool.size)
-        return max(1, min(self.together, most))
-
-    def _results_of_first(self) -> list[Any] | None:
-        """Return the results of the first batch; None if some of it is repeated now."""
-        first = self._ahead[0]
-        if first.future is None and first.results is None:
-            self._wait_for([batch.future for batch in self._ahead if batch.future is not None])
-            first.future = self.pool.submit(first.items, alone=True)
-        if first.results is None:
-            assert first.future is not None, "a batch without results is under way"
-            try:
-                first.results = self._awaited(first.future)
-            except self.pool.broken:
-                self._repeat(self.pool.blamed(first.future))
-                return None
-            self.pool.progressed()
-        failed = {
-            number: result.reason
-            for (number, _), result in zip(first.items, first.results, strict=True)
-            if isinstance(result, Failed)
-        }
-        if not failed:
-            return first.results
-        self._ahead.popleft()
-        self._ahead.extendleft(reversed(self._divided(first, failed)))
-        return None
-
-    def _awaited(self, future: Future[list[Any]]) -> list[Any]:
-        self._wait_for([future])
-        return future.result()
-
-    def _wait_for(self, futures: Sequence[Future[list[Any]]]) -> None:
-        while wait(futures, timeout=self.pool.check()).not_done:
-            pass
-
-    def _repeat(self, blamed: dict[int, str]) -> None:
-        """Submit again what was lost; the first batch, or one with an item that is blamed, is divided into items."""
-        ahead = [self._ahead.popleft() for _ in range(len(self._ahead))]
-        for place, batch in enumerate(ahead):
-            if not batch.is_lost:
-                self._ahead.append(batch)
-            elif not place or any(number in blamed for number, _ in batch.items):
-                self._ahead.extend(self._divided(batch, blamed))
+    def _settle(self, *, wait_for_one: bool) -> None:
+        """Note the outcomes of items, and which of them are to be tried again."""
+        for number, outcome in self.pool.ended(wait_for_one=wait_for_one):
+            item = self._under_way.pop(number)
+            self._tried[number] += isinstance(outcome, Failed)
+            if isinstance(outcome, Done | Raised):
+                self._done[number] = outcome
+            elif isinstance(outcome, Failed) and self._tried[number] > self.retries:
+                self._done[number] = _lost(item, outcome.reason, self._tried[number], self.of_lost)
             else:
-                self._ahead.append(_Batch(batch.items, self.pool.submit(batch.items, alone=True)))
+                self._again.append((number, item))
 
-    def _divided(self, batch: _Batch, failed: dict[int, str]) -> list[_Batch]:
-        """Return batches of one item each: done, lost, submitted again, or to be done alone if it failed before."""
-        single = []
-        for place, (number, item) in enumerate(batch.items):
-            alone = [(number, item)]
-            self._tried[number] += number in failed
-            if number not in failed:
-                done = None if batch.results is None else [batch.results[place]]
-                single.append(_Batch(alone, None if done else self.pool.submit(alone, alone=True), done))
-            elif self._tried[number] > self.retries:
-                single.append(_Batch(alone, results=[self._lost(item, number, failed[number])]))
-            else:
-                single.append(_Batch(alone, self.pool.submit(alone, alone=True) if self.pool.isolates else None))
-        return single
 
-    def _lost(self, item: Any, number: int, reason: str) -> Any:
-        tried = f"{reason}, in each of {self._tried[number]} attempts" if self._tried[number] > 1 else reason
-        if self.of_lost is None:
-            raise WorkerError(f"{item}: {tried}", "with too little memory, use a smaller --jobs")
-        return self.of_lost(item, tried)
+def _lost(item: Any, reason: str, tried: int, of_lost: OfLost | None) -> Done | Raised:
+    """Return what stands for an item that has failed too often."""
+    words = f"{reason}, in each of {tried} attempts" if tried > 1 else reason
+    if of_lost is None:
+        return Raised(WorkerError(f"{item}: {words}", "with too little memory, use a smaller --jobs"))
+    return Done(of_lost(item, words))

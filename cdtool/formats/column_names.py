@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Literal
 
 from cdtool.base.errors import RecordingError, nearest
@@ -45,45 +44,45 @@ def column_key(column: str | int, names: Sequence[str]) -> str | None:
     return short[0] if len(short) == 1 else None
 
 
-def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[str]:
+def wanted_keys(wanted: ChannelMap, names: Sequence[str]) -> list[str]:
     """Return the names of the columns that a channel map requests, without repetition and in the file's order.
 
     Ground truth may be absent, because the load cell is fitted for impact tests only. Raises RecordingError if any
     other column is missing.
     """
-    resolved, _ = _resolved(path, wanted, names)
+    resolved, _ = _resolved(wanted, names)
     keys = {resolved.time.key, resolved.time.nanoseconds_key}.union(*(source.keys for source in resolved.sources))
     return [name for name in names if name and name in keys]
 
 
-def requested_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
+def requested_keys(wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
     """Return the columns that a map requests (all if there is no map), except the container's own clock."""
     if wanted is None:
         return list(names)
     if wanted.time.column == OWN_CLOCK and OWN_CLOCK not in names:
         wanted = replace(wanted, time=TimeSource())
-    return wanted_keys(path, wanted, names)
+    return wanted_keys(wanted, names)
 
 
-def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) -> str:
+def find_key(channel: str, column: str | int, names: Sequence[str]) -> str:
     """Return the name of one column; raises RecordingError naming file, channel, column and the nearest known names."""
     key = column_key(column, names)
     if key is not None:
         return key
     if isinstance(column, int):
         raise RecordingError(
-            f"{path}: no column {column} (channel '{channel}')",
+            f"no column {column} (channel '{channel}')",
             f"the file has {len(names)} columns, numbered from 0 to {len(names) - 1}",
             channel=channel,
         )
     numbers = _numbers_of(column, names)
     if len(numbers) > 1:
         raise RecordingError(
-            f"{path}: {len(numbers)} columns have the name '{column}' (channel '{channel}')",
+            f"{len(numbers)} columns have the name '{column}' (channel '{channel}')",
             f"give the column's number instead: {' or '.join(numbers)}",
             channel=channel,
         )
-    raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names), channel=channel)
+    raise RecordingError(f"no column '{column}' (channel '{channel}')", nearest(column, names), channel=channel)
 
 
 def is_absent(column: str | int, names: Sequence[str]) -> bool:
@@ -100,7 +99,7 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
     own = channels.time.column == OWN_CLOCK and any(column.time is not None for column in source.columns.values())
     plain = replace(channels, time=TimeSource()) if own else channels
-    resolved, absent = _resolved(source.path, plain, names)
+    resolved, absent = _resolved(plain, names)
     resolved = replace(resolved, time=channels.time) if own else resolved
     what: Literal["column", "topic"] = "topic" if channels.topics else "column"
     notes = [
@@ -110,32 +109,25 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     return replace(source, findings=(*source.findings, *notes)), resolved
 
 
-def _resolved(path: Path, channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
+def _resolved(channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
     """Return the map with the file's own column names, and the ground truth that is missing from the file."""
+    asked = [(each, (each.described,) if channels.topics else each.columns) for each in channels.sources]
     absent = [
         source
-        for source in channels.sources
-        if source.channel in GROUND_TRUTH and any(is_absent(column, names) for column in _requested(source, channels))
+        for source, columns in asked
+        if source.channel in GROUND_TRUTH and any(is_absent(column, names) for column in columns)
     ]
     time = channels.time
     if time.column is not None:
-        time = replace(time, key=find_key(path, "time", time.column, names))
+        time = replace(time, key=find_key("time", time.column, names))
     if time.nanoseconds is not None:
-        time = replace(time, nanoseconds_key=find_key(path, "time", time.nanoseconds, names))
+        time = replace(time, nanoseconds_key=find_key("time", time.nanoseconds, names))
     sources = tuple(
-        replace(
-            source,
-            keys=tuple(find_key(path, source.channel, column, names) for column in _requested(source, channels)),
-        )
-        for source in channels.sources
+        replace(source, keys=tuple(find_key(source.channel, column, names) for column in columns))
+        for source, columns in asked
         if source not in absent
     )
     return replace(channels, time=time, sources=sources), absent
-
-
-def _requested(source: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
-    """Return the columns of a channel by their names in the machine file."""
-    return (source.described,) if channels.topics else source.columns
 
 
 def _similar(source: ChannelSource, names: Sequence[str]) -> str:

@@ -80,7 +80,7 @@ Parts = Iterable[Sequence[Part | None]]
 WrittenNames = list[list[list[str]]]
 
 
-class Writer(Protocol):
+class GroupWriter(Protocol):
     """Write groups with their provenance to a file; return the name of each column for the machine file."""
 
     def __call__(
@@ -90,18 +90,18 @@ class Writer(Protocol):
         ...
 
 
-def single_group(path: Path, groups: Sequence[Group]) -> Group:
+def single_group(groups: Sequence[Group]) -> Group:
     """Return the only group; raises UsageError if there are several."""
     if len(groups) != 1:
-        raise UsageError(f"{path}: a table has one clock, but there are {len(groups)}", "write one file per clock")
+        raise UsageError(f"a table has one clock, but there are {len(groups)}", "write one file per clock")
     return groups[0]
 
 
-def require_clocks(path: Path, groups: Sequence[Group]) -> None:
+def require_clocks(groups: Sequence[Group]) -> None:
     """Raise UsageError if the times of a group are not known; for containers that need times."""
     if not all(group.timed for group in groups):
         raise UsageError(
-            f"{path}: no column of the log is recognised as its clock, and this container needs a clock",
+            "no column of the log is recognised as its clock, and this container needs a clock",
             "name the clock in a machine file, and pass the file with -m",
         )
 

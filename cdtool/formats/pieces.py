@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import naming
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.columns import Column, Piece
 from cdtool.formats.source import Format, Source
@@ -33,11 +34,13 @@ class PiecewiseFormat(ABC):
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError."""
-        return join_pieces(self._read(path, wanted, None), sort=False)
+        with naming(path):
+            return join_pieces(self._read(path, wanted, None), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, some MiB at a time; raises RecordingError."""
-        return self._read(path, None, keys)
+        with naming(path):
+            return (yield from self._read(path, None, keys))
 
     @abstractmethod
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:

@@ -13,7 +13,7 @@ from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.files.bounded_loading import ContentError, parse_toml, read_text
 from cdtool.base.remote.remote_path import joined, relative_name
 from cdtool.formats.columns import Column
-from cdtool.formats.groups import Group, Writer, WrittenNames
+from cdtool.formats.groups import Group, GroupWriter, WrittenNames
 from cdtool.formats.machine_file import MachineFile
 from cdtool.recordings.recording import UNITLESS
 
@@ -32,13 +32,13 @@ _HEADER = re.compile(r"^\s*\[\[?\s*(?P<name>[^\[\]]+?)\s*\]\]?\s*(#.*)?$")
 _URDF = re.compile(r"^(\s*urdf\s*=\s*).*$", re.MULTILINE)
 
 
-def writer_of(target: Path) -> Writer:
+def writer_of(target: Path) -> GroupWriter:
     """Return the writer of a file's suffix; raises UsageError for an unknown one."""
     place = WRITERS.get(target.suffix.lower())
     if place is None:
         raise UsageError(f"{target}: '{target.suffix}' cannot be written", nearest(target.suffix, WRITERS))
     module, _, name = place.partition(":")
-    writer: Writer = getattr(import_module(module), name)
+    writer: GroupWriter = getattr(import_module(module), name)
     return writer
 
 

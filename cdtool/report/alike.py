@@ -14,7 +14,7 @@ _EACH, _NAMED = 3, 3
 _NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")
 
 
-class Entry(NamedTuple):
+class AlikeText(NamedTuple):
     """A text about a recording or channel `name`; entries of one `kind` are merged, and their subjects are listed."""
 
     name: str
@@ -23,19 +23,19 @@ class Entry(NamedTuple):
     subject: str
 
 
-class Reason(NamedTuple):
+class RecordingReason(NamedTuple):
     """A recording with a reason or a finding."""
 
     recording: str
     reason: str
 
 
-def grouped(items: Sequence[Entry]) -> list[tuple[str, str]]:
+def grouped(items: Sequence[AlikeText]) -> list[tuple[str, str]]:
     """Merge entries of one kind, with a count.
 
     Parameters
     ----------
-    items : sequence of Entry
+    items : sequence of AlikeText
         Names with texts and their kinds.
 
     Returns
@@ -49,7 +49,7 @@ def grouped(items: Sequence[Entry]) -> list[tuple[str, str]]:
     >>> grouped([*gaps, Entry("a", "stuck", "stuck", "a")])
     [('a', '3 gaps; 3 more like it (b, c, d)'), ('a', 'stuck')]
     """
-    groups: dict[Hashable, list[Entry]] = {}
+    groups: dict[Hashable, list[AlikeText]] = {}
     for item in items:
         groups.setdefault(item.kind, []).append(item)
     found: list[tuple[str, str]] = []
@@ -83,11 +83,14 @@ def grouped_findings(items: Sequence[Finding]) -> list[tuple[str, str]]:
     [('speed', 'the value never changes while the machine moves: stuck?; 3 more like it (torque, force, position)')]
     """
     return grouped(
-        [Entry(item.channel, item.message, (item.kind, item.variant), item.channel or item.subject) for item in items]
+        [
+            AlikeText(item.channel, item.message, (item.kind, item.variant), item.channel or item.subject)
+            for item in items
+        ]
     )
 
 
-def alike(items: Sequence[Skipped | RecordingFinding]) -> list[Reason]:
+def alike(items: Sequence[Skipped | RecordingFinding]) -> list[RecordingReason]:
     """Merge findings of one kind about one channel, and reasons that differ only in numbers.
 
     Parameters
@@ -105,11 +108,11 @@ def alike(items: Sequence[Skipped | RecordingFinding]) -> list[Reason]:
     >>> [item.reason for item in alike([Skipped(name, f"{n} gaps") for n, name in enumerate("abcd", 1)])]
     ['1 gaps; 3 more like it (b, c, d)']
     """
-    return [Reason(*item) for item in grouped([_entry(item) for item in items])]
+    return [RecordingReason(*item) for item in grouped([_entry(item) for item in items])]
 
 
-def _entry(item: Skipped | RecordingFinding) -> Entry:
+def _entry(item: Skipped | RecordingFinding) -> AlikeText:
     kind: Hashable = _NUMBERS.sub("#", item.reason)
     if isinstance(item, RecordingFinding) and item.kind not in ("", "remark"):
         kind = item.kind, item.channel, item.severity
-    return Entry(item.recording, item.reason, kind, item.recording)
+    return AlikeText(item.recording, item.reason, kind, item.recording)

@@ -5,7 +5,7 @@ Renderers (HTML, Markdown) add markup, choose what fits, and neither compute, fo
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import PureWindowsPath
 from typing import Any
@@ -35,7 +35,6 @@ from cdtool.report.tables.results import (
 from cdtool.report.tables.worst_cases import worst_cases_table
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.results import ContactResult, Results
-from cdtool.results.rows import picked, values_of
 
 # The tables of a command's own section of a benchmark file, and their lines on a terminal: `table` and `lines`.
 SECTIONS = Registry("section of a report", {"injected": "cdtool.commands.inject.report_table:InjectedSection"})
@@ -65,7 +64,6 @@ TITLES = {
     "calibration": "False-alarm budget",
     "provenance": "Provenance",
 }
-_CONTACT = ("group", "recording", "contact")
 # Where only the worst and the failed cases are listed.
 TITLES_OF_MANY = {"latency": "Distribution of the latency", "recordings": TITLES["cases"]}
 # A text from a file that is part of a sentence is cut to this length.
@@ -237,10 +235,12 @@ def counts_text(evaluated: Evaluated) -> str:
     summaries, results = evaluated.summaries, evaluated.results
     if not any(item.contacts or item.operations for item in summaries):
         return "nothing was scored"
-    columns = tuple(values_of(_of_unchanged(results), name) for name in ("outcome", "onset_hole_ms", *_CONTACT))
-    seen = {(outcome == "in_progress", *contact) for outcome, _, *contact in zip(*columns, strict=True)}
-    begun = sum(is_begun for is_begun, *_ in seen)
-    contacts = counted(len(seen) - begun, "contact")
+    unchanged = [item for item in results.contacts if item.group in results.groups]
+
+    def numbers(is_counted: Callable[[ContactResult], bool]) -> int:
+        return len({(item.group, item.recording, item.contact) for item in unchanged if is_counted(item)})
+
+    contacts = counted(numbers(lambda item: not item.in_progress), "contact")
     counts = (
         ("detected", sum(item.detected for item in summaries)),
         ("missed", sum(item.missed for item in summaries)),
@@ -249,11 +249,9 @@ def counts_text(evaluated: Evaluated) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in counts)
     if clipped := sum(item.clipped for item in summaries):
         outcomes += f" ({clipped} before the onset, counted as 0 ms)"
-    if holes := len({tuple(contact) for _, hole, *contact in zip(*columns, strict=True) if hole is not None}):
+    if holes := numbers(lambda item: item.onset_hole_ms is not None):
         outcomes += f"; {counted(holes, 'contact')} may have begun where load-cell samples are missing"
-    if begun := len(
-        {tuple(contact) for outcome, _, *contact in zip(*columns, strict=True) if outcome == "in_progress"}
-    ):
+    if begun := numbers(lambda item: item.in_progress):
         outcomes += f"; {counted(begun, 'contact')} in progress at the start, not scored"
     assessed = any(item.watched and item.judged_operations for item in summaries)
     count = counted(sum(item.false_alarms for item in summaries), "false alarm")
@@ -264,14 +262,6 @@ def counts_text(evaluated: Evaluated) -> str:
 def _bad_logs(cases: Table) -> list[Log]:
     """Return the recordings of the listed cases with a bad outcome."""
     return [log for log, cell in zip(cases.logs, cases.cells("outcome"), strict=True) if cell.tone == "bad"]
-
-
-def _of_unchanged(results: Results) -> Sequence[ContactResult]:
-    """Return the contacts of the unchanged machine."""
-    if not results.conditions:
-        return results.contacts
-    groups = values_of(results.contacts, "group")
-    return picked(results.contacts, [number for number, group in enumerate(groups) if group in results.groups])
 
 
 def _groups_note(evaluated: Evaluated) -> str:
@@ -286,7 +276,7 @@ def _results_note(evaluated: Evaluated) -> str:
     """Return how to read the results: from when to when, what is in brackets, what counts where."""
     results = evaluated.results
     onset = shorten(onset_words(results.provenance), _LONGEST)
-    resolutions = [value for value in values_of(results.contacts, "resolution_ms") if value is not None]
+    resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
     resolution = f"; resolution up to {number(max(resolutions))} ms" if resolutions else ""
     note = (
         f"Latency: from the onset of the contact ({onset}) to the sample that raised the alarm, debounce "

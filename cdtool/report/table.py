@@ -21,7 +21,7 @@ _JOINTS = " ,;:"
 
 
 @dataclass(frozen=True)
-class Column:
+class Heading:
     """A column; `numeric` columns are right-aligned and begin with their largest number when sorted.
 
     `choice`: readers may select one of its values. `below`: where width is scarce, it is shown in small print below the
@@ -59,7 +59,7 @@ class Cell:
 
 
 Row = Sequence[Cell]
-Fields = Sequence[tuple[Column, Callable[[Item], Cell]]]
+Fields = Sequence[tuple[Heading, Callable[[Item], Cell]]]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Table:
 
     name: str
     title: str
-    columns: Sequence[Column]
+    columns: Sequence[Heading]
     rows: Sequence[Row]
     source: str = ""
     marks: Mapping[str, Sequence[bool]] = field(default_factory=dict)
@@ -96,7 +96,7 @@ class Table:
 
     def narrow(self) -> Table:
         """Return the table with each `below` column in small print below the one to its left."""
-        columns: list[Column] = []
+        columns: list[Heading] = []
         rows: list[list[Cell]] = [[] for _ in self.rows]
         for place, column in enumerate(self.columns):
             if column.below:

@@ -6,11 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import NamedTuple
 
 from cdtool.base.errors import UsageError
-from cdtool.results.results import ContactResult, Results
-from cdtool.results.rows import grouped, values_of
+from cdtool.results.results import ContactResult, Results, grouped
 from cdtool.results.summary import campaigns
 from cdtool.statistics.paired import Difference, holm, mcnemar_p, paired_difference
 
@@ -22,15 +20,7 @@ _LEAST_LEVEL = 1e-9
 Key = tuple[str, int]
 
 
-class Seen(NamedTuple):
-    """What a comparison needs of a contact."""
-
-    recording: str
-    outcome: str
-    latency_ms: float | None
-
-
-Pair = tuple[Seen, Seen]
+Pair = tuple[ContactResult, ContactResult]
 
 
 def check_significance(level: float) -> None:
@@ -95,7 +85,11 @@ def compare_detectors(results: Results) -> list[Comparison]:
     of_group = grouped(results.scored_contacts, "group", "detector")
     found: list[Comparison] = []
     for group in results.groups:
-        rows = {name: _seen_by(of_group[group, name]) for name in results.detectors if (group, name) in of_group}
+        rows = {
+            name: {(item.recording, item.contact): item for item in of_group[group, name]}
+            for name in results.detectors
+            if (group, name) in of_group
+        }
         made = [
             _compare(group, first, second, rows[first], rows[second], clusters)
             for first, second in combinations(rows, 2)
@@ -104,18 +98,13 @@ def compare_detectors(results: Results) -> list[Comparison]:
     return found
 
 
-def _seen_by(contacts: Sequence[ContactResult]) -> dict[Key, Seen]:
-    columns = (values_of(contacts, name) for name in ("contact", *Seen._fields))
-    return {(seen[0], number): Seen(*seen) for number, *seen in zip(*columns, strict=True)}
-
-
-def pairs_of(first: Mapping[Key, Seen], second: Mapping[Key, Seen]) -> list[tuple[Seen, Seen]]:
+def _pairs_of(first: Mapping[Key, ContactResult], second: Mapping[Key, ContactResult]) -> list[Pair]:
     """Return the contacts that both could assess."""
-    both = [(first[key], second[key]) for key in first if key in second]
+    both = [(item, second[key]) for key, item in first.items() if key in second]
     return [pair for pair in both if all(item.outcome != "not_assessable" for item in pair)]
 
 
-def latency_difference(pairs: Sequence[Pair], clusters: Mapping[str, str]) -> Difference:
+def _latency_difference(pairs: Sequence[Pair], clusters: Mapping[str, str]) -> Difference:
     """Return the latency [ms] of the first minus that of the second, over the contacts that both detected."""
     differences, labels = [], []
     for first, second in pairs:
@@ -125,7 +114,7 @@ def latency_difference(pairs: Sequence[Pair], clusters: Mapping[str, str]) -> Di
     return paired_difference(differences, labels)
 
 
-def only_one_missed(pairs: Sequence[Pair]) -> tuple[int, int]:
+def _only_one_missed(pairs: Sequence[Pair]) -> tuple[int, int]:
     """Return how many contacts only the first missed, and how many only the second."""
     missed = [(first.outcome == "missed", second.outcome == "missed") for first, second in pairs]
     return missed.count((True, False)), missed.count((False, True))
@@ -135,13 +124,13 @@ def _compare(
     group: str,
     first: str,
     second: str,
-    rows: Mapping[Key, Seen],
-    others: Mapping[Key, Seen],
+    rows: Mapping[Key, ContactResult],
+    others: Mapping[Key, ContactResult],
     clusters: Mapping[str, str],
 ) -> Comparison:
-    pairs = pairs_of(rows, others)
-    difference = latency_difference(pairs, clusters)
-    only = only_one_missed(pairs)
+    pairs = _pairs_of(rows, others)
+    difference = _latency_difference(pairs, clusters)
+    only = _only_one_missed(pairs)
     missed_p = mcnemar_p(*only) if sum(only) else math.nan
     return Comparison(group, first, second, len(pairs), difference, difference.p, *only, missed_p)
 

@@ -20,8 +20,7 @@ from cdtool.base.plain_text import counted, plain
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.limits import not_met
 from cdtool.results.recording_outcomes import MISSES
-from cdtool.results.results import ConclusionResult, ContactResult, ForceResult, Results
-from cdtool.results.rows import grouped, values_of
+from cdtool.results.results import ConclusionResult, Results, grouped
 from cdtool.results.summary import Summary
 
 # Limits on these figures say how many contacts may be missed.
@@ -70,7 +69,7 @@ def force_checks(results: Results) -> list[ForceCheck]:
     for group, profile in _profiles(results).items():
         points = [item for item in results.points if item.group == group]
         named = {item.point for item in points}
-        rows, contacts = forces.get((group,), ()), scored.get((group,), ())
+        rows, contacts = forces.get(group, ()), scored.get(group, ())
         found += [
             ForceCheck(group, item.profile, f"test point {item.point}", item.verdict, item.reason or "", is_point=True)
             for item in points
@@ -82,23 +81,15 @@ def force_checks(results: Results) -> list[ForceCheck]:
             for item in rows
             if item.point not in named
         ]
-        known, why = set(_numbers(rows)), "no load-cell force"
-        unseen = [_name_of(*contact) for contact in sorted(set(_numbers(contacts)) - known)]
+        known, why = {(item.recording, item.contact) for item in rows}, "no load-cell force"
+        without = {(item.recording, item.contact) for item in contacts} - known
+        unseen = [f"{recording}, contact {number}" for recording, number in sorted(without)]
         if not contacts and not rows and not points:
             unseen, why = [""], "no contact of the group was scored: its recordings were left out, or show none"
-            if group in values_of(results.contacts, "group"):
+            if any(item.group == group for item in results.contacts):
                 why = "every contact was in progress when its recording began: its onset is not recorded"
         found += [ForceCheck(group, profile, name, "not_assessable", why) for name in unseen]
     return found
-
-
-def _name_of(recording: str, contact: int) -> str:
-    return f"{recording}, contact {contact}"
-
-
-def _numbers(rows: Sequence[ContactResult] | Sequence[ForceResult]) -> Iterator[tuple[str, int]]:
-    """Return recording and number of the contacts."""
-    return zip(values_of(rows, "recording"), values_of(rows, "contact"), strict=True)
 
 
 def missed_unasked(results: Results, summaries: Sequence[Summary]) -> list[Summary]:
@@ -274,8 +265,7 @@ def partly_unassessed(results: Results, summaries: Sequence[Summary]) -> list[st
 def _profiles(results: Results) -> dict[str, str]:
     """The name of the profile of each group that has one: of the provenance, which a file may hold anything in."""
     listed = results.provenance.get("force_profiles")
-    profiles = zip(values_of(results.forces, "group"), values_of(results.forces, "profile"), strict=True)
-    found = {group: profile for group, profile in profiles if group in results.groups}
+    found = {item.group: item.profile for item in results.forces if item.group in results.groups}
     if isinstance(listed, Mapping):
         named = {str(group): item for group, item in listed.items() if isinstance(item, Mapping)}
         found |= {group: str(item.get("name", "")) for group, item in named.items() if group in results.groups}
@@ -332,11 +322,8 @@ def _of_forces(checks: Sequence[ForceCheck]) -> Iterator[Statement]:
 
 def _force_reasons(checks: Sequence[ForceCheck], verdict: str, what: str) -> tuple[str, ...]:
     """Return a line for each group and profile with this verdict, and its first reason."""
-    parts: dict[Pair, list[ForceCheck]] = {}
-    for item in checks:
-        parts.setdefault((item.group, item.profile), []).append(item)
     lines = []
-    for (group, profile), items in parts.items():
+    for (group, profile), items in grouped(checks, "group", "profile").items():
         those = [item for item in items if item.verdict == verdict]
         if those and not those[0].name:
             lines.append(plain(f"force, {group}, {profile}: not assessable: {those[0].reason}"))
@@ -421,7 +408,7 @@ def _of_losses(results: Results) -> Iterator[Statement]:
     if results.skipped:
         yield Statement(Severity.LOST, f"{counted(len(results.skipped), 'entry')} left out", Fact.LEFT_OUT)
     if results.losses:
-        names = set(values_of(results.losses, "recording"))
+        names = {item.recording for item in results.losses}
         yield Statement(Severity.LOST, f"data lost in {counted(len(names), 'recording')}", Fact.LOST)
 
 
@@ -432,12 +419,8 @@ def _why_unassessed(results: Results, item: Summary, reasons: Mapping[Pair, Sequ
 
 def _reasons_of_contacts(results: Results) -> dict[Pair, Sequence[str]]:
     """Return the different reasons in the rows of the contacts, by detector and group."""
-    found: dict[Pair, dict[str, None]] = {}
-    columns = (values_of(results.contacts, name) for name in ("detector", "group", "reason"))
-    for detector, group, reason in zip(*columns, strict=True):
-        if reason:
-            found.setdefault((detector, group), {})[reason] = None
-    return {pair: list(reasons) for pair, reasons in found.items()}
+    found = grouped([item for item in results.contacts if item.reason], "detector", "group")
+    return {pair: list(dict.fromkeys(item.reason for item in items if item.reason)) for pair, items in found.items()}
 
 
 def _reasons_in_words(results: Results, item: Summary, of_contacts: Mapping[Pair, Sequence[str]]) -> str:

@@ -8,18 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from html import escape
-from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, get_type_hints
 
-from cdtool.results.files.results_folder import tables
-from cdtool.results.results import Results
-from cdtool.results.rows import values_of
+from cdtool.results.results import Results, scalar_of, tables
 
 if TYPE_CHECKING:
     import pandas as pd
 
 # The order of the outcomes, from detected to what could not be scored.
 OUTCOMES = ("detected", "missed", "not_assessable", "in_progress")
-_DTYPES = {float: "float64", int: "int64", bool: "bool", str: "string"}
 
 
 def rows_as_frame(
@@ -32,7 +29,7 @@ def rows_as_frame(
     kind : type
         The class of the rows.
     rows : sequence
-        The rows; those that are held as columns are not made.
+        The rows.
     categories : mapping of str to sequence of str, optional
         Columns of few different texts, and these in their order.
 
@@ -53,7 +50,7 @@ def rows_as_frame(
     hints, known = get_type_hints(kind), categories or {}
     columns: dict[str, Any] = {}
     for item in fields(kind):
-        values = list(values_of(rows, item.name))
+        values = [getattr(row, item.name) for row in rows]
         if item.name in known:
             columns[item.name] = pd.Categorical(values, categories=list(dict.fromkeys(known[item.name])))
         else:
@@ -119,15 +116,14 @@ def results_as_frame(results: Results, table: str) -> pd.DataFrame:
     complete = {
         name: values
         for name, values in known.items()
-        if name in {item.name for item in fields(kind)} and set(values_of(rows, name)) <= set(values)
+        if name in {item.name for item in fields(kind)} and {getattr(row, name) for row in rows} <= set(values)
     }
     return rows_as_frame(kind, rows, complete)
 
 
-def _dtype_of(hint: Any) -> Any:
+def _dtype_of(hint: Any) -> str:
     """Return the type of a column for the type of a field; other values than texts and numbers are objects."""
-    kinds = [item for item in (*get_args(hint), hint) if item is not type(None)]
-    is_optional = type(None) in get_args(hint)
-    if kinds[0] is int and is_optional:
+    scalar = scalar_of(hint)
+    if scalar is int and hint is not int:
         return "Int64"
-    return _DTYPES.get(kinds[0], "object") if kinds[0] is hint or is_optional else "object"
+    return {float: "float64", int: "int64", bool: "bool", str: "string"}[scalar] if scalar else "object"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from cdtool.base.errors import ConfigurationError, nearest
 from cdtool.base.findings import Finding
@@ -182,7 +183,8 @@ def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:
 
 def _check(rule: LimitRule, summary: Summary, worst: Summary | None) -> LimitResult:
     value = FIGURES[rule.figure](summary)
-    outcome, reason = "met", None
+    outcome: Literal["met", "violated", "not_assessable"] = "met"
+    reason = None
     if math.isnan(value):
         outcome, reason = "not_assessable", summary.why_undefined(rule.figure)
     elif not rule.least <= value <= rule.largest:

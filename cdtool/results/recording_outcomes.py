@@ -7,11 +7,10 @@ violated without any such recording: the upper end of an interval may be beyond 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from cdtool.results.results import ContactResult, FalseAlarmResult, ForceResult, LimitResult, RecordingResult, Results
-from cdtool.results.rows import grouped, values_of
+from cdtool.results.results import ContactResult, FalseAlarmResult, LimitResult, Results, grouped
 
 # Figures of [limits] by what of a recording counts in them; in the others nothing of a single recording does.
 MEANS = frozenset(("mean_ms", "mean_ms_upper"))
@@ -27,8 +26,6 @@ FALSE_ALARMS = frozenset(
     )
 )
 FORCES_AT_ALARM = frozenset(("force_at_alarm_n", "force_at_alarm_max_n"))
-
-Pair = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -70,60 +67,30 @@ def recording_outcomes(results: Results) -> Iterator[RecordingOutcome]:
     --------
     `cdtool.benchmark` returns the results.
     """
-    contacts = grouped(results.contacts, "group", "detector")
-    true_contacts = _by_log(results.recordings, "contacts")
+    contacts = grouped(results.contacts, "group", "recording", "detector")
+    alarms = grouped(results.false_alarms, "group", "recording", "detector")
+    true_contacts = {(item.group, item.recording): item.contacts for item in results.recordings}
     logs: dict[str, dict[str, None]] = {group: {} for group in results.every_group}
-    for group, name in (*true_contacts, *_by_log(results.contacts, "contact")):
+    for group, name, *_ in (*true_contacts, *contacts, *alarms):
         logs.setdefault(group, {})[name] = None
-    alarms: dict[Pair, dict[str, list[FalseAlarmResult]]] = {}
-    for alarm in results.false_alarms:
-        name = _log_of(alarm.recording, logs.setdefault(alarm.group, {}))
-        logs[alarm.group][name] = None
-        alarms.setdefault((alarm.group, alarm.detector), {}).setdefault(name, []).append(alarm)
     ran = {(item.group, item.detector) for item in results.exposure}
-    exceeded = _exceeded(results.limits)
-    failed = _failed(results.forces)
+    exceeded = grouped([item for item in results.limits if _exceeded(item)], "group", "detector")
+    failed = {(item.group, item.recording, item.contact) for item in results.forces if item.verdict == "fail"}
     for group, names in logs.items():
         for detector in results.detectors:
             limits = exceeded.get((group, detector), [])
-            of_log: dict[str, list[ContactResult]] = {}
-            for contact in contacts.get((group, detector), ()):
-                of_log.setdefault(contact.recording, []).append(contact)
-            false_of_log = alarms.get((group, detector), {})
             for name in names:
-                seen, false = of_log.get(name, []), false_of_log.get(name, [])
+                seen, false = contacts.get((group, name, detector), []), alarms.get((group, name, detector), [])
                 breaks = tuple(words for limit in limits for words in _part_in(limit, seen, false, failed))
                 silent = (group, detector) in ran and not true_contacts.get((group, name), 0)
                 judged = bool(seen or false or silent)
                 yield RecordingOutcome(name, group, detector, tuple(seen), tuple(false), breaks, judged)
 
 
-def _by_log(rows: Sequence[RecordingResult] | Sequence[ContactResult], field: str) -> dict[Pair, int]:
-    """Return a field of rows by group and recording."""
-    columns = (values_of(rows, name) for name in ("group", "recording", field))
-    return {(group, recording): value for group, recording, value in zip(*columns, strict=True)}
-
-
-def _failed(forces: Sequence[ForceResult]) -> set[tuple[str, str, int]]:
-    """Return group, recording and number of the contacts that fail their force profile."""
-    columns = (values_of(forces, name) for name in ("verdict", "group", "recording", "contact"))
-    return {(group, name, number) for verdict, group, name, number in zip(*columns, strict=True) if verdict == "fail"}
-
-
-def _log_of(operation: str, logs: Mapping[str, None]) -> str:
-    """Return the log of an operation, which is named log#n if the log was cut."""
-    log, _, number = operation.rpartition("#")
-    return log if operation not in logs and number.isdecimal() and log in logs else operation
-
-
-def _exceeded(limits: Sequence[LimitResult]) -> dict[tuple[str, str], list[LimitResult]]:
-    """Return the limits that a single recording can have violated, by group and detector."""
-    found: dict[tuple[str, str], list[LimitResult]] = {}
-    for limit in limits:
-        above = limit.largest is not None and (limit.value is None or limit.value > limit.largest)
-        if limit.outcome == "violated" and above != (limit.figure == "detected"):
-            found.setdefault((limit.group, limit.detector), []).append(limit)
-    return found
+def _exceeded(limit: LimitResult) -> bool:
+    """Return whether a single recording can have violated a limit."""
+    above = limit.largest is not None and (limit.value is None or limit.value > limit.largest)
+    return limit.outcome == "violated" and above != (limit.figure == "detected")
 
 
 def _part_in(

@@ -7,13 +7,15 @@ together with its meaning, from which the published schema is made.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Self
+from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cache
+from operator import attrgetter
+from typing import Any, Literal, Self, TypeVar, get_args, get_origin, get_type_hints
 
 from cdtool.base.findings import Finding
-from cdtool.results.rows import picked, values_of
 
-SCHEMA_VERSION = 4
+Row = TypeVar("Row")
+SCHEMA_VERSION = 5
 # How reports introduce what is lost of a recording that was used.
 DAMAGED = "damaged, used as far as it goes"
 _LOSS, _IN_PROGRESS = "loss", "in_progress"
@@ -24,7 +26,7 @@ def meant(meaning: str, **default: Any) -> Any:
     return field(metadata={"meaning": meaning}, **default)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class RecordingResult:
     """One log that was scored."""
 
@@ -41,7 +43,7 @@ class RecordingResult:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ContactResult:
     """One contact seen by one detector."""
 
@@ -55,7 +57,9 @@ class ContactResult:
     latency_ms: float | None = meant(
         "alarm less onset; 0 where the alarm came within the onset's uncertainty before it"
     )
-    outcome: str = meant("detected, missed, not_assessable or in_progress (at the start: neither detected nor missed)")
+    outcome: Literal["detected", "missed", "not_assessable", "in_progress"] = meant(
+        "detected, missed, not_assessable or in_progress (at the start: neither detected nor missed)"
+    )
     force_at_alarm_n: float | None = meant(
         "magnitude of the load-cell force over its rest level: last sample at or before the alarm, or at the onset"
     )
@@ -72,7 +76,9 @@ class ContactResult:
         "the latency is no finer than this: sample periods, synchronisation, noise, drift and slope of the force",
         default=None,
     )
-    side: str | None = meant("the limit that was crossed: above or below; null for triggers of a program", default=None)
+    side: Literal["above", "below"] | None = meant(
+        "the limit that was crossed: above or below; null for triggers of a program", default=None
+    )
     statistic: float | None = meant("value compared with the limit at the alarm; null for triggers", default=None)
     limit: float | None = meant("limit at the alarm, in the unit of the statistic; null for triggers", default=None)
     rest_n: float | None = meant("what the load cell read at rest just before the onset", default=None)
@@ -94,7 +100,7 @@ class ContactResult:
         return self.outcome == _IN_PROGRESS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class FalseAlarmResult:
     """One alarm without a contact."""
 
@@ -103,12 +109,15 @@ class FalseAlarmResult:
     detector: str = meant("full name of the detector")
     joint: str = meant("joint that raised it")
     time_s: float = meant("when")
-    side: str | None = meant("the limit that was crossed: above or below", default=None)
+    side: Literal["above", "below"] | None = meant("the limit that was crossed: above or below", default=None)
     statistic: float | None = meant("value compared with the limit, in the unit of provenance.units", default=None)
     limit: float | None = meant("limit, in the detector's unit", default=None)
+    operation: int | None = meant(
+        "number of the operation in its recording, from 1; null: read from a file of version 4 without it", default=None
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ExposureResult:
     """How long and how often a detector monitored a group: the denominator of its false alarms."""
 
@@ -121,7 +130,7 @@ class ExposureResult:
     not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ConditionResult:
     """One group of recordings of the machine under a changed condition: it is scored, and counts nowhere else."""
 
@@ -131,7 +140,7 @@ class ConditionResult:
     impact_free: bool = meant("whether its recordings have no contacts")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ForceStepResult:
     """One step of a force profile, compared with one contact or one test point."""
 
@@ -140,11 +149,11 @@ class ForceStepResult:
     at_most_n: float = meant("largest force allowed")
     peak_n: float | None = meant("largest force in the step; of a point: the mean of its tests, or the largest of them")
     time_budget_ms: float | None = meant("how long after the onset the limit was first exceeded; null if never")
-    verdict: str = meant("pass, fail or not_assessable")
+    verdict: Literal["pass", "fail", "not_assessable"] = meant("pass, fail or not_assessable")
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ForceResult:
     """One contact against a force profile."""
 
@@ -152,7 +161,7 @@ class ForceResult:
     group: str = meant("the benchmark's group")
     contact: int = meant("number of the contact in its recording, from 1")
     profile: str = meant("name of the profile in the limits file")
-    verdict: str = meant("pass, fail or not_assessable")
+    verdict: Literal["pass", "fail", "not_assessable"] = meant("pass, fail or not_assessable")
     peak_n: float | None = meant("largest force of the contact, corrected for the mass before the cell")
     steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
     point: str | None = meant("test point", default=None)
@@ -162,7 +171,7 @@ class ForceResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class PointResult:
     """The tests at one point against a force profile, averaged as the profile asks."""
 
@@ -170,13 +179,13 @@ class PointResult:
     group: str = meant("the benchmark's group")
     profile: str = meant("name of the profile in the limits file")
     tests: int = meant("contacts at the point")
-    verdict: str = meant("pass, fail or not_assessable")
+    verdict: Literal["pass", "fail", "not_assessable"] = meant("pass, fail or not_assessable")
     steps: tuple[ForceStepResult, ...] = meant("each step of the profile")
     note: str = meant("how many tests were averaged")
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class SweepResult:
     """One detector in one group with all its limits moved: a point of the latency against false-alarm curve."""
 
@@ -194,7 +203,7 @@ class SweepResult:
     in_use: bool = meant("the benchmark's own limits", default=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class CalibrationResult:
     """How a detector's safety factor was set for a false-alarm budget."""
 
@@ -206,7 +215,7 @@ class CalibrationResult:
     alarms: int = meant("operations that alarm with that factor; of a budget by hour: alarms")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LimitResult:
     """One limit of the benchmark file, checked against one metric."""
 
@@ -217,15 +226,15 @@ class LimitResult:
     value: float | None = meant("value of the metric; null where it is not known or not finite")
     least: float | None = meant("smallest value allowed")
     largest: float | None = meant("largest value allowed")
-    outcome: str = meant("met, violated or not_assessable")
+    outcome: Literal["met", "violated", "not_assessable"] = meant("met, violated or not_assessable")
     reason: str | None = meant("why it is not met", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ConclusionResult:
     """What follows from limits, force profiles, missed contacts and what could not be assessed, taken together."""
 
-    outcome: str = meant(
+    outcome: Literal["violated", "not_assessable", "met", "not_asked"] = meant(
         "violated, not_assessable, met, or not_asked without limits and force profiles", default="not_asked"
     )
     headline: str = meant("the conclusion in one line, as every report shows it", default="no limits are set")
@@ -240,7 +249,7 @@ class ConclusionResult:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Skipped:
     """What was left out: a recording, a part of one, or a detector."""
 
@@ -248,14 +257,14 @@ class Skipped:
     reason: str = meant("why it was left out")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class RecordingFinding:
     """A finding about a recording, or a detector, that was used."""
 
     recording: str = meant("path of the log below the benchmark file, or a detector")
     reason: str = meant("the finding in words")
-    severity: str = meant("loss, warning or note", default="warning")
-    kind: str = meant("kind of the finding; empty in files of earlier versions", default="")
+    severity: Literal["loss", "warning", "note"] = meant("loss, warning or note", default="warning")
+    kind: str = meant("kind of the finding", default="")
     channel: str = meant("channel or topic that it is about; empty for the whole log", default="")
 
     @classmethod
@@ -269,25 +278,25 @@ class RecordingFinding:
         return self.severity == _LOSS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Results:
-    """All of it, in the order of the benchmark file; rows of which there may be many are tuples, or `Rows`."""
+    """All of it, in the order of the benchmark file."""
 
     provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the results")
     detectors: tuple[str, ...] = meant("full names")
     groups: tuple[str, ...] = meant("groups of the unchanged machine: of impacts, then the impact-free hold-out")
-    contacts: Sequence[ContactResult] = meant("one row per contact and detector")
-    false_alarms: Sequence[FalseAlarmResult] = meant("one row per alarm without a contact")
+    contacts: tuple[ContactResult, ...] = meant("one row per contact and detector")
+    false_alarms: tuple[FalseAlarmResult, ...] = meant("one row per alarm without a contact")
     exposure: tuple[ExposureResult, ...] = meant("one row per group and detector")
-    recordings: Sequence[RecordingResult] = meant("one row per log that was scored", default=())
-    forces: Sequence[ForceResult] = meant("one row per contact with a force profile", default=())
+    recordings: tuple[RecordingResult, ...] = meant("one row per log that was scored", default=())
+    forces: tuple[ForceResult, ...] = meant("one row per contact with a force profile", default=())
     points: tuple[PointResult, ...] = meant("one row per test point with a force profile", default=())
     sweep: tuple[SweepResult, ...] = meant("latency against false alarms with all limits moved", default=())
     calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
     conditions: tuple[ConditionResult, ...] = meant("groups of the machine under changed conditions", default=())
-    skipped: Sequence[Skipped] = meant("what was left out", default=())
-    findings: Sequence[RecordingFinding] = meant("findings about recordings that were used", default=())
+    skipped: tuple[Skipped, ...] = meant("what was left out", default=())
+    findings: tuple[RecordingFinding, ...] = meant("findings about recordings that were used", default=())
     conclusion: ConclusionResult = field(
         default_factory=ConclusionResult, metadata={"meaning": "the conclusion from all of it"}
     )
@@ -299,23 +308,87 @@ class Results:
         return (*self.groups, *(item.group for item in self.conditions))
 
     @property
-    def losses(self) -> Sequence[RecordingFinding]:
+    def losses(self) -> list[RecordingFinding]:
         """The findings about recordings of which a part is lost."""
-        return picked(
-            self.findings, [i for i, item in enumerate(values_of(self.findings, "severity")) if item == _LOSS]
-        )
+        return [item for item in self.findings if item.is_loss]
 
     @property
-    def warnings(self) -> Sequence[RecordingFinding]:
+    def warnings(self) -> list[RecordingFinding]:
         """The other findings."""
-        return picked(
-            self.findings, [i for i, item in enumerate(values_of(self.findings, "severity")) if item != _LOSS]
-        )
+        return [item for item in self.findings if not item.is_loss]
 
     @property
-    def scored_contacts(self) -> Sequence[ContactResult]:
+    def scored_contacts(self) -> list[ContactResult]:
         """The contacts that have an onset, and so a latency or a reason for none."""
-        outcomes = values_of(self.contacts, "outcome")
-        if _IN_PROGRESS not in outcomes:
-            return self.contacts
-        return picked(self.contacts, [i for i, outcome in enumerate(outcomes) if outcome != _IN_PROGRESS])
+        return [item for item in self.contacts if not item.in_progress]
+
+
+def grouped(rows: Sequence[Row], *names: str) -> dict[Any, list[Row]]:
+    """Return rows by the value of a field, or the values of several.
+
+    Parameters
+    ----------
+    rows : sequence
+        The rows.
+    *names : str
+        The fields.
+
+    Returns
+    -------
+    dict of object to list
+        The rows by the value, or by the values as a tuple, in the order of the first rows.
+
+    Examples
+    --------
+    >>> grouped([Skipped("a", "empty"), Skipped("b", "empty")], "reason")["empty"][1].recording
+    'b'
+    """
+    key = attrgetter(*names)
+    found: dict[Any, list[Row]] = {}
+    for row in rows:
+        found.setdefault(key(row), []).append(row)
+    return found
+
+
+@cache
+def tables() -> Mapping[str, Any]:
+    """Return the class of the rows of each table; the tables are the fields of `Results` with rows.
+
+    Returns
+    -------
+    mapping of str to type
+        The class by the name of the field.
+
+    Examples
+    --------
+    >>> list(tables())[:3]
+    ['contacts', 'false_alarms', 'exposure']
+    """
+    hints = get_type_hints(Results)
+    found = {item.name: get_args(hints[item.name]) for item in fields(Results)}
+    return {name: inner[0] for name, inner in found.items() if inner and is_dataclass(inner[0])}
+
+
+def scalar_of(hint: Any) -> type | None:
+    """Return which plain values a field has.
+
+    Parameters
+    ----------
+    hint : type
+        The type of the field.
+
+    Returns
+    -------
+    type or None
+        str, float, int or bool, also where a value may be missing; None for any other field.
+
+    Examples
+    --------
+    >>> scalar_of(float | None), scalar_of(Literal["above"]), scalar_of(tuple[float, ...])
+    (<class 'float'>, <class 'str'>, None)
+    """
+    if type(None) in get_args(hint):
+        (hint,) = (item for item in get_args(hint) if item is not type(None))
+    if get_origin(hint) is Literal:
+        return str
+    return hint if hint in (str, float, int, bool) else None

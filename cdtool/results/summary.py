@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.base.plain_text import counted
-from cdtool.results.results import ContactResult, ExposureResult, ForceResult, Results
-from cdtool.results.rows import Rows, grouped, values_of
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, ForceResult, Results, grouped
 from cdtool.statistics.interval import Interval
 from cdtool.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
 from cdtool.statistics.small_sample import FEWEST, median_of, p95_of
@@ -164,26 +163,19 @@ def summarise_conditions(results: Results) -> list[Summary]:
 
 def _summaries(results: Results, groups: Sequence[str]) -> list[Summary]:
     contacts = grouped(results.contacts, "detector", "group")
-    forces = {group: _failed(items) for (group,), items in grouped(results.forces, "group").items()}
-    false_alarms = Counter(
-        zip(values_of(results.false_alarms, "detector"), values_of(results.false_alarms, "group"), strict=True)
-    )
-    columns = (values_of(results.false_alarms, name) for name in ("detector", "group", "recording"))
-    alarming = Counter((detector, group) for detector, group, _ in set(zip(*columns, strict=True)))
+    forces = {group: _failed(items) for group, items in grouped(results.forces, "group").items()}
+    alarms = grouped(results.false_alarms, "detector", "group")
     exposures = {(item.detector, item.group): item for item in results.exposure}
     clusters = campaigns(results)
     return [
-        replace(
-            _summary(
-                detector,
-                group,
-                contacts.get((detector, group), ()),
-                false_alarms[detector, group],
-                exposures.get((detector, group)),
-                clusters,
-                forces.get(group, math.nan),
-            ),
-            alarming=alarming[detector, group],
+        _summary(
+            detector,
+            group,
+            contacts.get((detector, group), ()),
+            alarms.get((detector, group), ()),
+            exposures.get((detector, group)),
+            clusters,
+            forces.get(group, math.nan),
         )
         for group in groups
         for detector in results.detectors
@@ -229,29 +221,18 @@ def summarise_kinds(results: Results) -> list[Summary]:
     --------
     `evaluate` adds them to the results.
     """
-    kinds: dict[str, dict[str, None]] = {}
-    for group, kind in zip(values_of(results.contacts, "group"), values_of(results.contacts, "kind"), strict=True):
-        kinds.setdefault(group, {})[kind or ""] = None
-    if not any(any(known) for known in kinds.values()):
-        return []
     clusters = campaigns(results)
-    contacts, forces = grouped(results.contacts, "group", "kind", "detector"), grouped(results.forces, "group")
+    contacts, forces = grouped(results.contacts, "group"), grouped(results.forces, "group")
     made = []
     for group in results.groups:
-        known = kinds.get(group, {})
-        for kind in known if any(known) else ():
-            rows = {
-                name: [
-                    *contacts.get((group, kind, name), ()),
-                    *(contacts.get((group, None, name), ()) if not kind else ()),
-                ]
-                for name in results.detectors
-            }
-            numbers = {(item.recording, item.contact) for items in rows.values() for item in items}
-            of_kind = [item for item in forces.get((group,), ()) if (item.recording, item.contact) in numbers]
-            failed = _failed(of_kind)
-            for name, items in rows.items():
-                made.append(_summary(name, kind_group(group, kind), items, 0, None, clusters, failed))
+        kinds = grouped(contacts.get(group, ()), "kind")
+        for kind, rows in kinds.items() if any(kinds) else ():
+            numbers = {(item.recording, item.contact) for item in rows}
+            failed = _failed([item for item in forces.get(group, ()) if (item.recording, item.contact) in numbers])
+            of_detector = grouped(rows, "detector")
+            for name in results.detectors:
+                items = of_detector.get(name, ())
+                made.append(_summary(name, kind_group(group, kind or ""), items, (), None, clusters, failed))
     return made
 
 
@@ -282,7 +263,7 @@ def later_ms(item: ContactResult) -> float:
 
 def at_worst(results: Results) -> Results:
     """Return the results with the longest latencies and the largest forces that missing load-cell samples allow."""
-    return replace(results, contacts=Rows(ContactResult, map(_at_worst, results.contacts)))
+    return replace(results, contacts=tuple(map(_at_worst, results.contacts)))
 
 
 def _at_worst(item: ContactResult) -> ContactResult:
@@ -314,8 +295,7 @@ def campaigns(results: Results) -> dict[str, str]:
     --------
     `cdtool.benchmark` returns the results.
     """
-    names, named = values_of(results.recordings, "recording"), values_of(results.recordings, "campaign")
-    return {name: campaign or name for name, campaign in zip(names, named, strict=True)}
+    return {item.recording: item.campaign or item.recording for item in results.recordings}
 
 
 def latencies(contacts: Sequence[ContactResult]) -> tuple[np.ndarray, np.ndarray]:
@@ -346,20 +326,20 @@ def _summary(
     detector: str,
     group: str,
     contacts: Sequence[ContactResult],
-    false_alarms: int,
+    alarms: Sequence[FalseAlarmResult],
     exposure: ExposureResult | None,
     clusters: Mapping[str, str],
     force_failed: float,
 ) -> Summary:
-    every = list(contacts)
-    contacts = [item for item in every if not item.in_progress]
-    in_progress = len(every) - len(contacts)
+    in_progress = sum(item.in_progress for item in contacts)
+    contacts = [item for item in contacts if not item.in_progress]
     detected = [item for item in contacts if item.latency_ms is not None]
     values = np.array([item.latency_ms for item in detected], dtype=np.float64)
     labels = [clusters.get(item.recording, item.recording) for item in detected]
     latency, censored = latencies(contacts)
     seen = [clusters.get(item.recording, item.recording) for item in contacts if item.outcome != "not_assessable"]
     missed = int(censored.sum())
+    false_alarms = len(alarms)
     operations, hours = (exposure.operations, exposure.hours) if exposure else (0, 0.0)
     judged = operations - exposure.not_assessable if exposure else 0
     at_alarm = [item.force_at_alarm_n for item in detected if item.force_at_alarm_n is not None]
@@ -396,11 +376,12 @@ def _summary(
         onset_holes=sum(item.onset_hole_ms is not None for item in contacts),
         later_ms=max((later_ms(item) for item in detected), default=0.0),
         force_holes=sum(item.force_hole_ms is not None for item in contacts),
+        alarming=len({(item.recording, item.operation) for item in alarms}),
     )
 
 
 def _failed(forces: Sequence[ForceResult]) -> float:
     """Contacts above their force limits; NaN where none was judged, or none failed and one could not be assessed."""
-    verdicts = Counter(values_of(forces, "verdict"))
+    verdicts = Counter(item.verdict for item in forces)
     failed, unknown = verdicts["fail"], verdicts["not_assessable"]
     return math.nan if not verdicts or (unknown and not failed) else float(failed)

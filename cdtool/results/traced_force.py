@@ -91,14 +91,12 @@ def traced_forces(results: Results, traces: Sequence[Trace]) -> tuple[TracedForc
             alarms.setdefault((*key, seen.contact), {})[seen.detector] = 1e-3 * seen.latency_ms
     found = []
     for trace in traces:
-        for log in (trace.recording, trace.recording.rpartition("#")[0]):
-            for number, contact, until in _contacts(trace, onsets.get((trace.group, log), {})):
-                row = verdicts.get((trace.group, log, number))
-                curve = _curve(trace, contact, until)
-                if row is not None and curve is not None:
-                    verdict = _verdict(row, *curve)
-                    late = alarms.get((trace.group, log, number), {})
-                    found.append(TracedForce(log, trace.group, number, *curve, verdict, late))
+        for number, contact, until in _contacts(trace, onsets.get((trace.group, trace.log), {})):
+            of = (trace.group, trace.log, number)
+            row, curve = verdicts.get(of), _curve(trace, contact, until)
+            if row is not None and curve is not None:
+                late = alarms.get(of, {})
+                found.append(TracedForce(trace.log, trace.group, number, *curve, _verdict(row, *curve), late))
     return tuple(found)
 
 

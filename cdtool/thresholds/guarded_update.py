@@ -105,7 +105,7 @@ def check_complete(signature: FittedSignature, recording: Recording, signal: Sig
 
 
 @dataclass(frozen=True)
-class _Part:
+class _CurveLimits:
     """The limits of one curve before and after, (g, J), where they count; `spread` is that of the first."""
 
     axis: str
@@ -142,7 +142,7 @@ class _Part:
         return f"at {at:.2f} {unit}" if self.axis == "travel" else f"{at:.2f} s after the motion began"
 
 
-def _parts(first: FittedSignature, updated: FittedSignature, where: Progress) -> list[_Part]:
+def _parts(first: FittedSignature, updated: FittedSignature, where: Progress) -> list[_CurveLimits]:
     """Return the part that counts of each curve: of time until this run had accelerated, of travel from then."""
     running = np.flatnonzero(where.running)
     begun = int(running[0]) if len(running) else len(where.elapsed) - 1
@@ -159,9 +159,9 @@ def _parts(first: FittedSignature, updated: FittedSignature, where: Progress) ->
 
 def _part(
     axis: str, first: FittedSignature, updated: FittedSignature, old: Curve, new: Curve, span: tuple[float, float]
-) -> _Part:
+) -> _CurveLimits:
     use = (old.grid >= span[0]) & (old.grid <= span[1])
     spread = old.band(first.pooled)[1]
     old_low, old_high = (limit[use] for limit in first.limits(old))
     new_low, new_high = (limit[use] for limit in updated.limits(new))
-    return _Part(axis, old.grid[use], (old_low, old_high), (new_low, new_high), spread[use])
+    return _CurveLimits(axis, old.grid[use], (old_low, old_high), (new_low, new_high), spread[use])

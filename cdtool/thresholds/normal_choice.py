@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.normal_motion import Comparison, NormalMotion
+from cdtool.thresholds.normal_motion import MotionComparison, NormalMotion
 
 # A class of motion fits if the leading joint's speed is within this many spreads of it, in the median up to the event.
 _FITS = 4.0
@@ -59,11 +59,11 @@ class NormalMotions:
 class _OnceCompared(NormalMotion):
     """A normal motion for one operation, shared by all detectors; their alarms are close to each other."""
 
-    compared: dict[str, tuple[float, float, Comparison]] = field(default_factory=dict, compare=False, repr=False)
+    compared: dict[str, tuple[float, float, MotionComparison]] = field(default_factory=dict, compare=False, repr=False)
 
     def compare(
         self, recording: Recording, channel: str, start: float = -math.inf, end: float = math.inf
-    ) -> Comparison:
+    ) -> MotionComparison:
         """Compare as NormalMotion does, maybe more of the channel; the recording is always the same."""
         first, last, known = self.compared.get(channel, (math.inf, -math.inf, None))
         if known is not None and first <= start and end <= last:

@@ -56,7 +56,7 @@ class NormalChannel:
 
 
 @dataclass(frozen=True)
-class Comparison(StoresDerived):
+class MotionComparison(StoresDerived):
     """A run's channel and its normal curve, on the channel's clock `time` (n,) [s]; the others are (n, J).
 
     `value` and `level` are the run's own, `mean` and `spread` those of the impact-free runs at the same location; NaN
@@ -98,7 +98,7 @@ class NormalMotion:
 
     def compare(
         self, recording: Recording, channel: str, start: float = -math.inf, end: float = math.inf
-    ) -> Comparison:
+    ) -> MotionComparison:
         """Compare a recording's channel from `start` to `end` [s] with its normal curve.
 
         Raises RecordingError without speed and position.
@@ -112,7 +112,7 @@ class NormalMotion:
         where = where.part(rows)
         samples, means = normal.samples.at(where, least), normal.level.at(where, least)
         reaches = normal.samples.reach, normal.level.reach
-        return Comparison(
+        return MotionComparison(
             normal.unit, series.time[rows], value[rows], *samples, level[rows], *means, where.running, *reaches
         )
 

@@ -270,6 +270,32 @@ def test_a_utility_is_passed_over_and_the_walk_ends_at_the_method(calls):
     ]
 
 
+def test_reach_counts_private_functions_and_not_comprehensions(script, package, monkeypatch):
+    name = f"made_for_reach_{next(_numbers)}"
+    nested = {
+        "start.py": """
+            from PKG import inner
+            def read():
+                return [_one(i) for i in range(3)], sum(inner.numbers())
+            def _one(i):
+                return inner.two(i)
+        """,
+        "inner.py": """
+            def two(i):
+                return i
+            def numbers():
+                yield two(1)
+                yield from (two(i) for i in range(2))
+        """,
+    }
+    root = package(nested, name)
+    monkeypatch.syspath_prepend(root.parent)
+    reach = script.reach_of(importlib.import_module(f"{name}.start").read, root)
+    called = [function.removeprefix(f"{name}.") for function in reach.functions]
+    assert called == ["start:read", "start:_one", "inner:two", "inner:numbers"]
+    assert (reach.modules, reach.depth) == (2, 3)
+
+
 def test_the_logs_of_the_walk_have_two_clocks_declared_units_and_one_gap(script, tmp_path):
     logs = script.write_logs(tmp_path)
     read = {kind: cdtool.read(log, tmp_path / "machine.toml") for kind, log in logs.items()}

@@ -91,7 +91,7 @@ REASONS = {
 @needs_dask
 def test_items_that_end_their_workers_are_lost_with_the_reason_and_no_other(address):
     workers = Workers(cluster=address, timeout=2.0, retries=0)
-    made = list(in_order(fate, range(40), 40, workers, of_lost=lost, together=4))
+    made = list(in_order(fate, range(40), 40, workers, of_lost=lost))
     assert made == [(number, REASONS[number]) if number in REASONS else number for number in range(40)]
 
 
@@ -105,7 +105,7 @@ def hungry(number):
 def test_an_item_is_tried_again_as_often_as_asked_and_dask_prints_nothing(address, capfd):
     logger = logging.getLogger("distributed")
     before = list(logger.handlers), logger.propagate, list(warnings.filters)
-    made = list(in_order(hungry, range(12), 12, Workers(cluster=address), of_lost=lost, together=2))
+    made = list(in_order(hungry, range(12), 12, Workers(cluster=address), of_lost=lost))
     reason = "its worker process was ended: the memory was not enough, in each of 2 attempts"
     assert made == [(number, reason) if number == 8 else number for number in range(12)]
     assert (list(logger.handlers), logger.propagate, list(warnings.filters)) == before
@@ -120,7 +120,7 @@ def refused(number):
 
 @needs_dask
 def test_results_are_in_order_relative_paths_are_those_of_here_and_errors_arrive_as_raised(address):
-    results = in_order(refused, range(100), 100, Workers(cluster=address), together=8)
+    results = in_order(refused, range(100), 100, Workers(cluster=address))
     assert [next(results) for _ in range(5)] == [(Path.cwd(), number) for number in range(5)]
     with pytest.raises(RecordingError) as raised:
         next(results)
@@ -135,7 +135,7 @@ def test_items_are_taken_when_their_work_begins_not_all_at_once(address):
         results = in_order(abs, (taken.append(k) or k for k in range(500)), 500, Workers(cluster=address))
         for number in range(10):
             assert next(results) == number
-        assert len(taken) <= 10 + 2 * count
+        assert len(taken) <= 10 + 8 * count
         results.close()
 
 
@@ -207,10 +207,9 @@ def test_a_file_is_seen_if_it_has_the_same_size_and_a_folder_if_it_exists(tmp_pa
     assert not seen.is_same and folder.is_same
 
 
-def test_a_batch_for_an_earlier_process_of_the_same_address_is_not_begun():
+def test_an_item_for_an_earlier_process_of_the_same_address_is_not_begun():
     begun = on_cluster.begin(pickle.dumps(os.remove), str(Path.cwd()), None)
-    done = pickle.loads(on_cluster.do(begun, "another process", pickle.dumps(["no-such-file"])))
-    assert done.is_other and done.results == ()
+    assert on_cluster.do(begun, "another process", pickle.dumps("no-such-file")) is None
 
 
 def slow(number):

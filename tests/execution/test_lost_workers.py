@@ -4,22 +4,22 @@ import ctypes
 import faulthandler
 import multiprocessing
 import os
+import random
 import signal
-import struct
 import sys
+import tempfile
 import threading
 import time
-from collections import deque
-from concurrent.futures import Future
-from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.base.errors import UsageError, WorkerError
-from cdtool.execution import processes
+from cdtool.execution import in_worker, processes
+from cdtool.execution.in_worker import Done, Failed, NotBegun, Raised
 from cdtool.execution.workers import Workers, _Ordered, in_order
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -60,27 +60,17 @@ def ended(number):
     return number
 
 
-class CutOff:
-    """The sending end of a pipe whose process is killed while it sends a result."""
-
-    def __init__(self, writer):
-        self.writer = writer
-
-    def send_bytes(self, content):
-        os.write(self.writer.fileno(), struct.pack("!i", len(content)) + bytes(content[:10]))
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-def cut_off(folder, number):
+def cut_off(folder, number, how=signal.SIGKILL):
     """The result of item 3 is cut off the first time."""
     with (folder / f"{number}.txt").open("a", encoding="utf-8") as file:
         file.write("x")
     if number == 3 and (folder / "3.txt").stat().st_size == 1:
-        frame = sys._getframe()
-        while "result_queue" not in frame.f_locals:
-            frame = frame.f_back
-        results = frame.f_locals["result_queue"]
-        results._writer = CutOff(results._writer)
+
+        def send(pipe, content):
+            pipe.sendall((len(content) + 1000).to_bytes(in_worker.HEADER) + content)
+            os.kill(os.getpid(), how)
+
+        in_worker._send = send
     return number
 
 
@@ -139,15 +129,14 @@ def lost(item, reason):
     return item, reason
 
 
-def run(work, count, workers, together=1):
-    return list(in_order(work, range(count), count, workers, of_lost=lost, together=together))
+def run(work, count, workers):
+    return list(in_order(work, range(count), count, workers, of_lost=lost))
 
 
-@pytest.mark.parametrize("together", [1, 8])
 @pytest.mark.parametrize("jobs", [2, 3])
-def test_items_that_crash_their_workers_are_lost_and_no_other(jobs, together):
+def test_items_that_crash_their_workers_are_lost_and_no_other(jobs):
     reason = "its worker process crashed (SIGSEGV), in each of 2 attempts"
-    made = run(crash, 60, Workers(jobs), together)
+    made = run(crash, 60, Workers(jobs))
     assert made == [(number, reason) if number in (3, 11) else number for number in range(60)]
 
 
@@ -175,7 +164,7 @@ def test_items_that_leave_their_workers_in_any_way_are_lost_and_no_other(beside,
     for thread in threads:
         thread.start()
     try:
-        made = run(ended, 12, Workers(2, retries=0), 2)
+        made = run(ended, 12, Workers(2, retries=0))
     finally:
         stop.set()
     reasons = {
@@ -189,44 +178,38 @@ def test_items_that_leave_their_workers_in_any_way_are_lost_and_no_other(beside,
     assert capfd.readouterr() == ("", "")
 
 
-def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_ignore_sigterm_end(capfd, monkeypatch):
-    monkeypatch.setattr(processes, "_ENDED_WITHIN", 0.5)
+def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_ignore_sigterm_end(capfd):
     before = set(multiprocessing.active_children())
     with pytest.raises(Exception, match=r"05\.csv is strange"):  # Dask, once imported, makes it possible to copy it
         run(odd, 8, Workers(2))
-    until = time.monotonic() + 10.0
-    # A process that a thread of the pool has waited for is listed until that thread goes on.
-    while set(multiprocessing.active_children()) != before and time.monotonic() < until:
-        time.sleep(0.01)
     assert set(multiprocessing.active_children()) == before
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("together", [1, 8])
 @pytest.mark.parametrize("retries", [0, 1])
-def test_a_worker_that_is_killed_while_it_sends_a_result_is_replaced(tmp_path, monkeypatch, together, retries):
-    """The pool waits for the rest of the result, and the other workers wait for the right to send theirs."""
-    monkeypatch.setattr(processes, "_NOTICED_WITHIN", 0.2)
-    monkeypatch.setattr(processes, "_CHECKED_EVERY", 0.1)
-    made = run(partial(cut_off, tmp_path), 12, Workers(2, retries=retries), together)
+def test_a_worker_that_is_killed_while_it_sends_a_result_is_replaced(tmp_path, retries):
+    made = run(partial(cut_off, tmp_path), 12, Workers(2, retries=retries))
     reason = "its worker process was killed (SIGKILL): mostly because the memory was not enough"
     assert made == [(number, reason) if number == 3 and not retries else number for number in range(12)]
     assert (tmp_path / "3.txt").stat().st_size == 1 + retries
 
 
-def always_cut_off(folder, number):
-    """The result of item 3 is cut off every time."""
-    if number == 3:  # another item's worker would remove the file under it
-        (folder / "3.txt").unlink(missing_ok=True)
-    return cut_off(folder, number)
+def test_a_worker_that_is_stopped_while_it_sends_a_result_is_ended_by_the_time_limit(tmp_path):
+    made = run(partial(cut_off, tmp_path, how=signal.SIGSTOP), 12, Workers(2, timeout=1.0))
+    assert made == list(range(12))
 
 
-def test_an_item_whose_result_never_arrives_is_lost_and_no_other(tmp_path, monkeypatch):
-    monkeypatch.setattr(processes, "_NOTICED_WITHIN", 0.2)
-    monkeypatch.setattr(processes, "_CHECKED_EVERY", 0.1)
-    made = run(partial(always_cut_off, tmp_path), 12, Workers(2, retries=1), 8)
-    assert [item for item in made if isinstance(item, int)] == [number for number in range(12) if number != 3]
-    assert made[3][0] == 3 and "in each of 2 attempts" in made[3][1]
+def keeps(folder, number):
+    (folder / f"{number}.txt").write_text(tempfile.mkdtemp(), encoding="utf-8")
+    if number == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def test_temporary_files_of_workers_are_removed_also_of_killed_ones(tmp_path):
+    assert len(run(partial(keeps, tmp_path), 8, Workers(2, retries=0))) == 8
+    made = [Path(file.read_text(encoding="utf-8")) for file in tmp_path.iterdir()]
+    assert len(made) == 8 and not any(path.exists() for path in made)
 
 
 def nap(number):
@@ -234,9 +217,7 @@ def nap(number):
     return number
 
 
-def test_two_pools_of_one_program_leave_each_other_alone(monkeypatch):
-    monkeypatch.setattr(processes, "_NOTICED_WITHIN", 0.2)
-    monkeypatch.setattr(processes, "_CHECKED_EVERY", 0.05)
+def test_two_pools_of_one_program_leave_each_other_alone():
     made = {}
 
     def work(count):
@@ -253,7 +234,7 @@ def test_two_pools_of_one_program_leave_each_other_alone(monkeypatch):
 def test_work_that_is_given_up_after_a_result_was_cut_off_leaves_nothing(tmp_path):
     processes_before, threads_before = set(multiprocessing.active_children()), set(threading.enumerate())
     made = in_order(partial(cut_off, tmp_path), range(12), 12, Workers(2), of_lost=lost)
-    assert next(made) == 0
+    assert [next(made) for _ in range(3)] == [0, 1, 2]
     until = time.monotonic() + 20.0
     while not (tmp_path / "3.txt").exists() and time.monotonic() < until:
         time.sleep(0.05)
@@ -265,19 +246,9 @@ def test_work_that_is_given_up_after_a_result_was_cut_off_leaves_nothing(tmp_pat
         assert not thread.is_alive()
 
 
-def test_a_process_that_is_stopped_is_ended_by_the_time_limit(monkeypatch):
-    monkeypatch.setattr(processes, "_GRACE", 0.2)
+def test_a_process_that_is_stopped_is_ended_by_the_time_limit():
     made = run(stopped, 6, Workers(2, timeout=0.5, retries=0))
     assert made == [0, 1, (2, "took longer than 0.5 s (--timeout)"), 3, 4, 5]
-
-
-def test_without_shared_memory_one_line_states_it(monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(multiprocessing.context.BaseContext, "RawArray", full)
-    with pytest.raises(WorkerError, match="no shared memory for processes: No space left on device"):
-        run(abs, 8, Workers(2))
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -290,12 +261,11 @@ def test_an_item_that_takes_too_long_is_ended(work, jobs):
 
 
 def test_a_time_limit_ends_no_item_that_keeps_it():
-    assert run(abs, 200, Workers(2, timeout=5.0), 8) == list(range(200))
+    assert run(abs, 200, Workers(2, timeout=5.0)) == list(range(200))
 
 
-@pytest.mark.parametrize("together", [1, 8])
-def test_an_item_that_ends_its_worker_once_is_repeated_and_done(tmp_path, together):
-    assert run(partial(once, tmp_path), 40, Workers(2), together) == list(range(40))
+def test_an_item_that_ends_its_worker_once_is_repeated_and_done(tmp_path):
+    assert run(partial(once, tmp_path), 40, Workers(2)) == list(range(40))
     attempts = [(tmp_path / f"{number}.txt").stat().st_size for number in range(0, 40, 5)]
     assert attempts == [2] * 8, "what is blamed for nothing would have been tried once more"
 
@@ -338,122 +308,59 @@ def test_workers_that_cannot_be_are_refused(wrong):
         Workers(**wrong)
 
 
-class Shared:
-    """A pool whose only worker holds a queue of batches, all of which are lost when one of them ends it.
+def test_processes_that_never_begin_are_one_error(monkeypatch):
+    monkeypatch.setattr(in_worker, "keep_freed_memory", lambda: os._exit(1))
+    monkeypatch.setattr(processes, "shares_memory", lambda: True)
+    with pytest.raises(WorkerError, match="worker processes end before they begin their work"):
+        run(abs, 8, Workers(2))
 
-    `ends` are the items that always end the worker, `once` those that do so the first time. An item that is to be alone
-    is done while the queue is elsewhere.
-    """
 
-    broken = (ConnectionError,)
-    isolates = True
-    size = 1
+class Fake:
+    """A pool without processes: `fates` are the outcomes of the attempts of an item before it is done."""
 
-    def __init__(self, ends, once):
-        self.ends, self.once = ends, set(once)
-        self.queue = deque()
-        self.may_work = threading.Condition()
-        self.ended = False
+    def __init__(self, size, fates, order):
+        self.size, self.fates, self.order = size, {number: list(each) for number, each in fates.items()}, order
+        self.has = []
 
-    def submit(self, batch, *, alone=False):
-        future = Future()
-        with self.may_work:
-            self.queue.append((batch, future, alone))
-            self.may_work.notify()
-        return future
+    @property
+    def free(self):
+        return self.size - len(self.has)
 
-    def work(self):
-        while not self.ended:
-            with self.may_work:
-                self.may_work.wait_for(lambda: self.queue or self.ended)
-                if not self.queue:
-                    continue
-                batch, future, alone = self.queue.popleft()
-                numbers = {number for number, _ in batch}
-                if fatal := numbers & (self.ends | self.once):
-                    self.once -= fatal
-                    future.set_exception(ConnectionError(*(numbers if alone and len(batch) == 1 else ())))
-                    for other in [item for item in self.queue if not alone and not item[2]]:
-                        self.queue.remove(other)
-                        other[1].set_exception(ConnectionError())
-                else:
-                    future.set_result([10 * item for _, item in batch])
+    def begin(self, number, item):
+        assert self.free and item == 10 * number
+        self.has.append(number)
 
-    def blamed(self, lost):
-        return dict.fromkeys(lost.exception().args, "its worker ended")
+    def ended(self, *, wait_for_one):
+        if not self.has or not (wait_for_one or self.order.random() < 0.5):
+            return []
+        number = self.has.pop(self.order.randrange(len(self.has)))
+        left = self.fates.get(number)
+        return [(number, left.pop(0) if left else Done(number))]
 
-    def check(self):
-        return None
+    def __enter__(self):
+        return self
 
-    def progressed(self):
+    def __exit__(self, *_):
         pass
-
-    @contextmanager
-    def __call__(self):
-        worker = threading.Thread(target=self.work)
-        worker.start()
-        try:
-            yield self
-        finally:
-            with self.may_work:
-                self.ended = True
-                self.may_work.notify()
-            worker.join()
 
 
 @given(
-    st.integers(1, 40),
-    st.sets(st.integers(0, 39), max_size=4),
-    st.sets(st.integers(0, 39), max_size=4),
-    st.integers(0, 3),
+    st.integers(0, 40),
+    st.dictionaries(st.integers(0, 39), st.lists(st.sampled_from([Failed("why"), NotBegun()]), max_size=6)),
     st.integers(1, 8),
+    st.integers(0, 3),
+    st.randoms(use_true_random=False),
 )
-def test_where_several_share_a_worker_only_those_that_end_it_alone_are_lost(count, ends, once, retries, together):
-    pool = Shared(ends, once - ends)
-    ordered = _Ordered(pool, count, retries, lost, together)
-    made = list(ordered.results(range(count)))
-    gone = {item for item in made if isinstance(item, tuple)}
-    lost_items, always = {number for number, _ in gone}, {number for number in ends if number < count}
-    # One that ends it alone for the first time is lost if nothing is tried again.
-    assert always <= lost_items <= (always | once if not retries else always)
-    assert [item[0] * 10 if isinstance(item, tuple) else item for item in made] == [10 * k for k in range(count)]
+def test_every_item_has_its_result_in_order_or_is_lost_after_its_attempts(count, fates, size, retries, order):
+    made = list(_Ordered(Fake(size, fates, order), range(0, 10 * count, 10), retries, lost).results(count))
+    words = f"why, in each of {retries + 1} attempts" if retries else "why"
+    gone = {number for number, each in fates.items() if each.count(Failed("why")) > retries}
+    assert made == [(10 * number, words) if number in gone else number for number in range(count)]
 
 
-class Sizes:
-    """A pool that notes how many items it receives at once."""
-
-    broken = ()
-    isolates = False
-
-    def __init__(self, size):
-        self.size, self.seen = size, []
-
-    def submit(self, batch, *, alone=False):  # noqa: ARG002
-        self.seen.append(len(batch))
-        future = Future()
-        future.set_result([item for _, item in batch])
-        return future
-
-    def blamed(self, _):
-        raise AssertionError
-
-    def check(self):
-        return None
-
-    def progressed(self):
-        pass
-
-    @contextmanager
-    def __call__(self):
-        yield self
-
-
-@given(st.integers(0, 3000), st.integers(1, 64))
-def test_batches_are_small_at_the_beginning_and_at_the_end(count, jobs):
-    pool = Sizes(jobs)
-    assert list(_Ordered(pool, count, 1, None, 8).results(range(count))) == list(range(count))
-    assert sum(pool.seen) == count and all(1 <= size <= 8 for size in pool.seen)
-    done = 0
-    for size in pool.seen:
-        assert size == 1 or size * 4 * jobs <= min(done, count - done), "other workers have as much to do"
-        done += size
+def test_an_error_is_raised_at_its_turn():
+    pool = Fake(2, {3: [Raised(ValueError("3"))]}, random.Random(1))
+    results = _Ordered(pool, range(0, 80, 10), 1, None).results(8)
+    assert [next(results) for _ in range(3)] == [0, 1, 2]
+    with pytest.raises(ValueError, match="3"):
+        next(results)

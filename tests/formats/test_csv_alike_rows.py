@@ -94,9 +94,9 @@ def outcome(read):
         return str(fault)
 
 
-def by_all_rows(path, text, stream, pins):
+def by_all_rows(text, stream, pins):
     finding.refuse_long_line(text, stream)
-    return finding._by_lines(path, text, stream, pins)
+    return finding._by_lines(text, stream, pins)
 
 
 def assert_alike(path, content, pins=TablePins()):  # noqa: B008
@@ -109,8 +109,8 @@ def assert_alike(path, content, pins=TablePins()):  # noqa: B008
         text, stream = detect_text(path, sample, pins.encoding)
     except RecordingError:
         return
-    expected = outcome(lambda: by_all_rows(path, text, stream, pins))
-    assert outcome(lambda: finding._dialect(path, text, stream, pins)) == expected
+    expected = outcome(lambda: by_all_rows(text, stream, pins))
+    assert outcome(lambda: finding._dialect(text, stream, pins)) == expected
 
 
 @settings(max_examples=150)

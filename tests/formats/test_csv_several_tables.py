@@ -9,7 +9,6 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.findings import lines_of
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.text import read_sample
 from cdtool.formats.csv_dialect.find_dialect import find_dialect
 from cdtool.formats.pieces import PieceRun
 from tests.base.findings.facts import fact_of
@@ -102,13 +101,13 @@ def test_a_single_line_of_numbers_above_the_names_is_a_loss(tmp_path):
 
 def test_lines_skipped_by_a_pin_are_not_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
-    dialect = find_dialect(path, read_sample(path), TablePins(skip_lines=401))
+    dialect = find_dialect(path, TablePins(skip_lines=401))
     assert dialect.first_line == 403 and not [finding for finding in dialect.findings if finding.severity == "loss"]
 
 
 def test_rows_above_a_pinned_header_are_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
-    dialect = find_dialect(path, read_sample(path), TablePins(header=402))
+    dialect = find_dialect(path, TablePins(header=402))
     lost = [fact_of(finding) for finding in dialect.findings if finding.severity == "loss"]
     assert lost == [("numbers_above_rows", lines_of(tuple(range(2, 402))))]
 
@@ -127,7 +126,7 @@ def test_a_last_comment_without_line_end_causes_no_loss_and_no_warning(tmp_path,
 @pytest.mark.parametrize("header", [None, 1])
 def test_a_row_of_types_above_or_below_the_units_is_not_the_names(tmp_path, below, header):
     path = log(tmp_path, "t,a,b\n" + below + rows(50, 3))
-    dialect = find_dialect(path, read_sample(path), TablePins(header=header))
+    dialect = find_dialect(path, TablePins(header=header))
     assert dialect.names == ("t", "a", "b")
     assert dialect.units == ("s", "Nm", "m/s")
     assert dialect.first_line == 4

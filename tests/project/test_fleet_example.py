@@ -8,7 +8,7 @@ from glob import glob
 from pathlib import Path
 
 import cdtool
-from cdtool.execution.store.use import StoreUse
+from cdtool.execution.store.store import Store
 
 ROOT = Path(__file__).parents[2]
 SHARES = 3
@@ -32,8 +32,8 @@ def test_the_shares_fill_the_store_for_the_whole_benchmark(tmp_path, monkeypatch
     for number in range(SHARES):
         file = folder / f"share-{number}.toml"
         file.write_text(share_of()(text, number), encoding="utf-8")
-        done = cdtool.benchmark(file, store=StoreUse(folder / "outcomes"))
+        done = cdtool.benchmark(file, store=Store(folder / "outcomes"))
         scored += [item.recording for item in done.results.recordings]
-    whole = cdtool.benchmark("benchmark.toml", store=StoreUse(folder / "outcomes"))
+    whole = cdtool.benchmark("benchmark.toml", store=Store(folder / "outcomes"))
     assert sorted(scored) == sorted(item.recording for item in whole.results.recordings)
     assert whole.stored.computed == 0

@@ -13,7 +13,6 @@ from cdtool.report.outputs import write_outputs
 from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import evaluate
 from cdtool.results.results import Results
-from cdtool.results.rows import Rows
 from tests.synthetic.many_results import many_results
 
 duckdb = pytest.importorskip("duckdb", reason="duckdb is absent: the documented queries were not run")
@@ -55,7 +54,7 @@ def test_the_door_that_got_slower_is_the_first(tmp_path, monkeypatch):
         is_slow = "/door-07/" in item.recording and last_month in item.recording and item.latency_ms is not None
         return replace(item, latency_ms=item.latency_ms + 500.0) if is_slow else item
 
-    results = replace(results, contacts=Rows(type(results.contacts[0]), map(slowed, results.contacts)))
+    results = replace(results, contacts=tuple(map(slowed, results.contacts)))
     rows = asked(results, SLOWER, tmp_path, monkeypatch)
     assert {row["door"] for row in rows[:2]} == {"door-07"} and rows[0]["slower_by_ms"] > 300.0
     assert {f"{row['month']:%Y-%m}" for row in rows} == {last_month}

@@ -60,7 +60,7 @@ def results() -> Results:
         detectors=("friction_ekf", "momentum"),
         groups=("stiff", "soft", "holdout"),
         contacts=tuple(contacts),
-        false_alarms=(FalseAlarmResult("holdout/01.csv#2", "holdout", "momentum", "gate", 1.0, "above", 25.0, 20.0),),
+        false_alarms=(FalseAlarmResult("holdout/01.csv", "holdout", "momentum", "gate", 1.0, "above", 25.0, 20.0, 2),),
         exposure=(
             ExposureResult("stiff", "friction_ekf", 4, 4, 0.01, 1, {"standing still": 0.25}),
             ExposureResult("stiff", "momentum", 3, 3, 0.01),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cdtool.base.findings import Finding, remark
-from cdtool.report.alike import Reason, alike, grouped_findings
+from cdtool.report.alike import RecordingReason, alike, grouped_findings
 from cdtool.results.results import RecordingFinding, Skipped
 
 
@@ -53,8 +53,8 @@ def test_findings_of_recordings_are_merged_by_kind_and_channel():
     of = [RecordingFinding.of(f"{i}.csv", gaps(1 + i % 5, "time")) for i in range(6)]
     force = RecordingFinding.of("6.csv", gaps(1, "force"))
     assert alike([*of, force]) == [
-        Reason("0.csv", f"{gaps(1, 'time')}; 5 more like it (1.csv, 2.csv, 3.csv, ...)"),
-        Reason("6.csv", force.reason),
+        RecordingReason("0.csv", f"{gaps(1, 'time')}; 5 more like it (1.csv, 2.csv, 3.csv, ...)"),
+        RecordingReason("6.csv", force.reason),
     ]
 
 
@@ -63,4 +63,4 @@ def test_reasons_of_errors_are_merged_where_only_their_numbers_differ():
     other = Skipped("5.csv", "line 5 is cut off")
     merged, single = alike([*lines, other])
     assert merged.reason == f"{lines[0].reason}; 4 more like it (1.csv, 2.csv, 3.csv, ...)"
-    assert single == Reason(other.recording, other.reason)
+    assert single == RecordingReason(other.recording, other.reason)

@@ -31,7 +31,7 @@ def contact(latency: float | None, outcome: str = "detected", detector: str = "m
 
 
 RESULTS = Results(
-    provenance={"tool": "cdtool", "gain": math.inf},
+    provenance={"tool": "cdtool", "gain": math.inf, "learned_runs": []},
     detectors=("momentum", "pure_torque"),
     groups=("stiff", "holdout"),
     contacts=(

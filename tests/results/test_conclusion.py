@@ -16,15 +16,12 @@ from cdtool.report.markdown.report import to_markdown
 from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
 from cdtool.results.evaluated import Evaluated, evaluate
-from cdtool.results.files.results_file import migrated, read_results, to_json
+from cdtool.results.files.results_file import to_json
 from cdtool.results.limits import LimitRule, unchecked
 from cdtool.results.results import (
-    SCHEMA_VERSION,
     CalibrationResult,
-    ConclusionResult,
     ContactResult,
     ExposureResult,
-    LimitResult,
     PointResult,
     RecordingFinding,
     Skipped,
@@ -300,27 +297,6 @@ def test_a_recording_of_which_a_part_is_lost_is_3_and_was_not_left_out():
     conclusion = evaluate(replace(results([40.0] * 2), findings=findings)).results.conclusion
     assert conclusion.exit_status == 3 and conclusion.facts == ("lost",)
     assert evaluate(replace(results([40.0] * 2), findings=findings[1:])).results.conclusion.exit_status == 0
-
-
-def test_files_of_version_2_are_read_with_their_words_changed(tmp_path):
-    made = evaluate(results([40.0] * 2, ["not_assessable", "pass"], "A", [averaged("not_assessable")]), [MET]).results
-    limits = (LimitResult("a", "momentum", "stiff", "missed", 1.0, None, 0.0, "violated", "1 is more"), *made.limits)
-    made = replace(made, limits=limits, conclusion=ConclusionResult())
-    old = json.loads(to_json(made).replace(': "not_assessable"', ': "not assessable"').replace('"met"', '"kept"'))
-    old["limits"][0]["outcome"] = "broken"
-    del old["conclusion"]
-    old["schema_version"] = 2
-    path = tmp_path / "old.json"
-    path.write_text(json.dumps(old), encoding="utf-8")
-    read = read_results(path)
-    assert replace(read, provenance=made.provenance) == made and read.schema_version == SCHEMA_VERSION
-    assert migrated(old)["limits"][0]["outcome"] == "violated"
-    assert cdtool("report", path).status == 1
-    old["schema_version"] = 1
-    path.write_text(json.dumps(old), encoding="utf-8")
-    done = cdtool("report", path)
-    assert done.status == 2 and done.err.count("\n") == 1
-    assert f"this version of cdtool reads 2, 3 and {SCHEMA_VERSION}" in done.err
 
 
 def test_contacts_keep_their_spelling_in_the_data():

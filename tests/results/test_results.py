@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import asdict, fields, replace
-from typing import Any
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -14,8 +13,7 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.files.strict_json import strict_json
 from cdtool.report.model import onset_words
 from cdtool.results.files.results_file import json_pieces, read_results, to_json
-from cdtool.results.results import SCHEMA_VERSION, RecordingFinding, Skipped
-from cdtool.results.rows import Rows
+from cdtool.results.results import SCHEMA_VERSION, FalseAlarmResult, RecordingResult, Results, Skipped, tables
 from cdtool.results.summary import summarise
 from tests.report.html.html_case import case
 from tests.results.full_results import FULL, RESULTS, STEP
@@ -37,10 +35,12 @@ def test_the_json_is_strict_with_null_for_missing_values():
 
 
 @pytest.mark.parametrize("results", [FULL, RESULTS, many_results(30, 3), case()[0].results], ids=range(4))
-def test_the_json_is_laid_out_as_strict_json_lays_out_all_of_it(results):
-    rows = {item.name: getattr(results, item.name) for item in fields(results)}
-    plain = replace(results, **{name: tuple(held) for name, held in rows.items() if isinstance(held, Rows)})
-    assert to_json(results) == to_json(plain) == strict_json(asdict(plain)) + "\n"
+def test_the_json_has_all_of_it_and_a_line_for_each_row(results):
+    text = to_json(results)
+    assert json.loads(text) == json.loads(strict_json(asdict(results)))
+    lines = [json.loads(line.removesuffix(",")) for line in text.splitlines() if line.startswith("  {")]
+    rows = [row for name in tables() for row in getattr(results, name)]
+    assert lines == json.loads(strict_json([asdict(row) for row in rows]))
 
 
 def test_the_json_of_many_rows_is_never_in_memory_as_a_whole():
@@ -54,6 +54,7 @@ def test_results_survive_writing_and_reading(tmp_path):
     again = read_results(path)
     assert to_json(again) == to_json(FULL)
     assert again.forces[0].steps[1] == replace(STEP, peak_n=None)
+    assert again.provenance == {**FULL.provenance, "gain": None}
     assert (again.limits, again.sweep, again.points[0].steps[0].name) == (FULL.limits, FULL.sweep, "dynamic")
 
 
@@ -73,7 +74,7 @@ def test_a_number_without_decimals_is_read_as_one_with(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content", ["", "{}", "[]", '{"schema_version": 2}', '{"schema_version": 1}', '{"schema_version": NaN}', "\x00"]
+    "content", ["", "{}", "[]", '{"schema_version": 4}', '{"schema_version": 1}', '{"schema_version": NaN}', "\x00"]
 )
 def test_an_invalid_results_file_is_one_clear_error(tmp_path, content):
     path = tmp_path / "results.json"
@@ -82,49 +83,32 @@ def test_an_invalid_results_file_is_one_clear_error(tmp_path, content):
         read_results(path)
 
 
-def version_3(**values: object) -> dict[str, Any]:
-    """Results as a file of version 3 has them: what is lost is listed as left out, findings have a reason alone."""
-    old = json.loads(to_json(RESULTS))
-    return {**old, "schema_version": 3, **values}
-
-
-def test_losses_that_version_3_lists_as_left_out_are_findings(tmp_path):
-    path = tmp_path / "results.json"
-    cut = {"recording": "a.csv", "reason": "damaged, used as far as it goes: the last line (9) is cut off, dropped"}
-    empty, gap = {"recording": "c.csv", "reason": "empty"}, {"recording": "b.csv", "reason": "time: 1 gap"}
-    path.write_text(json.dumps(version_3(skipped=[cut, empty], findings=[gap])), encoding="utf-8")
-    read = read_results(path)
-    assert read.schema_version == SCHEMA_VERSION and read.skipped == (Skipped("c.csv", "empty"),)
-    assert read.losses == (RecordingFinding("a.csv", "the last line (9) is cut off, dropped", "loss"),)
-    assert read.warnings == (RecordingFinding("b.csv", "time: 1 gap", "warning"),)
-
-
-@pytest.mark.parametrize("wrong", [{"skipped": 7}, {"skipped": [7]}, {"findings": [{"reason": []}]}])
-def test_a_wrong_file_of_version_3_is_one_clear_error(tmp_path, wrong):
-    path = tmp_path / "results.json"
-    path.write_text(json.dumps(version_3(**wrong)), encoding="utf-8")
-    with pytest.raises(RecordingError, match=r"results\.json: not a results file: results\.(skipped|findings)"):
-        read_results(path)
+def version_4(recording: str, operations: int, *more: str) -> Results:
+    """Results with a false alarm as a file of version 4 has it, without the number of the operation."""
+    logs = tuple(RecordingResult(name, "holdout", "", 7.0, operations, 0) for name in ("cut", *more))
+    return replace(
+        FULL, recordings=logs, false_alarms=(FalseAlarmResult(recording, "holdout", "momentum", "gate", 1.0),)
+    )
 
 
 @pytest.mark.parametrize(
-    ("onset", "rule", "unit"),
+    ("old", "recording", "operation"),
     [
-        (
-            "load cell above 20 N for 3 ms",
-            "load cell above 20 N for 3 ms",
-            None,
-        ),
-        ("load cell above 20 N for 3 ms; label file labels.csv", "load cell above 20 N for 3 ms", None),
-        ("load cell above 20 N for 3 samples", "load cell above 20 N for 3 samples", "samples"),
-        ("load cell above 20 N for 1 sample", "load cell above 20 N for 1 sample", "samples"),
+        (version_4("cut#2", 3), "cut", 2),
+        (version_4("cut", 3), "cut", None),
+        (version_4("cut", 1), "cut", 1),
+        (version_4("cut#2", 1, "cut#2"), "cut#2", 1),  # the name of a run
+        (version_4("gone#2", 1), "gone#2", None),
     ],
 )
-def test_the_rule_of_the_onset_is_apart_from_the_label_file_and_names_its_unit(tmp_path, onset, rule, unit):
+def test_a_false_alarm_of_version_4_names_its_recording_as_a_contact_does(tmp_path, old, recording, operation):
+    values = json.loads(to_json(old))
+    del values["false_alarms"][0]["operation"]
     path = tmp_path / "results.json"
-    path.write_text(json.dumps(version_3(provenance={"onset": onset})), encoding="utf-8")
-    provenance = read_results(path).provenance
-    assert provenance["onset"] == rule and provenance.get("onset_unit") == unit
+    path.write_text(json.dumps({**values, "schema_version": 4}), encoding="utf-8")
+    read = read_results(path)
+    alarm = replace(old.false_alarms[0], recording=recording, operation=operation)
+    assert (read.schema_version, read.false_alarms) == (SCHEMA_VERSION, (alarm,))
 
 
 def test_the_words_of_the_onset_name_the_label_file():
@@ -137,7 +121,7 @@ def test_the_words_of_the_onset_name_the_label_file():
 def test_another_version_is_named_with_a_hint(tmp_path):
     path = tmp_path / "results.json"
     path.write_text(to_json(RESULTS).replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 99'))
-    with pytest.raises(RecordingError, match=r"schema_version is 99; this version of cdtool reads 2") as fault:
+    with pytest.raises(RecordingError, match=r"schema_version is 99; this version of cdtool reads 4 and 5") as fault:
         read_results(path)
     assert "benchmark" in fault.value.hint
 
@@ -185,10 +169,10 @@ def test_a_wrong_field_is_named(tmp_path, old, new, words):
     [
         (None, r"results\.json: no such file$"),
         ("", r"results\.json: not a results file: it is empty$"),
-        ('{"schema_version": 2, "detec', r"results\.json: not a results file: truncated or damaged at line 1$"),
+        ('{"schema_version": 5, "detec', r"results\.json: not a results file: truncated or damaged at line 1$"),
         (b"\xff\xfe\x00", r"results\.json: not a results file: not UTF-8 text$"),
         (
-            '{"schema_version": 2}',
+            '{"schema_version": 4}',
             r"results: provenance, detectors, groups, contacts, false_alarms, exposure missing$",
         ),
     ],

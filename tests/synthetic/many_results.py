@@ -23,7 +23,6 @@ from cdtool.results.results import (
     Skipped,
     SweepResult,
 )
-from cdtool.results.rows import Rows
 from cdtool.results.traces.trace import Trace
 from tests.report.html.html_case import ONSET, trace_of
 
@@ -74,26 +73,20 @@ def rows_of_logs(count: int, detectors: int = 2, seed: int = 0) -> Iterator[Rows
 
 def many_results(count: int, detectors: int = 2, seed: int = 0) -> Results:
     """Return the results of that many recordings."""
+    logs = tuple(rows_of_logs(count, detectors, seed))
+    of_group = {group: sum(log.recording.group == group for log in logs) for group in GROUPS}
     made = Results(
         provenance={"tool": "cdtool", "tool_version": "9.8.7", "machine": "door", "onset": "above 20 N, back to 8 N"},
         detectors=DETECTORS[:detectors],
         groups=GROUPS,
-        contacts=(contacts := Rows(ContactResult)),
-        false_alarms=(false_alarms := Rows(FalseAlarmResult)),
+        contacts=tuple(row for log in logs for row in log.contacts),
+        false_alarms=tuple(row for log in logs for row in log.false_alarms),
         exposure=(),
-        recordings=(recordings := Rows(RecordingResult)),
-        forces=(forces := Rows(ForceResult)),
-        findings=(findings := Rows(RecordingFinding)),
-        skipped=Rows(Skipped, (Skipped(f"broken/{i}.mcap", f"broken/{i}.mcap: empty") for i in range(count // 100))),
+        recordings=tuple(log.recording for log in logs),
+        forces=tuple(row for log in logs for row in log.forces),
+        findings=tuple(row for log in logs for row in log.findings),
+        skipped=tuple(Skipped(f"broken/{i}.mcap", f"broken/{i}.mcap: empty") for i in range(count // 100)),
     )
-    of_group = dict.fromkeys(GROUPS, 0)
-    for log in rows_of_logs(count, detectors, seed):
-        recordings.append(log.recording)
-        contacts += log.contacts
-        false_alarms += log.false_alarms
-        forces += log.forces
-        findings += log.findings
-        of_group[log.recording.group] += 1
     return replace(
         made,
         exposure=tuple(

@@ -8,7 +8,7 @@ from weakref import ref
 import numpy as np
 
 from cdtool.detectors.detection import Signal
-from cdtool.thresholds.recent import Recent
+from cdtool.thresholds.whitening import Recent
 
 
 def signals(count: int) -> list[Signal]:

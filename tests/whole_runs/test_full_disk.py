@@ -13,7 +13,7 @@ import pytest
 from cdtool.base.errors import OutputError, RecordingError
 from cdtool.base.files.writing import replaced
 from cdtool.commands.convert.converting import convert
-from cdtool.commands.convert.log_rows import LogRows
+from cdtool.commands.convert.log_rows import ColumnRows
 from cdtool.formats.groups import Part
 from tests.commands.convert.kinds import KINDS, needs, table
 
@@ -76,7 +76,7 @@ def test_a_read_error_is_not_reported_for_the_file_being_written(tmp_path, monke
         yield [Part(None, ())]
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
-    monkeypatch.setattr(LogRows, "parts", lost)
+    monkeypatch.setattr(ColumnRows, "parts", lost)
     monkeypatch.setattr("cdtool.formats.exports.csv_writing._lines", lambda *_: "")
     monkeypatch.setattr(Part, "__len__", lambda _: 0)
     with pytest.raises(RecordingError, match=r"run\.csv: cannot be read: Input/output error"):

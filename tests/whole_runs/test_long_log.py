@@ -190,3 +190,13 @@ def test_detect_and_explain_accept_only_the_option_fields_as_keywords(call, firs
     assert log == first and given == list(inspect.signature(DetectionOptions).parameters)
     with pytest.raises(TypeError, match="'limits'"):
         call("a.csv", "machine.toml", limits=[1.0])
+
+
+def test_false_alarms_are_counted_by_operation_and_named_by_the_log(folder):
+    (folder / "sensitive.toml").write_text(BENCHMARK + "[signature]\nsafety_factor = 0.5\n")
+    results = cdtool.benchmark(folder / "sensitive.toml").results
+    alarms = [row for row in results.false_alarms if (row.group, row.detector) == ("holdout", "momentum")]
+    assert {row.recording for row in alarms} == {"quiet.csv"}
+    (reason,) = (text for text in results.conclusion.reasons if text.startswith("momentum, holdout: "))
+    assert [row.operation for row in alarms] == [1, 3, 4, 5, 6]
+    assert "5 false alarms in 5 of 6 operations" in reason

@@ -14,10 +14,11 @@ _ACTIVE = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufe
 def strict_json(value: Any, *, compact: bool = False) -> str:
     """Return JSON of mappings, sequences and plain values: null for non-finite numbers, active characters escaped."""
     layout: dict[str, Any] = {"separators": (",", ":")} if compact else {"indent": 1}
-    return _passive(json.dumps(finite(value), allow_nan=False, ensure_ascii=False, **layout))
+    return passive(json.dumps(finite(value), allow_nan=False, ensure_ascii=False, **layout))
 
 
-def _passive(text: str) -> str:
+def passive(text: str) -> str:
+    """Return JSON with active characters escaped."""
     return _ACTIVE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from cdtool.base.findings.kinds import Severity, kind_of
 from cdtool.base.findings.words import FindingWords
@@ -35,7 +35,7 @@ class Finding:
 
     kind: str
     channel: str = ""
-    numbers: Mapping[str, Any] = field(default_factory=dict)
+    numbers: Mapping[str, Annotated[Any, tuple]] = field(default_factory=dict)
     severity: Severity = ""  # type: ignore[assignment]  # completed below
     file: str = ""
 

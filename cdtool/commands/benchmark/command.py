@@ -29,8 +29,8 @@ from cdtool.commands.console.summary_table import finish
 from cdtool.commands.console.written_reports import show_results, write_reports
 
 if TYPE_CHECKING:
-    from cdtool.commands.scoring.store.stored_outcomes import StoreReport
-    from cdtool.execution.store.use import StoreUse
+    from cdtool.commands.scoring.benchmark_result import StoreReport
+    from cdtool.execution.store.store import Store
     from cdtool.execution.workers import Workers
     from cdtool.results.evaluated import Evaluated
 
@@ -99,7 +99,7 @@ def benchmark(
     """
     from cdtool.commands.scoring.benchmark import benchmark as run
     from cdtool.commands.scoring.benchmark_file import SECTIONS
-    from cdtool.execution.store.use import StoreUse
+    from cdtool.execution.store.store import Store
     from cdtool.execution.workers import Workers
     from cdtool.report.model import SECTIONS as REPORT_SECTIONS
     from cdtool.report.outputs import check_outputs
@@ -109,7 +109,7 @@ def benchmark(
     if store is None and (trust_mtime or retry_failed):
         raise UsageError(f"{'--trust-mtime' if trust_mtime else '--retry-failed'} needs --store", "add --store DIR")
     workers = Workers(jobs, timeout, retries, cluster)
-    use = None if store is None else StoreUse(store, trust_times=trust_mtime, retry_failed=retry_failed)
+    use = None if store is None else Store(store, trust_times=trust_mtime, retry_failed=retry_failed)
     if dry_run:
         _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
         return
@@ -170,7 +170,7 @@ def _show_dry_run(
     detectors: tuple[str, ...],
     false_alarm_budget: str | None,
     workers: Workers,
-    store: StoreUse | None,
+    store: Store | None,
     *,
     as_json: bool,
 ) -> None:

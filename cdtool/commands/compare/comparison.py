@@ -220,7 +220,6 @@ class Changed:
 
 def _refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: Sequence[str]) -> None:
     """Raise ConfigurationError if a rule that defines the results of these groups differs."""
-    _refuse_onsets_in_samples(old, new)
     for key, where in _RULES.items():
         before, after = old.get(key), new.get(key)
         if key in _BY_GROUP:
@@ -233,17 +232,6 @@ def _refuse_other_rules(old: Mapping[str, Any], new: Mapping[str, Any], groups: 
                 f"{name} differs: {_shown(one)} in old, {_shown(other)} in new",
                 f"such results cannot be compared: use the same {where} in the benchmark file and run one again",
             )
-
-
-def _refuse_onsets_in_samples(old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
-    """Raise ConfigurationError if one of the files is of a version that counted onsets in samples."""
-    if old.get("onset_unit") == new.get("onset_unit"):
-        return
-    which = "old" if old.get("onset_unit") else "new"
-    raise ConfigurationError(
-        f"{which} is of an earlier version, whose onsets are counted in samples, not in ms",
-        f"run the benchmark of {which} again with this version: such results cannot be compared",
-    )
 
 
 def _changed_settings(old: Mapping[str, Any], new: Mapping[str, Any], detectors: Sequence[str]) -> list[Changed]:

@@ -12,7 +12,7 @@ from cdtool.commands.compare.rows import BuildRow
 from cdtool.report.few_contacts import EXPLAINED
 from cdtool.report.model import NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number
-from cdtool.report.table import Cell, Column, Fields, Table, name_cell, shown, tabulate
+from cdtool.report.table import Cell, Fields, Heading, Table, name_cell, shown, tabulate
 
 _TONES = {"worse": "bad", "mixed": "bad", "inconclusive": "unknown"}
 _MOST_CHANGES = 10
@@ -50,9 +50,9 @@ def comparison_model(comparison: BuildComparison) -> ComparisonModel:
     few = any(row.few for row in comparison.rows)
     changed_rows = [row for row in comparison.rows if row.outcome in ("worse", "mixed", "better")]
     changed: Fields[tuple[str, str, str]] = (
-        (Column("setting"), lambda item: Cell(item[0])),
-        (Column("old"), lambda item: Cell(item[1])),
-        (Column("new"), lambda item: Cell(item[2])),
+        (Heading("setting"), lambda item: Cell(item[0])),
+        (Heading("old"), lambda item: Cell(item[1])),
+        (Heading("new"), lambda item: Cell(item[2])),
     )
     only = (("old", comparison.only_old), ("new", comparison.only_new))
     return ComparisonModel(
@@ -103,30 +103,30 @@ def contacts_of(row: BuildRow) -> str:
 def _short_table(rows: Sequence[BuildRow]) -> Table:
     """Return the rows in seven columns, which fit a pull request; the result in one word."""
     fields: Fields[BuildRow] = (
-        (Column("group"), lambda row: name_cell(row.group)),
-        (Column("detector"), lambda row: name_cell(row.detector)),
-        (Column("latency ms"), lambda row: Cell(both(row, "latency_ms"))),
-        (Column("missed"), lambda row: Cell(both(row, "missed"))),
-        (Column("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
-        (Column("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n"))),
-        (Column("result", choice=True), lambda row: Cell(row.outcome, tone=_TONES.get(row.outcome, ""))),
+        (Heading("group"), lambda row: name_cell(row.group)),
+        (Heading("detector"), lambda row: name_cell(row.detector)),
+        (Heading("latency ms"), lambda row: Cell(both(row, "latency_ms"))),
+        (Heading("missed"), lambda row: Cell(both(row, "missed"))),
+        (Heading("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
+        (Heading("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n"))),
+        (Heading("result", choice=True), lambda row: Cell(row.outcome, tone=_TONES.get(row.outcome, ""))),
     )
     return tabulate("short_results", "", fields, rows)
 
 
 def _results_table(rows: Sequence[BuildRow], few: bool) -> Table:
     """Return a row per detector and group; `few`: with ranges of latency, as a row has too few contacts for a mean."""
-    ranges: Fields[BuildRow] = ((Column("range ms"), lambda row: Cell(ranges_of(row) or NOTHING)),)
+    ranges: Fields[BuildRow] = ((Heading("range ms"), lambda row: Cell(ranges_of(row) or NOTHING)),)
     fields: Fields[BuildRow] = (
-        (Column("group"), lambda row: name_cell(row.group)),
-        (Column("detector"), lambda row: name_cell(row.detector)),
-        (Column("contacts"), lambda row: Cell(contacts_of(row))),
-        (Column("latency ms"), lambda row: Cell(both(row, "latency_ms", 4))),
+        (Heading("group"), lambda row: name_cell(row.group)),
+        (Heading("detector"), lambda row: name_cell(row.detector)),
+        (Heading("contacts"), lambda row: Cell(contacts_of(row))),
+        (Heading("latency ms"), lambda row: Cell(both(row, "latency_ms", 4))),
         *(ranges if few else ()),
-        (Column("missed"), lambda row: Cell(both(row, "missed"))),
-        (Column("not assessable"), lambda row: Cell(both(row, "not_assessable"))),
-        (Column("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
-        (Column("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n", 4))),
-        (Column("result"), lambda row: Cell(row.words)),
+        (Heading("missed"), lambda row: Cell(both(row, "missed"))),
+        (Heading("not assessable"), lambda row: Cell(both(row, "not_assessable"))),
+        (Heading("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
+        (Heading("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n", 4))),
+        (Heading("result"), lambda row: Cell(row.words)),
     )
     return tabulate("results", "", fields, rows)

@@ -12,8 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.results.results import ContactResult, RecordingResult, Results
-from cdtool.results.rows import grouped, values_of
+from cdtool.results.results import ContactResult, RecordingResult, Results, grouped
 
 # An onset in seconds since 1970 is stored to some 2e-7 s.
 _CLOCK = 1e-6
@@ -44,7 +43,7 @@ def pair_recordings(old: Results, new: Results) -> dict[str, Pairing]:
     onsets = (_onsets(old), _onsets(new))
     shared = [group for group in old.every_group if group in new.every_group]
     before, after = (grouped(results.recordings, "group") for results in (old, new))
-    return {group: _pair(group, before.get((group,), ()), after.get((group,), ()), *onsets) for group in shared}
+    return {group: _pair(group, before.get(group, ()), after.get(group, ()), *onsets) for group in shared}
 
 
 def _pair(
@@ -116,10 +115,8 @@ def _agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 def _onsets(results: Results) -> Onsets:
     found: dict[tuple[str, str], dict[int, tuple[float, float]]] = defaultdict(dict)
-    names = ("group", "recording", "contact", "onset_s", "onset_uncertainty_s")
-    columns = (values_of(results.contacts, name) for name in names)
-    for group, recording, contact, onset, uncertainty in zip(*columns, strict=True):
-        found[group, recording][contact] = (onset, uncertainty or 0.0)
+    for item in results.contacts:
+        found[item.group, item.recording][item.contact] = (item.onset_s, item.onset_uncertainty_s or 0.0)
     return found
 
 

@@ -45,7 +45,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Measured:
+class PlannedDeviation:
     """A standard deviation [ms] to plan with: given, or measured on the contacts described by `source`."""
 
     std: float
@@ -58,7 +58,7 @@ class Plan:
     """The answers in the order of the questions; `measured` if a difference was given."""
 
     answers: tuple[Answer, ...]
-    measured: Measured | None = None
+    measured: PlannedDeviation | None = None
 
     def __repr__(self) -> str:
         return f"Plan({'; '.join(item.words for item in self.answers)})"
@@ -67,7 +67,7 @@ class Plan:
 def plan(  # noqa: PLR0913  # the public function: a keyword for each setting
     *,
     difference_ms: float | None = None,
-    std_ms: float | Measured | None = None,
+    std_ms: float | PlannedDeviation | None = None,
     unpaired: bool = False,
     power: float = 0.8,
     missed_at_most: str = "",
@@ -81,7 +81,7 @@ def plan(  # noqa: PLR0913  # the public function: a keyword for each setting
     ----------
     difference_ms : float, optional
         Difference of the mean latency of two detectors that the test has to show [ms].
-    std_ms : float or Measured, optional
+    std_ms : float or PlannedDeviation, optional
         Standard deviation of the differences within pairs, or within a group if `unpaired` [ms]: a number, or the
         result of `measured_std`.
     unpaired : bool, optional
@@ -122,7 +122,7 @@ def plan(  # noqa: PLR0913  # the public function: a keyword for each setting
     level = 1.0 - significance
     counts = (0, 1) if allowed is None else tuple(dict.fromkeys((0, allowed)))
     answers: list[Answer] = []
-    measured = std_ms if isinstance(std_ms, Measured) or std_ms is None else Measured(std_ms)
+    measured = std_ms if isinstance(std_ms, PlannedDeviation) or std_ms is None else PlannedDeviation(std_ms)
     if difference_ms is not None:
         if measured is None:
             raise UsageError(
@@ -144,7 +144,7 @@ def plan(  # noqa: PLR0913  # the public function: a keyword for each setting
 
 def measured_std(
     results: str | Path | Results, detectors: Sequence[str] = (), group: str = "", *, unpaired: bool = False
-) -> Measured:
+) -> PlannedDeviation:
     """Return the standard deviation [ms] of the paired differences of two detectors, or of latencies if `unpaired`.
 
     By recording or campaign, see `spread_of`; for two detectors unpaired, the root of the mean square. `detectors` are
@@ -165,10 +165,10 @@ def measured_std(
     std = math.sqrt(sum(item.std**2 for item in spreads) / len(spreads))
     cluster = "campaign" if any(item.campaign for item in known.recordings if item.group == chosen) else "recording"
     where = " and ".join(_counted(item, len(sample), cluster) for item, sample in zip(spreads, samples, strict=True))
-    return Measured(std, f"{words} in {chosen}, {where}", spreads)
+    return PlannedDeviation(std, f"{words} in {chosen}, {where}", spreads)
 
 
-def _difference(difference: float, std: Measured, unpaired: bool, power: float, level: float) -> Answer:
+def _difference(difference: float, std: PlannedDeviation, unpaired: bool, power: float, level: float) -> Answer:
     count = (impacts_for_unpaired if unpaired else impacts_for_difference)(difference, std.std, power, level)
     # If recordings contain several contacts, the spread is that of recordings.
     grouped = any(item.clusters < item.n for item in std.spreads)

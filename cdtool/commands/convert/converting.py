@@ -1,30 +1,157 @@
-"""`cdtool convert`: write a log's channels or all its columns to another file format, bit for bit, with provenance."""
+"""`cdtool convert`: write a log's channels or all its columns to another file format, bit for bit, with provenance.
+
+The mapped channels of a log as `cdtool convert` writes them: as logged, in SI units, in memory.
+
+The rows of a section of a log, as `cdtool convert` writes them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
+from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.base.files.writing import replaced
 from cdtool.base.findings import Finding
+from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import location
 from cdtool.base.version import __version__
-from cdtool.commands.convert.channel_rows import ChannelRows
-from cdtool.commands.convert.log_rows import LogRows
-from cdtool.commands.convert.section_rows import Rows, SectionRows
+from cdtool.commands.convert.log_rows import ColumnRows
+from cdtool.commands.judging.runs import read
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.parts import join_digests
-from cdtool.formats.channels.reading import LogFolder, log_parts
-from cdtool.formats.groups import UNVERIFIED, Parts
+from cdtool.formats.channels.reading import LogFolder, log_parts, read_as_logged
+from cdtool.formats.columns import Column
+from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts
 from cdtool.formats.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.formats.written_files import files_of, machine_text, writer_of
 from cdtool.recordings.log_section import LogSection
+from cdtool.recordings.recording import Series
 
 if TYPE_CHECKING:
     from cdtool.execution.workers import Progress
+
+
+class Rows(Protocol):
+    """The groups of a log and their rows; `parts` can be called repeatedly."""
+
+    @property
+    def groups(self) -> Sequence[Group]:
+        """The groups, without their rows."""
+        ...
+
+    @property
+    def origin(self) -> float:
+        """The origin of the times [s]."""
+        ...
+
+    @property
+    def findings(self) -> Sequence[Finding]:
+        """What was found while reading."""
+        ...
+
+    def parts(self, groups: Sequence[Group]) -> Parts:
+        """Yield the rows of these groups."""
+        ...
+
+
+class SectionRows:
+    """The groups of a log that have rows in a section, and these rows; they keep their times.
+
+    A distance travelled is determined from the log's channels, so that it needs a machine file. Raises UsageError for a
+    distance without one and for columns without a clock, RecordingError if no row is in the section.
+    """
+
+    def __init__(self, log: Path, rows: Rows, section: LogSection, machine_file: MachineFile | None) -> None:
+        if untimed := [group for group in rows.groups if not group.timed]:
+            name = untimed[0].columns[0].name
+            raise UsageError(f"{log}: no clock is known for {name}, so that it cannot be cut {section}", "pass -m")
+        self._rows, self._begin, self._end = rows, *_times(log, section, machine_file)
+        self.origin, self.findings = rows.origin, rows.findings
+        counts, starts = [0] * len(rows.groups), [np.inf] * len(rows.groups)
+        for ready in self.parts(rows.groups):
+            for i, part in enumerate(ready):
+                if part is not None and part.time is not None:
+                    counts[i] += len(part)
+                    starts[i] = min(starts[i], float(part.time.min()))
+        numbered = zip(rows.groups, counts, starts, strict=True)
+        self.groups = [replace(group, rows=count, start=start) for group, count, start in numbered if count]
+        if not self.groups:
+            start = min(group.start for group in rows.groups)
+            raise RecordingError(
+                f"{log}: no sample {section}: the log starts at {digits(start)} s", "change from and to"
+            )
+
+    def parts(self, groups: Sequence[Group]) -> Iterator[list[Part | None]]:
+        """Yield the rows of these groups that are in the section, part by part."""
+        whole = {group.name: group for group in self._rows.groups}
+        for ready in self._rows.parts([whole[group.name] for group in groups]):
+            yield [None if part is None else self._inside(part) for part in ready]
+
+    def _inside(self, part: Part) -> Part | None:
+        assert part.time is not None, "groups without a clock are refused"
+        inside = (part.time >= self._begin) & (part.time <= self._end)
+        if inside.all():
+            return part
+        return Part(part.time[inside], tuple(item[inside] for item in part.values)) if inside.any() else None
+
+
+def _times(log: Path, section: LogSection, machine_file: MachineFile | None) -> tuple[float, float]:
+    by_distance = [mark for mark in (section.begin, section.end) if mark and mark.unit != "s"]
+    if by_distance and machine_file is None:
+        raise UsageError(f"{by_distance[0]} needs the log's position", "pass a machine file with -m, or give a time")
+    if machine_file is not None and by_distance:
+        return section.times(read(log, machine_file))
+    begin, end = section.begin, section.end
+    return -np.inf if begin is None else begin.value, np.inf if end is None else end.value
+
+
+# Rows of the longest clock per part.
+_ROWS = 1 << 16
+
+
+class ChannelRows:
+    """The groups of a recording (the channels of one clock) and their rows; `parts` can be called repeatedly."""
+
+    def __init__(self, log: Path, machine_file: MachineFile) -> None:
+        self._recording = read_as_logged(log, machine_file, unread="loss").recording
+        self.origin, self.findings = self._recording.origin, self._recording.findings
+        clocks: dict[bytes, list[str]] = {}
+        for name, series in self._recording.channels.items():
+            clocks.setdefault(series.time.tobytes(), []).append(name)
+        self.groups = [self._group(f"clock_{i}", names) for i, names in enumerate(clocks.values(), start=1)]
+
+    def parts(self, groups: Sequence[Group]) -> Iterator[list[Part | None]]:
+        """Yield the rows of these groups, part by part along the longest clock."""
+        series = [[self._recording[column.name] for column in group.columns] for group in groups]
+        times = [channels[0].time for channels in series]
+        before = [0] * len(times)
+        for end in (*max(times, key=len)[_ROWS::_ROWS].tolist(), np.inf):
+            to = [int(np.searchsorted(time, end, side="left")) for time in times]
+            yield [
+                Part(channels[0].time[a:b], tuple(_values(item, slice(a, b)) for item in channels)) if b > a else None
+                for channels, a, b in zip(series, before, to, strict=True)
+            ]
+            before = to
+
+    def _group(self, name: str, channels: Sequence[str]) -> Group:
+        first = self._recording[channels[0]]
+        columns = tuple(_header(channel, self._recording[channel]) for channel in channels)
+        return Group(name, columns, len(first), True, float(first.time[0]), self._recording.joints)
+
+
+def _header(name: str, series: Series) -> Column:
+    shape = (0, series.joint_count) if series.joint_count > 1 else (0,)
+    return Column(name, np.empty(shape), None, None if series.unit == "1" else series.unit)
+
+
+def _values(series: Series, rows: slice) -> FloatArray:
+    return series.values[rows] if series.joint_count > 1 else series.values[rows, 0]
 
 
 @dataclass(frozen=True)
@@ -94,7 +221,7 @@ def convert(
     machine_file = (
         None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     )
-    rows: Rows = ChannelRows(log, machine_file) if machine_file else LogRows(log)
+    rows: Rows = ChannelRows(log, machine_file) if machine_file else ColumnRows(log)
     if not rows.groups:
         raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
     rows = SectionRows(log, rows, section, machine_file) if section else rows

@@ -36,7 +36,7 @@ class _Pick:
         return values if self.element is None else np.ascontiguousarray(values[:, self.element])
 
 
-class LogRows:
+class ColumnRows:
     """A log, in one file or in parts, read piece by piece: its groups and their rows; `parts` can be called repeatedly.
 
     The clock of a table is guessed, since some containers need one. Topics with bit-identical times form one group.

@@ -66,7 +66,7 @@ def detect(
     settings = options.settings()
     prepared, machine_file = settings.prepared(), settings.machine_file()
     estimate_force = _force_at(contact_at, machine_file.machine) if contact_at else None
-    run = _Run(
+    run = _DetectedLogs(
         settings,
         _plot_names(plot, logs, runs=settings.has_runs, force=force),
         estimate_force,
@@ -95,7 +95,7 @@ def detect(
 
 
 @dataclass
-class _Run:
+class _DetectedLogs:
     """Detection in several logs: the steps for each, and the results so far."""
 
     settings: DetectionOptions

@@ -1,9 +1,13 @@
-"""The result of a detector on logs for Python: alarms and contacts as DataFrames, the signal, the figure."""
+"""The result of a detector on logs for Python: alarms and contacts as DataFrames, the signal, the figure.
+
+Logs by name: one that is not among the results is answered with the nearest that are.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cached_property
 from os import PathLike
 from pathlib import Path, PurePath
@@ -14,7 +18,6 @@ import numpy as np
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.detect.log_by_name import UnknownLogError, number_of
 from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of, detect_log
 from cdtool.commands.detecting.detection_options import DetectionOptions
 from cdtool.commands.judging.runs import several_logs
@@ -32,10 +35,56 @@ if TYPE_CHECKING:
     from cdtool.alarms.activation import ActivationSettings
     from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
     from cdtool.commands.judging.scoring_rules import ScoringRules
-    from cdtool.commands.learning.learning import Learned
+    from cdtool.commands.learning.learning import LearnedSignature
     from cdtool.detectors.base import Detector
     from cdtool.formats.machine_file import MachineFile
     from cdtool.formats.signature_file import SignatureFile
+
+
+class UnknownLogError(UsageError, KeyError):
+    """No log of that name is among the results, or `several` are."""
+
+    several = False
+
+
+def number_of(name: str, logs: Sequence[str], left_out: Mapping[str, str] | None = None) -> int:
+    """Return the number of the log of that name, or of the only one whose path ends in it.
+
+    `left_out` are logs without a result, with the reason. Raises UnknownLogError with that reason, with the nearest
+    names, or with those that the name fits.
+
+    Examples
+    --------
+    >>> number_of("03.csv", ["stiff/02.csv", "stiff/03.csv"])
+    1
+    """
+    wanted = PurePath(name).parts
+    exact = [place for place, log in enumerate(logs) if log == name]
+    found = exact or [place for place, log in enumerate(logs) if _ends_in(log, wanted)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        same = ", ".join(f"{'/'.join(PurePath(logs[place]).parts[-len(wanted) - 1 :])} [{place}]" for place in found)
+        fault = UnknownLogError(f"{len(found)} logs are named '{name}'", f"give more of the path or the number: {same}")
+        fault.several = True
+        raise fault
+    reason = next((reason for log, reason in (left_out or {}).items() if _ends_in(log, wanted)), None)
+    raise UnknownLogError(
+        f"no log '{name}' in these results", f"it was left out: {reason}" if reason else _near(name, logs)
+    )
+
+
+def _ends_in(log: str, wanted: tuple[str, ...]) -> bool:
+    return bool(wanted) and PurePath(log).parts[-len(wanted) :] == wanted
+
+
+def _near(name: str, logs: Sequence[str]) -> str:
+    if not logs:
+        return "they are empty"
+    ends = [PurePath(log).name for log in logs]
+    close = get_close_matches(PurePath(name).name, dict.fromkeys(ends), n=2, cutoff=0.5)
+    return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(dict.fromkeys(ends))}"
+
 
 VERDICTS = ("alarm", "no alarm", "not_assessable")
 _SHOWN = ["operation", "verdict", "alarms", "first_alarm_s", "contacts", "latency_ms"]
@@ -341,7 +390,7 @@ def detect(  # type: ignore[overload-overlap]  # a str is one log, not a sequenc
     machine: str | Path | MachineFile | None = ...,
     *,
     benchmark: str | Path | PreparedBenchmark | None = ...,
-    signature: str | Path | Learned | SignatureFile | None = ...,
+    signature: str | Path | LearnedSignature | SignatureFile | None = ...,
     detector: str | Detector | None = ...,
     limit: Sequence[float] = ...,
     warm_up: float | None = ...,
@@ -359,7 +408,7 @@ def detect(
     machine: str | Path | MachineFile | None = ...,
     *,
     benchmark: str | Path | PreparedBenchmark | None = ...,
-    signature: str | Path | Learned | SignatureFile | None = ...,
+    signature: str | Path | LearnedSignature | SignatureFile | None = ...,
     detector: str | Detector | None = ...,
     limit: Sequence[float] = ...,
     warm_up: float | None = ...,
@@ -376,7 +425,7 @@ def detect(  # noqa: PLR0913  # the public function: a keyword for each setting
     machine: str | Path | MachineFile | None = None,
     *,
     benchmark: str | Path | PreparedBenchmark | None = None,
-    signature: str | Path | Learned | SignatureFile | None = None,
+    signature: str | Path | LearnedSignature | SignatureFile | None = None,
     detector: str | Detector | None = None,
     limit: Sequence[float] = (),
     warm_up: float | None = None,

@@ -14,7 +14,7 @@ from cdtool.base.errors import RecordingError, UsageError
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.detecting.detection_options import DetectionOptions
-from cdtool.commands.judging.matched_log import DetectedLog, match_log
+from cdtool.commands.judging.matched_log import CutLog, match_log
 from cdtool.commands.judging.runs import (
     absent_truth,
     check_joints,
@@ -238,8 +238,8 @@ class _OneDetector:
         )
         contacts = any_contacts(whole, rules)
         contacts = list(self.section.contacts_of(whole, contacts)) if self.section else contacts
-        detected = DetectedLog(recording, parts, self.operations, contacts, [[item] for item in detections])
-        matched = match_log(detected, "", rules, self.activation.wait)
+        log = CutLog(recording, parts, self.operations, contacts)
+        matched = match_log(log, [[item] for item in detections], "", rules, self.activation.wait)
         return Detected(
             recording,
             detections,

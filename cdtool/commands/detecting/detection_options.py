@@ -17,7 +17,7 @@ from cdtool.recordings.operations import RunCut
 
 if TYPE_CHECKING:
     from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
-    from cdtool.commands.learning.learning import Learned
+    from cdtool.commands.learning.learning import LearnedSignature
     from cdtool.detectors.base import Detector
     from cdtool.formats.signature_file import SignatureFile
 
@@ -29,7 +29,7 @@ class DetectionOptions:
     machine: str | Path | MachineFile | None = None
     _: KW_ONLY
     benchmark: str | Path | PreparedBenchmark | None = None
-    signature: str | Path | Learned | SignatureFile | None = None
+    signature: str | Path | LearnedSignature | SignatureFile | None = None
     detector: str | Detector | None = None
     limit: Sequence[float] = ()
     warm_up: float | None = None

@@ -11,7 +11,7 @@ from typing import Any
 from cdtool.base.errors import UsageError, nearest
 from cdtool.base.plain_text import counted
 from cdtool.commands.judging.runs import load_runs
-from cdtool.commands.learning.learning import Learned, signature_of
+from cdtool.commands.learning.learning import LearnedSignature, signature_of
 from cdtool.commands.learning.normal_runs import normals_for, normals_of, notes_on
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog, learn_thresholds
@@ -86,7 +86,10 @@ class PreparedBenchmark:
 
 
 def prepare_benchmark(
-    file: str | Path, *, detector: str | None = None, signature: str | Path | Learned | SignatureFile | None = None
+    file: str | Path,
+    *,
+    detector: str | None = None,
+    signature: str | Path | LearnedSignature | SignatureFile | None = None,
 ) -> PreparedBenchmark:
     """Read a benchmark file and learn the threshold of one of its detectors, or use that of a signature file.
 

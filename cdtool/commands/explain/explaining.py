@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cdtool.alarms.activation import ActivationSettings
     from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
     from cdtool.commands.judging.scoring_rules import ScoringRules
-    from cdtool.commands.learning.learning import Learned
+    from cdtool.commands.learning.learning import LearnedSignature
     from cdtool.detectors.base import Detector
     from cdtool.formats.signature_file import SignatureFile
 
@@ -62,7 +62,7 @@ def explain(  # noqa: PLR0913  # the public function: a keyword for each setting
     machine: str | Path | MachineFile | None = None,
     *,
     benchmark: str | Path | PreparedBenchmark | None = None,
-    signature: str | Path | Learned | SignatureFile | None = None,
+    signature: str | Path | LearnedSignature | SignatureFile | None = None,
     detector: str | Detector | None = None,
     limit: Sequence[float] = (),
     warm_up: float | None = None,

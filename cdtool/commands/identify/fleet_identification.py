@@ -19,7 +19,7 @@ from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.identifying import IdentifiedMachine, JointIdentification, identify
 from cdtool.commands.judging.log_groups import by_machine, day_in_path, day_of
-from cdtool.commands.judging.runs import find_logs, read_log, several_logs, shown_path
+from cdtool.commands.judging.runs import find_logs, read, several_logs, shown_path
 from cdtool.execution.workers import Progress, Workers, in_order
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.results.results import RecordingFinding, Skipped
@@ -153,7 +153,7 @@ class _Group:
 
 
 @dataclass(frozen=True)
-class _Outcome:
+class _GroupOutcome:
     """What a group's logs show, or the reason why they show nothing."""
 
     group: _Group
@@ -228,19 +228,19 @@ class _IdentifiesGroup:
 
     machine: Path
 
-    def __call__(self, group: _Group) -> _Outcome:
+    def __call__(self, group: _Group) -> _GroupOutcome:
         try:
             done = identify(group.logs, self.machine)
         except CdtoolError as fault:
-            return _Outcome(group, reason=str(fault))
-        return _Outcome(group, tuple(parameters_of(done)), done.skipped, done.findings)
+            return _GroupOutcome(group, reason=str(fault))
+        return _GroupOutcome(group, tuple(parameters_of(done)), done.skipped, done.findings)
 
 
-def _lost(group: _Group, reason: str) -> _Outcome:
-    return _Outcome(group, reason=reason)
+def _lost(group: _Group, reason: str) -> _GroupOutcome:
+    return _GroupOutcome(group, reason=reason)
 
 
-def _collected(by: Division, outcomes: Sequence[_Outcome], skipped: list[Skipped]) -> FleetIdentification:
+def _collected(by: Division, outcomes: Sequence[_GroupOutcome], skipped: list[Skipped]) -> FleetIdentification:
     machines: list[FleetMachine] = []
     findings: list[RecordingFinding] = []
     usable = {item.group.machine for item in outcomes if not item.group.period and not item.reason}
@@ -286,7 +286,7 @@ def _frictions(joint: JointIdentification, prefix: str) -> Iterable[ParameterVal
             )
 
 
-def _series(periods: Sequence[_Outcome]) -> tuple[ParameterSeries, ...]:
+def _series(periods: Sequence[_GroupOutcome]) -> tuple[ParameterSeries, ...]:
     """Return each parameter over the periods; a value by another method is another parameter."""
     found: dict[tuple[str, str], list[tuple[str, ParameterValue]]] = {}
     for outcome in periods:
@@ -400,6 +400,6 @@ def _day_of(log: Path, machine_file: MachineFile) -> str:
     if day := day_in_path(log):
         return day
     try:
-        return day_of(log, read_log(log, machine_file).began)
+        return day_of(log, read(log, machine_file).began)
     except CdtoolError:
         return ""

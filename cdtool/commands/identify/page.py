@@ -29,7 +29,7 @@ from cdtool.commands.identify.words import (
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
 from cdtool.report.number_text import NOTHING, number, percent
-from cdtool.report.table import Cell, Column, Table, name_cell, number_cell, tabulate
+from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -86,13 +86,13 @@ def _joint_sections(joint: JointIdentification, shown: JointEvidence, name: str)
 
 def _changes_table(changes: Sequence[MachineChange]) -> Table:
     fields = (
-        (Column("key"), lambda item: Cell(f"{item.section}.{item.key}")),
-        (Column("old", numeric=True), lambda item: Cell(_old(item))),
-        (Column("new", numeric=True), lambda item: Cell(_values(item.values, 6))),
-        (Column("standard error", numeric=True), lambda item: Cell(_values(item.standard_errors, 2))),
-        (Column("unit"), lambda item: Cell(item.unit)),
-        (Column("origin"), lambda item: Cell(item.method.value)),
-        (Column("valid"), lambda item: Cell("alone" if item.is_known_alone else "only with its table")),
+        (Heading("key"), lambda item: Cell(f"{item.section}.{item.key}")),
+        (Heading("old", numeric=True), lambda item: Cell(_old(item))),
+        (Heading("new", numeric=True), lambda item: Cell(_values(item.values, 6))),
+        (Heading("standard error", numeric=True), lambda item: Cell(_values(item.standard_errors, 2))),
+        (Heading("unit"), lambda item: Cell(item.unit)),
+        (Heading("origin"), lambda item: Cell(item.method.value)),
+        (Heading("valid"), lambda item: Cell("alone" if item.is_known_alone else "only with its table")),
     )
     return tabulate("changes", "Values of the machine file", fields, changes)
 
@@ -113,9 +113,9 @@ def _missing_table(joint: JointIdentification, shown: JointEvidence) -> Table:
     if shown.robot is not None:
         excitation, travel = shown.robot.motion.excitation, shown.robot.units[1]
     fields = (
-        (Column("parameter"), lambda item: Cell(f"{item.section}.{item.key}")),
-        (Column("because"), lambda item: Cell(words_of_reason(item, excitation, travel))),
-        (Column("add"), lambda item: Cell(words_of_needs(item.missing) or NOTHING)),
+        (Heading("parameter"), lambda item: Cell(f"{item.section}.{item.key}")),
+        (Heading("because"), lambda item: Cell(words_of_reason(item, excitation, travel))),
+        (Heading("add"), lambda item: Cell(words_of_needs(item.missing) or NOTHING)),
     )
     return tabulate("missing", "Not identifiable from these logs", fields, joint.not_identifiable)
 
@@ -124,12 +124,12 @@ def _plan_table(shown: JointEvidence, travel: str) -> Table:
     motion = shown.robot.motion if shown.robot else None
     fields = (
         (
-            Column("add"),
+            Heading("add"),
             lambda item: Cell(
                 words_of_joint_plan(item, motion, travel) if motion is not None else words_of_plan(item, travel)
             ),
         ),
-        (Column("makes identifiable"), lambda item: Cell(", ".join(item.keys))),
+        (Heading("makes identifiable"), lambda item: Cell(", ".join(item.keys))),
     )
     return tabulate("plan", "Motion that would make the other parameters identifiable", fields, shown.plan)
 
@@ -157,7 +157,7 @@ def _excitation_table(joint: JointIdentification) -> Table:
             ("largest wind-up of the drive", f"{number(joint.two_mass.largest_wind_up)} {travel}"),
         ]
     cells = [[Cell(name), Cell(value)] for name, value in rows]
-    return Table("excitation", "What the logged motion excites", (Column("quantity"), Column("value")), cells)
+    return Table("excitation", "What the logged motion excites", (Heading("quantity"), Heading("value")), cells)
 
 
 def _prediction_section(joint: JointIdentification, shown: JointEvidence, name: str) -> PageSection:
@@ -186,7 +186,7 @@ def _prediction_table(validation: CrossValidation, force: str) -> Table:
     ]
     floor = number_cell(validation.floor if validation.repeats else None)
     rows.append([Cell(f"between equal strokes ({validation.repeats}): no model can be better"), Cell(NOTHING), floor])
-    columns = (Column("friction"), Column(f"all [{force}]", numeric=True), Column(f"moving [{force}]", numeric=True))
+    columns = (Heading("friction"), Heading(f"all [{force}]", numeric=True), Heading(f"moving [{force}]", numeric=True))
     title = f"RMS error of the force in what was left out of the fit ({counted(validation.folds, 'part')} in turn)"
     return Table("prediction", title, columns, rows)
 
@@ -228,7 +228,7 @@ def _controller_section(joint: JointIdentification, shown: JointEvidence, name: 
 
 def _refused_table(joint: JointIdentification) -> Table:
     rows = [[Cell(method.replace("_", "-")), Cell(visible(reason))] for method, reason in joint.refused.items()]
-    return Table("refused", "Methods that could not be used", (Column("method"), Column("reason")), rows)
+    return Table("refused", "Methods that could not be used", (Heading("method"), Heading("reason")), rows)
 
 
 def drift_html(fleet: FleetIdentification) -> str:
@@ -269,14 +269,14 @@ _NO_DRIFT = "No parameter changed beyond 3 standard errors; a smaller change may
 
 def _drift_table(changed: Sequence[tuple[str, ParameterSeries]]) -> Table:
     fields = (
-        (Column("machine"), lambda item: name_cell(visible(item[0]))),
-        (Column("parameter"), lambda item: Cell(visible(item[1].name))),
-        (Column("first period", numeric=True), lambda item: _value_cell(item[1], 0)),
-        (Column("last period", numeric=True), lambda item: _value_cell(item[1], -1)),
-        (Column("unit"), lambda item: Cell(item[1].unit)),
-        (Column("change", numeric=True), lambda item: number_cell(item[1].drift.change)),
-        (Column("in standard errors", numeric=True), lambda item: number_cell(item[1].drift.standard_errors)),
-        (Column("kind"), lambda item: Cell(item[1].drift.kind.value)),
+        (Heading("machine"), lambda item: name_cell(visible(item[0]))),
+        (Heading("parameter"), lambda item: Cell(visible(item[1].name))),
+        (Heading("first period", numeric=True), lambda item: _value_cell(item[1], 0)),
+        (Heading("last period", numeric=True), lambda item: _value_cell(item[1], -1)),
+        (Heading("unit"), lambda item: Cell(item[1].unit)),
+        (Heading("change", numeric=True), lambda item: number_cell(item[1].drift.change)),
+        (Heading("in standard errors", numeric=True), lambda item: number_cell(item[1].drift.standard_errors)),
+        (Heading("kind"), lambda item: Cell(item[1].drift.kind.value)),
     )
     return tabulate("drift", "Parameters that changed beyond 3 standard errors", fields, changed)
 
@@ -299,5 +299,5 @@ def _machines_table(fleet: FleetIdentification) -> Table:
         ]
         rows.append([name_cell(visible(item.machine)), Cell(str(item.logs), key=item.logs), *cells])
     headings = [f"{visible(name)} [{unit}]" if unit else visible(name) for name, unit in names]
-    columns = [Column("machine"), Column("logs", numeric=True), *(Column(item, numeric=True) for item in headings)]
+    columns = [Heading("machine"), Heading("logs", numeric=True), *(Heading(item, numeric=True) for item in headings)]
     return Table("machines", "Parameters from all logs of a machine, ± standard error", columns, rows)

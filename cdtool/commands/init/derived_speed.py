@@ -20,14 +20,14 @@ _OF_RATE = 0.4
 
 
 @dataclass(frozen=True)
-class LowPass:
+class LowPassGuess:
     """A corner frequency [Hz] for `speed_low_pass_hz`, and the reason."""
 
     corner: float
     why: str
 
 
-def propose_low_pass(channels: Channels, in_seconds: float) -> LowPass | None:
+def propose_low_pass(channels: Channels, in_seconds: float) -> LowPassGuess | None:
     """Return a low-pass for the derived speed; None if a speed is logged or the default suffices.
 
     White noise of the position with deviation s, sampled with period T, has after differentiation and an ideal low-pass
@@ -62,7 +62,9 @@ def propose_low_pass(channels: Channels, in_seconds: float) -> LowPass | None:
     jitter = _jitter(steps, period)
     if jitter > 0.02 * period:
         text += f" with a jitter of {1e3 * jitter:.2g} ms"
-    return LowPass(rounded, f"{text}: up to this frequency its noise is below {100 * _NOISE:g} % of its largest value")
+    return LowPassGuess(
+        rounded, f"{text}: up to this frequency its noise is below {100 * _NOISE:g} % of its largest value"
+    )
 
 
 def _jitter(steps: FloatArray, period: float) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.findings import Finding
-from cdtool.commands.init.derived_speed import LowPass
+from cdtool.commands.init.derived_speed import LowPassGuess
 from cdtool.commands.init.machine_side import Side
 from cdtool.commands.init.names.units import Evidence, Logged
 from cdtool.commands.init.stream import Stream
@@ -61,7 +61,7 @@ class Draft:
     topics: bool
     evidence: Evidence
     unmapped: tuple[Unmapped, ...] = ()
-    low_pass: LowPass | None = None
+    low_pass: LowPassGuess | None = None
     csv: Mapping[str, Any] = field(default_factory=dict)
     words: tuple[UnreadWord, ...] = ()
 

@@ -24,12 +24,12 @@ from cdtool.commands.init.names.units import Evidence, fits_as_well, is_si
 from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
 from cdtool.commands.init.speed_ratio import Ratio, ratio_of
 from cdtool.commands.init.streams import Channels, streams_of
-from cdtool.commands.init.table_clock import TableClock, split_stamp, table_clock
+from cdtool.commands.init.table_clock import DraftedClock, split_stamp, table_clock
 from cdtool.commands.init.unmapped import Unmapped, unmapped_columns
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.information import info
 from cdtool.commands.judging.log_findings import before_contact
-from cdtool.commands.judging.runs import read_log, several_logs
+from cdtool.commands.judging.runs import read, several_logs
 from cdtool.formats.channels.reading import choose_format, element_names, has_topics, log_parts, with_nanoseconds
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv_dialect.pins import read_pins
@@ -262,7 +262,7 @@ def _checked_together(logs: Sequence[Path], machine_file: MachineFile) -> tuple[
     parts = []
     for log in logs:
         with suppress(CdtoolError):
-            recording = with_scalar_force(read_log(log, machine_file), OnsetRule())
+            recording = with_scalar_force(read(log, machine_file), OnsetRule())
             parts.append(before_contact(recording, contacts_shown(recording, OnsetRule())))
     return check_channels(parts, machine_file.machine)
 
@@ -273,7 +273,7 @@ def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
     if csv and not is_table:
         raise UsageError(f"{path}: is {found.name}, not a text table", "remove --csv")
     try:
-        return Csv().columns_by(path, read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
+        return Csv().columns(path, pins=read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
     except RecordingError as fault:
         if not is_table or csv:
             raise
@@ -340,7 +340,7 @@ def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:
     return tuple(found.values())
 
 
-def _in_seconds(time: Clock, clock: TableClock | None, own: bool) -> float:
+def _in_seconds(time: Clock, clock: DraftedClock | None, own: bool) -> float:
     """Return the unit [s] of the streams' times as the draft has it; 0 if its clock is only a placeholder."""
     if own:
         return 1.0
@@ -365,7 +365,7 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
     return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
 
 
-def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
+def _doubt(channels: Channels, clock: DraftedClock | None, ratio: Ratio | None) -> str:
     """Return the doubt about a clock's unit that is only written: another fits the ratio, or the rate is too low."""
     if clock is None or not clock.written:
         return ""
@@ -380,7 +380,7 @@ def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) ->
     return f"{first.clock} with {first.position}, {first.speed} fits the ratio, {clock.unit} does not"
 
 
-def _clock(clock: TableClock | None, ratio: Ratio | None, check: str) -> Clock:
+def _clock(clock: DraftedClock | None, ratio: Ratio | None, check: str) -> Clock:
     if clock is None:
         return Clock(why="no column looks like a clock: give the rate, or a column with its unit")
     name: str | int = int(clock.column) if clock.column.isdigit() else clock.column

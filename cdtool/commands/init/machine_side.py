@@ -10,7 +10,7 @@ from cdtool.commands.init.names.quantity_words import words
 from cdtool.commands.init.names.units_in_names import factor_of, si_of
 from cdtool.commands.init.speed_ratio import Ratio, motion_kind, rotation_unit, seems_to_turn, stated, whole_numbers
 from cdtool.commands.init.streams import Channels
-from cdtool.commands.init.table_clock import TableClock
+from cdtool.commands.init.table_clock import DraftedClock
 from cdtool.recordings.recording import RIG_UNITS
 from cdtool.recordings.units import find_unit
 
@@ -56,7 +56,7 @@ class Side:
         return rotary[quantity], load
 
 
-def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, messages_si: bool) -> Side:
+def side_of(channels: Channels, ratio: Ratio | None, clock: DraftedClock | None, messages_si: bool) -> Side:
     """Guess linear or rotary, motor or load: from stated units, names, and the range and speed of rotation."""
     told = {name: stated(name, found.stream).si for name, found in channels.found.items()}
     lengths = told.get("position") == "m" or told.get("speed") == "m/s"
@@ -96,7 +96,7 @@ def _load_side(channels: Channels, ratio: Ratio | None, told: dict[str, str], me
     return Side("linear_axis", "load", "one joint", "rotary_axis for a rotating joint")
 
 
-def _gear(channels: Channels, ratio: Ratio | None, clock: TableClock | None) -> Gear | None:
+def _gear(channels: Channels, ratio: Ratio | None, clock: DraftedClock | None) -> Gear | None:
     """Return a travel and a rotation, by units or names, whose ratio is that of a gear."""
     if ratio is None or ratio.fitting:
         return None

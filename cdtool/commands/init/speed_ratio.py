@@ -16,7 +16,7 @@ from cdtool.commands.init.names.quantity_words import is_twist, motion_of, words
 from cdtool.commands.init.names.units_in_names import factor_of, label, own_name, si_of, unit_in_name
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
-from cdtool.commands.init.table_clock import TableClock
+from cdtool.commands.init.table_clock import DraftedClock
 from cdtool.recordings.units import find_unit
 
 # Units of position and speed that belong together, the likelier first; the first of each kind are both SI.
@@ -128,7 +128,7 @@ def seems_to_turn(channels: Channels) -> bool:
     return position is None or float(np.nanmax(np.abs(position.stream.values))) < 4.0 * math.pi
 
 
-def ratio_of(channels: Channels, clock: TableClock | None, messages_si: bool) -> Ratio | None:
+def ratio_of(channels: Channels, clock: DraftedClock | None, messages_si: bool) -> Ratio | None:
     """Return position over speed and all units that fit; None if one is missing or does not follow the other.
 
     `messages_si`: the type of the messages implies SI units.
@@ -201,7 +201,7 @@ def _tick(channels: Channels, bare: Ratio, pairs: list[tuple[str, str]]) -> floa
 
 
 def _combination(
-    channels: Channels, clock: TableClock | None, unit: str, pair: tuple[str, str], rank: int, bare: Ratio
+    channels: Channels, clock: DraftedClock | None, unit: str, pair: tuple[str, str], rank: int, bare: Ratio
 ) -> Combination | None:
     off = abs(bare.per_second(unit) * factor_of(pair[0]) / factor_of(pair[1]) - 1.0)
     if off > _NEAR:

@@ -32,7 +32,7 @@ _TIMED_BY_HARDWARE, _JITTERS, _JITTERY = 2e3, 0.02, 1.5
 
 
 @dataclass(frozen=True)
-class TableClock:
+class DraftedClock:
     """A table's clock: the median `step` of its stamps, in its own unit, its jitter, and the seconds assumed per unit.
 
     `jitter` is the median deviation of a step, as a share of the median one. `told` is the source of the unit; if it is
@@ -64,7 +64,7 @@ class TableClock:
         return 1.0 + rare if _POSSIBLE[0] <= rate <= _POSSIBLE[1] else 2 * _RARE
 
 
-def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
+def table_clock(source: Source) -> tuple[DraftedClock, GuessedClock] | None:
     """Return the clock of a table and its times; None if no column looks like a clock."""
     found = _named(source) or _unnamed(source)
     if found is None:
@@ -79,7 +79,7 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     # Numbers that rise by one without a name are those of the rows; the rate follows from position and speed.
     is_row = not re.search(r"[^\W\d_]", found.column) and bool((steps == 1.0).all())
     counts = is_counter(found.column) or is_row
-    clock = TableClock(found.column, step, assumed, unit, "", counts, jitter=jitter)
+    clock = DraftedClock(found.column, step, assumed, unit, "", counts, jitter=jitter)
     stated = find_unit(column.unit) if column.unit else None
     against = ""
     if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from cdtool.machines.axis_model.parameters import AxisModel, Drive
+from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive
 
 # A drive beyond its known wind-up that is as good as rigid: its oscillation lasts so many periods of the controller.
 _PERIODS_OF_RIGID = 20.0
@@ -94,7 +94,7 @@ def assumptions_of(model: AxisModel) -> tuple[Assumption, ...]:
     return tuple(Assumption(*bounds) for bounds in itertools.product(reactions, beyond, slews))
 
 
-def _rigid_beyond(model: AxisModel) -> Drive:
+def _rigid_beyond(model: AxisModel) -> ElasticDrive:
     """Return the drive with an end of its take-up travel at the observed wind-up that hardly gives way."""
     drive = model.drive
     period = model.controller.period if model.controller is not None else _PERIOD

@@ -1,4 +1,9 @@
-"""The section [inject] of a benchmark file: which contacts are put into which impact-free logs."""
+"""The section [inject] of a benchmark file: which contacts are put into which impact-free logs.
+
+A position in a log at which a named joint is at a given angle or place.
+
+Obstacles by name: of a benchmark file, and those that ship with cdtool.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.base.errors import UsageError, nearest
+from cdtool.base.errors import ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import joined
-from cdtool.base.tables import Table
+from cdtool.base.tables import Table, read_toml
 from cdtool.commands.inject.assumption import Assumption
-from cdtool.commands.inject.joint_mark import JointMark
-from cdtool.commands.inject.obstacles import read_obstacle, shipped_obstacles
 from cdtool.commands.inject.robot_contact import StruckPoint
 from cdtool.commands.judging.named_logs import LogsOf
 from cdtool.formats.written_files import WRITERS
@@ -23,6 +26,124 @@ from cdtool.machines.axis import Axis
 from cdtool.machines.axis_model.obstacle import Obstacle
 from cdtool.machines.dynamics import Machine, has_links
 from cdtool.recordings.log_section import MARK_HINT, Mark
+from cdtool.recordings.recording import Recording
+from cdtool.recordings.units import find_unit
+
+_SHIPPED = Path(__file__).with_name("obstacles.toml")
+_PER_MM = 1e3  # N/mm in N/m
+
+
+def shipped_obstacles(path: Path | None = None) -> dict[str, Obstacle]:
+    """Return the obstacles of a file by name; by default those that ship with cdtool.
+
+    Raises ConfigurationError naming file and key.
+
+    >>> round(shipped_obstacles()["en_12453_force_meter"].steepest)
+    500000
+    """
+    where = str(path) if path else "the shipped obstacles.toml"
+    root = Table(read_toml(path or _SHIPPED, "a file of obstacles"), where)
+    found = {}
+    for name in root.values:
+        table = root.table(name)
+        table.text("title", "")
+        table.flag("checked", False)
+        found[name] = read_obstacle(table, {})
+    if not found:
+        raise ConfigurationError(f"{where}: contains no obstacle", "write one table per obstacle")
+    return found
+
+
+def read_obstacle(table: Table, known: Mapping[str, Obstacle]) -> Obstacle:
+    """Return the obstacle that a table describes: `profile`, `stiffness_n_per_mm`, or a force curve.
+
+    A curve has `deflection_mm` and `force_n`, from 0. `damping_s_per_m` is that of T (1 + damping * speed),
+    `in_series_n_per_mm` what is in series, such as a load cell. A given damping replaces a profile's, a given series
+    stiffness adds to its. Raises ConfigurationError naming the key.
+    """
+    forms = [key for key in ("profile", "stiffness_n_per_mm", "force_n") if key in table]
+    if len(forms) != 1:
+        given = " and ".join(forms) or "nothing of it"
+        raise table.fault("stiffness_n_per_mm", f"{given} is given", "give one of profile, stiffness_n_per_mm, force_n")
+    damping = table.number("damping_s_per_m", 0.0, minimum=0.0)
+    series = table.number("in_series_n_per_mm", math.inf, above=0.0) * _PER_MM
+    if forms == ["profile"]:
+        name = table.text("profile")
+        if name not in known:
+            raise table.fault("profile", f"is '{name}'", nearest(name, known))
+        spring = known[name]
+        damping = damping if "damping_s_per_m" in table else spring.damping
+        compliance = 1.0 / series + 1.0 / spring.series_stiffness
+        obstacle = Obstacle(spring.deflection, spring.force, damping, 1.0 / compliance if compliance else math.inf)
+    elif forms == ["stiffness_n_per_mm"]:
+        obstacle = Obstacle.spring(table.number("stiffness_n_per_mm", above=0.0) * _PER_MM, damping, series)
+    else:
+        obstacle = _curve(table, damping, series)
+    table.finish()
+    return obstacle
+
+
+def _curve(table: Table, damping: float, series: float) -> Obstacle:
+    force = table.raw("force_n")
+    if not isinstance(force, list) or len(force) < 2:
+        raise table.fault("force_n", "is no list of two or more forces", "give force_n and deflection_mm, both from 0")
+    forces = table.numbers("force_n", len(force), minimum=0.0)
+    deflections = table.numbers("deflection_mm", len(force), minimum=0.0)
+    if not isinstance(table.raw("deflection_mm"), list):
+        raise table.fault("deflection_mm", "is no list", f"give {len(force)} deflections, one per force")
+    try:
+        return Obstacle(tuple(item / _PER_MM for item in deflections), forces, damping, series)
+    except ConfigurationError as fault:
+        raise table.fault("force_n", fault.message, fault.hint) from fault
+
+
+_HINT = 'give a joint and its position, as "elbow = 62deg" or "lift = 0.3m"'
+
+
+@dataclass(frozen=True)
+class JointMark(Mark):
+    """The first time at which the joint `joint` passes its position `value` in `unit` (m, rad), from either side."""
+
+    joint: str = ""
+
+    @classmethod
+    def of_machine(cls, text: str, machine: Machine) -> JointMark:
+        """Return the mark that a text such as `elbow = 62deg` describes; raises UsageError."""
+        name, _, place = (part.strip() for part in text.partition("="))
+        if name not in machine.joints:
+            raise UsageError(f"names the joint '{name[:40]}'", nearest(name, machine.joints))
+        number = place.rstrip("abcdefghijklmnopqrstuvwxyz° ")
+        unit = find_unit(place[len(number) :].strip())
+        expected = machine.load_units["position"]
+        try:
+            value = float(number) * unit.factor if unit else math.nan
+        except ValueError:
+            value = math.nan
+        if (
+            unit is None
+            or not math.isfinite(value)
+            or unit.si not in (("m", "rad") if expected == "SI" else (expected,))
+        ):
+            raise UsageError(f"is '{text[:40]}'", _HINT)
+        return cls(value, unit.si, name)
+
+    def __str__(self) -> str:
+        return f"{self.joint} = {digits(self.value)} {self.unit}"
+
+    def time_in(self, recording: Recording) -> float:
+        """Return the time [s] at which the joint first passes the position; infinite if it never does.
+
+        Raises RecordingError without positions.
+        """
+        if "position" not in recording:
+            raise RecordingError(f"{recording.name}: no position", "map position in [channels], or use a time")
+        position = recording["position"]
+        column = position.values[:, recording.joints.index(self.joint)]
+        known = np.isfinite(column)
+        beyond = column[known] >= self.value
+        passed = np.flatnonzero(beyond[1:] != beyond[:-1])
+        return float(position.time[known][passed[0] + 1]) if len(passed) else math.inf
+
 
 # The name of every group of injected contacts begins with this word.
 INJECTED = "injected"

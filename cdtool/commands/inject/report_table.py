@@ -6,7 +6,7 @@ import math
 
 from cdtool.base.plain_text import plain
 from cdtool.report.number_text import NOT_REACHED, NOTHING, number
-from cdtool.report.table import Cell, Column, Fields, Table, empty_cell, key_of, name_cell, tabulate
+from cdtool.report.table import Cell, Fields, Heading, Table, empty_cell, key_of, name_cell, tabulate
 from cdtool.report.tables.results import detector_cell
 from cdtool.results.agreement import Agreement, agreements
 from cdtool.results.evaluated import Evaluated
@@ -19,17 +19,17 @@ class InjectedSection:
     def table(evaluated: Evaluated) -> Table:
         """Return the latencies of injected contacts beside those of the real ones they are compared with."""
         fields: Fields[Agreement] = (
-            (Column("detector"), lambda item: detector_cell(evaluated.results, item.detector)),
-            (Column("injected"), lambda item: name_cell(item.injected_group)),
-            (Column("median [ms]", numeric=True), _injected),
-            (Column("n", numeric=True), lambda item: Cell(str(item.injected_count), key=item.injected_count)),
-            (Column("real"), lambda item: name_cell(item.real_group) if item.real_group else empty_cell()),
+            (Heading("detector"), lambda item: detector_cell(evaluated.results, item.detector)),
+            (Heading("injected"), lambda item: name_cell(item.injected_group)),
+            (Heading("median [ms]", numeric=True), _injected),
+            (Heading("n", numeric=True), lambda item: Cell(str(item.injected_count), key=item.injected_count)),
+            (Heading("real"), lambda item: name_cell(item.real_group) if item.real_group else empty_cell()),
             (
-                Column("real median [ms]", numeric=True),
+                Heading("real median [ms]", numeric=True),
                 lambda item: Cell(_milliseconds(item.real_ms), key=key_of(item.real_ms)),
             ),
-            (Column("real n", numeric=True), lambda item: Cell(str(item.real_count), key=item.real_count)),
-            (Column("assumed"), lambda item: Cell("; ".join(item.assumed))),
+            (Heading("real n", numeric=True), lambda item: Cell(str(item.real_count), key=item.real_count)),
+            (Heading("assumed"), lambda item: Cell("; ".join(item.assumed))),
         )
         return tabulate("injected", "Injected contacts", fields, agreements(evaluated))
 

@@ -1,10 +1,14 @@
-"""The groups of injected contacts of a benchmark: its section [inject] carried out, or found as it was carried out."""
+"""The groups of injected contacts of a benchmark: its section [inject] carried out, or found as it was carried out.
+
+Which detectors an injected contact can test: those whose channels the model gives what they need.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +19,6 @@ from cdtool.base.tables import Table
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
 from cdtool.commands.inject.inject_section import INJECTED, InjectSection, NamedObstacle, read_inject_section
 from cdtool.commands.inject.injected_logs import InjectedCase, InjectedLogs, model_of, read_injected, write_injected
-from cdtool.commands.inject.refusal import refusal
 from cdtool.commands.judging.named_logs import LogsOf
 from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, ImpactGroup
@@ -24,6 +27,34 @@ from cdtool.execution.store.digest import code_version, digest_of
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.machines.axis_model.parameters import AxisModel
+
+
+class Refusal(Enum):
+    """Why the latency of a detector from injected contacts would be wrong, with what to add."""
+
+    CONTROLLER = "its signal is the reaction of the controller: identify [model.controller]"
+    ACCELEROMETER = "the accelerometer's bandwidth is not known: give [model.sensors] accelerometer_hz"
+    DRIVE = (
+        "the stiffness of the drive is not known: identify it from starts at rest, or state [model.drive] rigid = true"
+    )
+
+
+def refusal(needs: Sequence[str], model: AxisModel, reaction: ControllerReaction) -> Refusal | None:
+    """Return why a detector with these `needs` (channels) is not tested; None if it is.
+
+    Torque alone shows a contact only when the controller reacts. A rigid drive in the place of an elastic one reports
+    a contact to the motor far too early (45 ms on the simulated gate), and only the acceleration is not affected.
+    """
+    if "acceleration" in needs and model.sensors.accelerometer_hz == 0.0:
+        return Refusal.ACCELEROMETER
+    senses_motion = any(channel in needs for channel in ("speed", "position", "acceleration"))
+    if not senses_motion and reaction is not ControllerReaction.KNOWN:
+        return Refusal.CONTROLLER
+    if "acceleration" not in needs and model.drive.is_rigid and not model.drive.stated_rigid:
+        return Refusal.DRIVE
+    return None
+
 
 _DIGEST = "digest.txt"
 

@@ -1,8 +1,12 @@
-"""The content of a log: channels, units, rates, gaps and findings, and why a clock is missing or doubtful."""
+"""The content of a log: channels, units, rates, gaps and findings, and why a clock is missing or doubtful.
+
+Find placeholders of `cdtool init` that are still in a machine file.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,15 +15,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.findings import Finding, worst_first
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.log_findings import before_contact, log_findings
-from cdtool.commands.judging.placeholders import placeholder_findings
 from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.commands.judging.true_contacts import any_contacts
-from cdtool.formats.channels.channel_map import AXES
+from cdtool.formats.channels.channel_map import AXES, ChannelSource
 from cdtool.formats.channels.clock_guess import ReadColumn, TableClock, is_clock_name
 from cdtool.formats.channels.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.formats.columns import Column
@@ -29,11 +33,83 @@ from cdtool.machines.plausibility import check_channels
 from cdtool.recordings.clock.stamps import COARSE_SHARE, missing_findings
 from cdtool.recordings.distribution import Distribution
 from cdtool.recordings.recording import Recording, Series
+from cdtool.recordings.units import RAW_UNITS, find_unit
 from cdtool.truth.force_vector import with_scalar_force
 
 if TYPE_CHECKING:
     from cdtool.formats.channels.log_statistics import LogStatistics
     from cdtool.truth.synchronisation.latency import ChannelLatency
+
+
+_KEY = re.compile(r"^\s*([A-Za-z_]\w*)\s*=")
+_MARK = re.compile(r"#.*\bCHECK\b")
+
+
+def placeholder_findings(recording: Recording, machine_file: MachineFile) -> list[Finding]:
+    """Return a warning for each placeholder that is still in a machine file, and for the marks of `cdtool init`.
+
+    Parameters
+    ----------
+    recording : Recording
+        A log on the load side: the load's speed shows what a placeholder does.
+    machine_file : MachineFile
+        The machine file with which it was read.
+
+    Returns
+    -------
+    list of Finding
+        Empty for a machine file without placeholders. A rotary axis may have the ratio 1.
+    """
+    machine = machine_file.machine
+    found = []
+    of_motor = getattr(machine, "ratio_unit", "") == "m/rad" and getattr(machine, "coordinates", "") == "motor"
+    if of_motor and any(ratio == 1.0 for ratio in getattr(machine, "transmission_ratio", ())):
+        found.append(Finding("placeholder_ratio", "", {"speed": _top_speed(recording)}))
+    maps = machine_file.topics if machine_file.topics.sources else machine_file.columns
+    found += [
+        Finding("placeholder_scale", channel, {"raw": raw, "unit": unit, "per": per})
+        for channel, (raw, unit, per) in _scales(maps.sources)
+    ]
+    key = getattr(machine, "inertia_key", "")
+    load = getattr(machine, "load_inertia", (1.0,))
+    if key and not any(load) and not any(getattr(machine, "motor_inertia", (1.0,))):
+        found.append(Finding("placeholder_inertia", "", {"key": key}))
+    count, keys = _marked_keys(machine_file)
+    return [*found, Finding("unchecked_lines", "", {"count": count, "keys": keys})] if count else found
+
+
+def _top_speed(recording: Recording) -> float:
+    speed = np.abs(recording["speed"].values) if "speed" in recording else np.empty(0)
+    known = speed[np.isfinite(speed)]
+    return float(known.max()) if len(known) else math.nan
+
+
+def _scales(sources: tuple[ChannelSource, ...]) -> Iterator[tuple[str, tuple[str, str, str]]]:
+    """Yield the channels in a raw unit with the scale 1, and the units of both and of the scale."""
+    for source in sources:
+        known = find_unit(source.stated) if source.stated else None
+        if known is None or known.si not in RAW_UNITS or source.duty is not None or source.unit in RAW_UNITS:
+            continue
+        if all(factor == known.factor for factor in source.factor):
+            yield source.channel, (source.stated, source.unit, known.si)
+
+
+def _marked_keys(machine_file: MachineFile) -> tuple[int, tuple[str, ...]]:
+    """Return how many keys have a comment with the mark CHECK, after the key or before it, and which."""
+    try:
+        lines = read_text(machine_file.path, ConfigurationError).splitlines()
+    except ConfigurationError:  # a machine file that was read and is gone since, as that of a trial draft
+        return 0, ()
+    keys, marked = [], False
+    for line in lines:
+        if line.lstrip().startswith("#"):
+            marked = marked or bool(_MARK.search(line))
+            continue
+        key = _KEY.match(line)
+        if key and (marked or _MARK.search(line)):
+            keys.append(key[1])
+        marked = False
+    return len(keys), tuple(dict.fromkeys(keys))
 
 
 @dataclass(frozen=True)
@@ -150,6 +226,7 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
     from cdtool.commands.judging.synchronisation import latency_findings
+    from cdtool.formats.channels.parts import join_details, join_topics
     from cdtool.formats.channels.reading import read_as_logged
     from cdtool.truth.synchronisation.audit import audit
 
@@ -172,8 +249,8 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     latencies = audit(recording, machine_file.machine, contacts)
     findings += latency_findings(latencies)
     found = worst_first(findings)
-    details, origin = logged.details, recording.origin
-    return Info(str(log), logged.format, details, tuple(channels), found, logged.dialect, latencies, origin)
+    details, last = in_words(join_details(logged.headers), join_topics(logged.headers)), logged.headers[-1]
+    return Info(str(log), last.format, details, tuple(channels), found, last.dialect, latencies, recording.origin)
 
 
 def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Finding]) -> list[Finding]:

@@ -122,6 +122,7 @@ def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
             detector=detection.detector,
             joint=alarm.joint,
             time_s=alarm.time,
+            operation=max(judged.operation.number, 1),
             **_crossing(detection, alarm),
         )
         for detection, matching in zip(judged.detections, judged.matchings, strict=True)

@@ -75,19 +75,24 @@ class UncutStrokes:
 
 
 @dataclass(frozen=True)
-class DetectedLog:
-    """A log with its contacts, divided into operations by `cut_by`, and the detections of each operation."""
+class CutLog:
+    """A log or run, or the part of it that is used: divided into operations by `cut_by`, with its contacts.
+
+    `unwanted` are contacts of a log that should have none.
+    """
 
     recording: Recording
     operations: Sequence[Operation]
     cut_by: str
-    contacts: Sequence[Contact]
-    detections: Sequence[Sequence[Detection]]
+    contacts: Sequence[Contact] = ()
+    unwanted: Sequence[Contact] = ()
 
 
-def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -> MatchedLog:
-    """Match the detections of each operation with the log's contacts; `rearm` [s] is a setting of the activation."""
-    recording, contacts, found = log.recording, log.contacts, log.detections
+def match_log(
+    log: CutLog, found: Sequence[Sequence[Detection]], group: str, rules: ScoringRules, rearm: float
+) -> MatchedLog:
+    """Match the detections `found` in each operation with the contacts; `rearm` [s] is a setting of the activation."""
+    recording, contacts = log.recording, log.contacts
     inside = contacts_by_operation(log.operations, contacts)
     curves, doubts = force_curves(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
@@ -119,7 +124,7 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
         curves,
         tuple(_not_scored(recording, contacts, inside, log.cut_by)),
         (*warned, *(RecordingFinding.of(recording.name, item) for item in findings)),
-        _uncut_strokes(log),
+        _uncut_strokes(log, found),
     )
 
 
@@ -218,10 +223,10 @@ def force_curves(
     return found, missing
 
 
-def _uncut_strokes(log: DetectedLog) -> UncutStrokes:
+def _uncut_strokes(log: CutLog, found: Sequence[Sequence[Detection]]) -> UncutStrokes:
     """Return by detector the strokes of an uncut log that are not assessable although the first one is."""
     recording, contacts = log.recording, log.contacts
-    detections = [item for found in log.detections for item in found if not np.all(item.statistic.valid)]
+    detections = [item for of_operation in found for item in of_operation if not np.all(item.statistic.valid)]
     if log.cut_by != "whole" or not detections:
         return UncutStrokes(recording.name)
     strokes = _strokes(recording)

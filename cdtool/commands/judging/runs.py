@@ -86,8 +86,47 @@ def _runs_matching(pattern: str, base: Path) -> list[Path]:
     return []
 
 
-def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
-    """Read a log through a machine file, as `cdtool.read` describes; raises CdtoolError."""
+def read(
+    log: str | Path, machine: str | Path | MachineFile | None = None, ranges: PlausibleRanges | None = None
+) -> Recording:
+    """Read a log through a machine file.
+
+    Parameters
+    ----------
+    log : str or Path
+        The log, in any format of `cdtool list formats`, or a folder with its parts.
+    machine : str, Path or MachineFile
+        The machine file, or what `cdtool.read_machine_file` returned. It is needed: it states which column is which
+        channel, and in which unit.
+    ranges : PlausibleRanges, optional
+        Plausible ranges of the channels, in SI units: values outside are masked and reported as a loss.
+
+    Returns
+    -------
+    Recording
+        Every mapped channel on the load side in SI units, at its own times; a missing sample is NaN. A force with
+        several columns has one column per axis.
+
+    Raises
+    ------
+    UsageError
+        No machine file is given.
+    CdtoolError
+        The log or the machine file cannot be read, or no channel is mapped; the message names the file.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> recording = cdtool.read("sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml")
+    >>> recording["speed"].values.shape, recording["speed"].unit
+    ((7200, 1), 'm/s')
+    """
+    if machine is None:
+        name = location(log).name
+        raise UsageError(
+            f"cdtool.read('{name}') needs a machine file: it states which column is which channel, and the units",
+            f"cdtool.read('{name}', 'machine.toml'); cdtool.init('{name}', 'machine.toml') drafts one",
+        )
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     return _with_channels(location(log), read_recording(location(log), machine_file, ranges))
 
@@ -104,7 +143,7 @@ def read_named(
     A force with several axes is a magnitude, their rest levels removed by the `onset` rule. Channels that
     contradict the mechanics of the machine have no values: in what `ranges` were learned from, else in this log.
     """
-    recording = replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
+    recording = replace(read(path, machine_file, ranges), name=shown_path(path, base))
     recording = with_scalar_force(recording, onset or OnsetRule())
     return recording if ranges else without_contradicted(recording, machine_file.machine, onset)
 
@@ -238,9 +277,11 @@ def load_runs(
     without: list[tuple[str, Finding]] = []
 
     cut = RunCut.of(reading.operations)
-    read = _AsLogged(machine_file, cut)
+    as_logged = _AsLogged(machine_file, cut)
     with reading.workers.ready(to_be_seen(paths)):
-        logs = list(in_order(read, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_lost_run))
+        logs = list(
+            in_order(as_logged, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_lost_run)
+        )
     logged: list[tuple[Path, Path, LoggedRecording | CdtoolError]] = []  # as listed, the log or its run
     for path, log in zip(paths, logs, strict=True):
         if isinstance(log, _NotRead):

@@ -34,7 +34,7 @@ from cdtool.commands.console.options import (
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.learning.learning import Learned
+    from cdtool.commands.learning.learning import LearnedSignature
 
 
 def learn_signature(
@@ -170,7 +170,7 @@ def learn_signature(
     leave(learned.skipped, learned.findings)
 
 
-def _show(learned: Learned, output: Path, *, as_json: bool, quiet: bool) -> None:
+def _show(learned: LearnedSignature, output: Path, *, as_json: bool, quiet: bool) -> None:
     signature = learned.signature
     if as_json:
         print_json(

@@ -27,7 +27,7 @@ _AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5.0
 
 
 @dataclass(frozen=True)
-class _Run:
+class _ClassedRun:
     """An impact-free operation and its class by the measured speed."""
 
     operation: Operation
@@ -39,10 +39,10 @@ def by_class(operations: Sequence[Operation]) -> tuple[list[list[Operation]], li
 
     A class: one leading joint and direction, nominal speeds close together and at most 10 % from their median.
     """
-    kinds: dict[tuple[int, int], list[_Run]] = {}
+    kinds: dict[tuple[int, int], list[_ClassedRun]] = {}
     for operation in operations:
         motion = measured_class(operation.recording)
-        kinds.setdefault((motion.joint, motion.direction), []).append(_Run(operation, motion))
+        kinds.setdefault((motion.joint, motion.direction), []).append(_ClassedRun(operation, motion))
     classes: list[list[Operation]] = []
     odd: list[Skipped] = []
     for members in (group for kind in kinds.values() for group in _by_speed(kind)):
@@ -56,14 +56,14 @@ def by_class(operations: Sequence[Operation]) -> tuple[list[list[Operation]], li
     return sorted(classes, key=lambda group: place[id(group[0])]), odd
 
 
-def _by_speed(operations: Sequence[_Run]) -> list[list[_Run]]:
+def _by_speed(operations: Sequence[_ClassedRun]) -> list[list[_ClassedRun]]:
     ordered = sorted(operations, key=lambda run: run.motion.nominal_speed)
-    groups: list[list[_Run]] = [[ordered[0]]]
+    groups: list[list[_ClassedRun]] = [[ordered[0]]]
     for before, run in pairwise(ordered):
         if run.motion.nominal_speed > (1.0 + _STEP) * before.motion.nominal_speed:
             groups.append([])
         groups[-1].append(run)
-    made: list[list[_Run]] = []
+    made: list[list[_ClassedRun]] = []
     for group in groups:
         median = float(np.median([run.motion.nominal_speed for run in group]))
         common = replace(group[0].motion, nominal_speed=median)
@@ -73,7 +73,7 @@ def _by_speed(operations: Sequence[_Run]) -> list[list[_Run]]:
     return [group for group in made if group]
 
 
-def _alike(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
+def _alike(runs: list[_ClassedRun]) -> tuple[list[_ClassedRun], list[Skipped]]:
     """Return the runs of a class with the common speed along the stroke, and the others with the reason."""
     if len(runs) < _ENOUGH or runs[0].motion.direction == 0:
         return runs, []
@@ -110,7 +110,7 @@ def _alike(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
     return alike, odd
 
 
-def _near_their_median(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
+def _near_their_median(runs: list[_ClassedRun]) -> tuple[list[_ClassedRun], list[Skipped]]:
     """Return the runs with a nominal speed near the median of those that remain, and the others with the reason."""
     left_out: list[Skipped] = []
     while True:
@@ -127,7 +127,7 @@ def _near_their_median(runs: list[_Run]) -> tuple[list[_Run], list[Skipped]]:
         runs = [run for run in runs if run is not worst]
 
 
-def _course(run: _Run, nominal: float) -> tuple[FloatArray, FloatArray]:
+def _course(run: _ClassedRun, nominal: float) -> tuple[FloatArray, FloatArray]:
     """Return the averaged forward speed over increasing travel."""
     motion, recording = run.motion, run.operation.recording
     series = recording["speed"]

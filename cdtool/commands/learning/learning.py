@@ -34,7 +34,7 @@ from cdtool.truth.onset import OnsetRule
 
 
 @dataclass(frozen=True)
-class Learned:
+class LearnedSignature:
     """The content of a signature file, the number of runs per class (None: all classes), and what was left out."""
 
     signature: SignatureFile
@@ -54,9 +54,9 @@ class Learned:
         write_signature(path, self.signature)
 
 
-def signature_of(given: str | Path | Learned | SignatureFile) -> SignatureFile:
+def signature_of(given: str | Path | LearnedSignature | SignatureFile) -> SignatureFile:
     """Return the content of a signature file, read or just learned; raises SignatureError."""
-    if isinstance(given, Learned):
+    if isinstance(given, LearnedSignature):
         return given.signature
     return given if isinstance(given, SignatureFile) else read_signature(given)
 
@@ -77,7 +77,7 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
     jobs: int = 1,
     workers: Workers | None = None,
     progress: Progress | None = None,
-) -> Learned:
+) -> LearnedSignature:
     """Learn the threshold of one detector from impact-free logs.
 
     Parameters
@@ -115,7 +115,7 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
 
     Returns
     -------
-    Learned
+    LearnedSignature
         The content of a signature file, with one threshold per class of motion if the rule distinguishes classes, and
         the runs left out. `save` writes the file; `cdtool.detect` also takes it as it is.
 
@@ -171,7 +171,7 @@ class Setting:
 
 def learned_from_runs(
     runs: Runs, machine_file: MachineFile, instance: Any, rule: Threshold, setting: Setting
-) -> Learned:
+) -> LearnedSignature:
     """Learn the threshold of a detector from runs that have been read; raises as `learn_signature`."""
     joints, operations, budget = setting.joints, setting.operations, setting.budget
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
@@ -204,7 +204,7 @@ def learned_from_runs(
     )
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
     findings = (*runs.findings, *fitted.findings(rule, instance.name))
-    return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), findings)
+    return LearnedSignature(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), findings)
 
 
 def _refuse_by_hand(rule: Threshold, budget: Budget | None) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.protocol.assessment.assessment import check_point, judge
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind
 from cdtool.commands.protocol.measuring import Assignment, assign, profiles_of
 from cdtool.commands.protocol.protocol_file import ProtocolFile, read_protocol_file
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
@@ -22,7 +22,7 @@ class CheckedProtocol:
     """
 
     file: ProtocolFile
-    verdict: Verdict
+    verdict: ProtocolVerdict
     recordings: dict[str, int]
     has_detectors: bool = True
 

@@ -122,14 +122,14 @@ def write(
 
 
 def _show_checked(checked: CheckedProtocol) -> None:
-    from cdtool.commands.protocol.assessment.reasons import Verdict
+    from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict
     from cdtool.commands.protocol.document.words import words_of
 
     file, words = checked.file, words_of("en")
     for name, count in checked.recordings.items():
         typer.echo(f"{plain(name)}: {counted(count, 'recording')}")
     for due, title in (("before_test", "before the test"), ("test_day", "on the day of the test")):
-        part = Verdict(tuple(item for item in checked.verdict.reasons if item.due == due))
+        part = ProtocolVerdict(tuple(item for item in checked.verdict.reasons if item.due == due))
         sentences = [*words.reasons(part, "fail"), *words.reasons(part, "incomplete")]
         if sentences:
             typer.echo(f"incomplete, {title}:")

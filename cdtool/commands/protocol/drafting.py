@@ -17,6 +17,7 @@ from cdtool.base.errors import UsageError
 from cdtool.base.files.writing import write_text
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import relative_name
+from cdtool.commands.judging.matched_log import CutLog
 from cdtool.commands.protocol.assessment.plan import (
     FILL_IN,
     FORCE,
@@ -26,7 +27,7 @@ from cdtool.commands.protocol.assessment.plan import (
     TestParticulars,
 )
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.commands.scoring.scoring import LogToScore, logs_to_score
+from cdtool.commands.scoring.scoring import logs_to_score
 from cdtool.results.results import Skipped
 from cdtool.truth.force.limits import ForceProfile, read_force_limits
 from cdtool.truth.missing_samples import cell_samples
@@ -142,14 +143,14 @@ def _points(setup: BenchmarkFile, folder: Path) -> list[_Point]:
     ]
 
 
-def _read(setup: BenchmarkFile, logs: Sequence[tuple[str, Path]]) -> Iterator[LogToScore]:
+def _read(setup: BenchmarkFile, logs: Sequence[tuple[str, Path]]) -> Iterator[CutLog]:
     for group, log in logs:
         for read in logs_to_score(setup, group, log):
             if not isinstance(read, Skipped):
                 yield read
 
 
-def _instrument(read: Mapping[str, Sequence[LogToScore]]) -> dict[str, tuple[str, str]]:
+def _instrument(read: Mapping[str, Sequence[CutLog]]) -> dict[str, tuple[str, str]]:
     """Return what the recordings show of the instrument that measured the force."""
     recordings = [item.recording for items in read.values() for item in items if "force" in item.recording]
     periods = [cell_samples(item["force"]).clock.period for item in recordings]
@@ -160,7 +161,7 @@ def _instrument(read: Mapping[str, Sequence[LogToScore]]) -> dict[str, tuple[str
     return known
 
 
-def _point(point: _Point, read: Sequence[LogToScore]) -> dict[str, tuple[str, str]]:
+def _point(point: _Point, read: Sequence[CutLog]) -> dict[str, tuple[str, str]]:
     contacts = sum(len(item.contacts) for item in read)
     least = point.profile.average_of if point.profile else 1
     known = {
@@ -179,7 +180,7 @@ def _point(point: _Point, read: Sequence[LogToScore]) -> dict[str, tuple[str, st
     return known
 
 
-def _speeds(read: LogToScore) -> Iterator[float]:
+def _speeds(read: CutLog) -> Iterator[float]:
     """Yield the speed before each contact [m/s], of a machine that moves in m/s."""
     if "speed" not in read.recording or read.recording["speed"].unit != "m/s":
         return

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.base.errors import ConfigurationError, nearest
-from cdtool.commands.judging.matched_log import force_curves
+from cdtool.commands.judging.matched_log import CutLog, force_curves
 from cdtool.commands.judging.runs import absent_truth, find_logs, resolve_all
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.commands.protocol.assessment.plan import MeasuringPoint
@@ -22,7 +22,7 @@ from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind
 from cdtool.commands.protocol.assessment.speed import speed_before
 from cdtool.commands.protocol.protocol_file import ProtocolFile
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
-from cdtool.commands.scoring.scoring import LogToScore, logs_to_score
+from cdtool.commands.scoring.scoring import logs_to_score
 from cdtool.recordings.recording import RIG_UNITS, Contact, Recording
 from cdtool.results.results import Skipped
 from cdtool.truth.force.curve import ForceTimeCurve
@@ -186,7 +186,7 @@ def measured_point(
     return assess_point(item.point, profile, repetitions, unmeasured, of_force, of_pressure, contacts)
 
 
-def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[list[Repetition], list[Unmeasured]]:
+def _measured(read: CutLog, profile: ForceProfile, mass: float) -> tuple[list[Repetition], list[Unmeasured]]:
     """Return the contacts of a recording, and those that do not count."""
     recording: Recording = read.recording
     curves, problems = force_curves(recording, read.contacts, mass)

@@ -20,9 +20,11 @@ from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import shown_path, to_be_seen
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
-from cdtool.commands.scoring.gathering import Gathering
+from cdtool.commands.scoring.gathering import recordings_in, results_before, results_of
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
+from cdtool.commands.scoring.pieces import PieceScoring
+from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import Detections, ScoredLog, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.execution.workers import Progress, Workers
@@ -31,7 +33,7 @@ from cdtool.formats.labels.trigger_file import Triggered, TriggerFile, read_trig
 from cdtool.recordings.operations import Operation
 from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import ALL, unchecked
-from cdtool.results.results import RecordingFinding, RecordingResult, Skipped
+from cdtool.results.results import RecordingFinding, RecordingResult, Results, Skipped
 from cdtool.thresholds.normal_choice import NormalMotions
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
@@ -111,28 +113,29 @@ def _run(
     runs = setup.has_runs
     known = {shown_path(split_run(path)[0] if runs else path, base) for _, path in work}
     said, strangers = given.assigned(known, runs)
-    gathered = Gathering(setup, names, {}, {})
     if strangers and not any(said.values()):
         raise ConfigurationError(
             f"{given.path}: no row is about a scored recording: {first_of(strangers)}",
             f"give paths relative to the benchmark file, such as {min(known)}",
         )
+    findings: list[RecordingFinding] = []
     if strangers:
         note = Finding("rows_not_scored", "", {"names": first_of(strangers), "scored": min(known)})
-        gathered.findings.append(RecordingFinding.of(str(given.path), note))
-    gathered.findings += measured
+        findings.append(RecordingFinding.of(str(given.path), note))
+    findings += measured
     if not runs:
-        gathered.findings += _unlisted(given.path, said, known, listed_only)
+        findings += _unlisted(given.path, said, known, listed_only)
         if listed_only:
             work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
+    findings += unchecked(setup.limits, names, str(setup.path))
+    before = results_before(setup, _provenance(setup, given, clock), names, findings=findings)
     scoring = _TriggerScoring(setup, given.path, said, clock, listed_only)
-    gathered.score(lambda: scoring, work, workers, progress)
-    if runs:
-        gathered.skipped += _without_run(said, known, gathered.scored)
-    gathered.findings += unchecked(setup.limits, names, str(setup.path))
-    results = gathered.results(_provenance(setup, given, clock))
+    scored = ScoredLogs(setup, PieceScoring(setup, scoring), work, workers, progress)
+    results = results_of(setup, before, scored, {}, {})
+    without = _without_run(said, known, results) if runs else []
+    results = replace(results, skipped=(*results.skipped, *without), findings=(*results.findings, *scored.left_out))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
-    return BenchmarkResult(evaluate(results, rules), gathered.traces, (given.path, *setup.inputs))
+    return BenchmarkResult(evaluate(results, rules), scored.traces, (given.path, *setup.inputs))
 
 
 @dataclass(frozen=True)
@@ -179,11 +182,9 @@ class _TriggerScoring:
         return [_detection(operation, name, self.said[name].get(log, Triggered()), shift) for name in asked]
 
 
-def _without_run(
-    said: Mapping[str, Mapping[str, Triggered]], logs: Collection[str], runs: Collection[str]
-) -> list[Skipped]:
+def _without_run(said: Mapping[str, Mapping[str, Triggered]], logs: Collection[str], results: Results) -> list[Skipped]:
     """Return the names that have rows, but are not those of runs that were scored."""
-    names = sorted({name for by_name in said.values() for name in by_name} - set(runs))
+    names = sorted({name for by_name in said.values() for name in by_name} - recordings_in(results))
     return [Skipped(name, _CUT_LOG.format(name=name) if name in logs else _NO_RUN) for name in names]
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -25,17 +24,20 @@ from cdtool.commands.scoring.benchmark_file import (
     with_detectors,
     with_only,
 )
-from cdtool.commands.scoring.benchmark_result import BenchmarkResult
-from cdtool.commands.scoring.gathering import Gathering
+from cdtool.commands.scoring.benchmark_result import BenchmarkResult, StoreReport
+from cdtool.commands.scoring.gathering import recordings_in, results_before, results_of
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
+from cdtool.commands.scoring.pieces import PieceScoring
+from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import ScoredLog, detect_with, score_runs
-from cdtool.commands.scoring.store.stored_learned import StoreOfRun
+from cdtool.commands.scoring.store.determinants import Determinants
+from cdtool.commands.scoring.store.stored_learned import learned_with_store
+from cdtool.commands.scoring.store.stored_scoring import StoredScoring
 from cdtool.detectors.base import Detector
-from cdtool.execution.store.digest import code_version, digest_of
-from cdtool.execution.store.use import StoreUse
+from cdtool.execution.store.store import Store
 from cdtool.execution.workers import Progress, Workers
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.plausible import LearnedRanges
@@ -43,7 +45,7 @@ from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.curves.sweep import MULTIPLES
 from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import LimitRule, unchecked
-from cdtool.results.results import Skipped
+from cdtool.results.results import Results, Skipped
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.normal_choice import NormalMotions
 
@@ -55,7 +57,7 @@ def benchmark(
     false_alarm_budget: str | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
-    store: StoreUse | None = None,
+    store: Store | None = None,
     progress: Progress | None = None,
 ) -> BenchmarkResult:
     """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
@@ -74,7 +76,7 @@ def benchmark(
     workers : Workers, optional
         In place of `jobs`: also the longest time for a log, and how often one that ended its worker is tried again;
         or a Dask cluster.
-    store : StoreUse, optional
+    store : Store, optional
         Where outcomes are kept: a log is computed only if something that determines its outcome has changed.
     progress : callable, optional
         Called after each log with the number done and the total.
@@ -106,13 +108,11 @@ def benchmark(
     workers = workers or Workers(jobs)
     work = BenchmarkWork.of(file, detectors, false_alarm_budget)
     work = replace(work, setup=work.setup.with_made(workers, progress))
-    with ExitStack() as stack:
-        folder = stack.enter_context(store.opened()) if store else None
-        logs = [path for item in work.setup.impacts.values() for path in item.logs]
-        stack.enter_context(workers.ready(to_be_seen([*work.setup.learn, *logs])))
-        if store is None or folder is None:
-            return _run(work, workers, None, progress)
-        return _run(work, workers, StoreOfRun(folder, store, workers), progress)
+    if store is not None:
+        store.create()
+    logs = [path for item in work.setup.impacts.values() for path in item.logs]
+    with workers.ready([*to_be_seen([*work.setup.learn, *logs]), *([store.mark] if store else [])]):
+        return _run(work, workers, store, progress)
 
 
 @dataclass(frozen=True)
@@ -136,66 +136,42 @@ class BenchmarkWork:
         return cls(setup, limits, list(detectors) == ["all"])
 
 
-def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> BenchmarkResult:
+def _run(work: BenchmarkWork, workers: Workers, store: Store | None, progress: Progress | None) -> BenchmarkResult:
     begin = perf_counter()
     setup, measured = with_synchronisation(work.setup, workers)
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
-    learned = store.learned(teaching) if store else teaching.learned
+    learned, runs = learned_with_store(store, teaching) if store else (teaching.learned, {})
     setup = with_only(setup, learned.about.detectors)
     seconds = perf_counter() - begin
     factors = sweep_factors(setup, learned.thresholds)
-    gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
-    gathered.skipped += (*setup.not_made, *learned.about.skipped)
-    gathered.findings += [*measured, *learned.about.findings]
-    gathered.findings += unchecked(work.limits, setup.detectors, str(setup.path))
-    gathered.skipped += [
+    used = [setup.machine_file.detector(name) for name in setup.detectors]
+    refused = [
         Skipped(name, f"{group}: not tested by injected contacts: {reason}")
         for group, item in setup.impacts.items()
         for name, reason in item.refused.items()
     ]
-    logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-    used = [setup.machine_file.detector(name) for name in setup.detectors]
-    provenance = _provenance(setup, used, learned)
-    stored = store.outcomes(setup, learned, factors) if store else None
-    plan = stored.plan(logs, workers) if stored else ()
-    beside_logs = _digest_beside_logs(gathered, learned, provenance, stored.determinants.normals) if stored else ""
-    found = stored.finished(beside_logs, provenance) if stored else None
-    if found is None:
-        gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
-        gathered.skipped += _labels_without_run(setup, gathered.scored)
-        provenance["units"] |= gathered.units
-        evaluated = evaluate(gathered.results(provenance, learned.about.calibration), setup.limits)
-        traces = gathered.traces
-    else:
-        evaluated, traces = found[0].evaluated, found[1]
-        if progress:
-            progress(len(logs), len(logs))
-    report = stored.finish() if stored else None
-    if stored and found is None:
-        stored.add_finished(beside_logs, evaluated, gathered.trace_keys)
-    times = {"reading": learned.seconds + gathered.reading, "detecting": seconds - learned.seconds + gathered.detecting}
-    return BenchmarkResult(evaluated, traces, setup.inputs, times, report)
-
-
-def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mapping[str, Any], normals: str) -> str:
-    """Return the digest of what determines the results beside the outcome of each log, before the first is scored.
-
-    `normals` is the digest of the normal motion.
-    """
-    setup = gathered.setup
-    return digest_of(
-        code_version(),
-        provenance,
-        str(setup.path),
-        setup.limits,
-        setup.labels,
-        {name: group.force for name, group in setup.impacts.items()},
-        list(gathered.skipped),
-        list(gathered.findings),
-        learned.about.calibration,
-        learned.about.sources,
-        normals,
+    of_limits = unchecked(work.limits, setup.detectors, str(setup.path))
+    before = results_before(
+        setup,
+        _provenance(setup, used, learned),
+        setup.detectors,
+        (*setup.not_made, *learned.about.skipped, *refused),
+        (*measured, *learned.about.findings, *of_limits),
     )
+    logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
+    scoring = scoring_of(setup, learned, teaching, factors)
+    with_store = StoredScoring(scoring, store, Determinants(setup, learned, runs, factors)) if store else None
+    scored = ScoredLogs(setup, with_store or scoring, logs, workers, progress)
+    results = results_of(setup, before, scored, factors, learned.about.sources)
+    results = replace(
+        results,
+        calibration=tuple(learned.about.calibration),
+        skipped=(*results.skipped, *_labels_without_run(setup, results)),
+        findings=(*results.findings, *scored.left_out),
+    )
+    report = StoreReport(len(logs) - scored.stored, scored.stored) if store else None
+    times = {"reading": learned.seconds + scored.reading, "detecting": seconds - learned.seconds + scored.detecting}
+    return BenchmarkResult(evaluate(results, setup.limits), scored.traces, setup.inputs, times, report)
 
 
 @dataclass(frozen=True)
@@ -234,11 +210,11 @@ class _LogScoring:
         return NormalsWithout(self.runs, scored.recording.name, self.setup.rule)
 
 
-def _scoring(
+def scoring_of(
     setup: BenchmarkFile, learned: Learned, teaching: Teaching, factors: Mapping[str, FloatArray]
-) -> _LogScoring:
+) -> PieceScoring:
     """Return how a log is scored; the runs themselves are needed only for a log that is learned from, too."""
-    return _LogScoring(
+    score = _LogScoring(
         setup,
         tuple(setup.machine_file.detector(name) for name in setup.detectors),
         ThresholdsByLog(setup, learned.thresholds, teaching.pairs if setup.both else {}),
@@ -248,13 +224,14 @@ def _scoring(
         learned.normals,
         teaching.operations if setup.both else (),
     )
+    return PieceScoring(setup, score)
 
 
-def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[Skipped]:
+def _labels_without_run(setup: BenchmarkFile, results: Results) -> list[Skipped]:
     """Return the names in the label file that no run has; rows about whole logs were checked before reading."""
     if setup.labels is None or not setup.has_runs:
         return []
-    used = {setup.labels.name_of(name) for name in scored}
+    used = {setup.labels.name_of(name) for name in recordings_in(results)}
     return [
         Skipped(name, f"no such run is scored: {', '.join(lines)} left out")
         for name, lines in setup.labels.lines.items()

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from cdtool.base.errors import UsageError, nearest
 from cdtool.base.plain_text import counted, first_of, shorten
 from cdtool.base.remote.remote_path import location
-from cdtool.commands.scoring.store.stored_outcomes import StoreReport
 from cdtool.report.plots.figures import described
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.frames import notebook_table, results_as_frame
@@ -27,6 +26,14 @@ if TYPE_CHECKING:
 _LONGEST_HEADLINE = 100
 _COUNTS = ("contacts", "detected", "missed", "not_assessable", "false_alarms", "operations", "hours")
 _SHOWN = ["group", "detector", "detected", "missed", "not_assessable", "median_ms", "mean_ms", "false_alarms"]
+
+
+@dataclass(frozen=True)
+class StoreReport:
+    """How many recordings were computed, at least in part, and how many were all in the store."""
+
+    computed: int = 0
+    reused: int = 0
 
 
 @dataclass(frozen=True, repr=False)
@@ -131,7 +138,7 @@ class BenchmarkResult:
         UsageError
             There are no rows of that name.
         """
-        from cdtool.results.files.results_folder import tables
+        from cdtool.results.results import tables
 
         if table not in tables():
             raise UsageError(f"no table '{table}' in the results", nearest(table, tuple(tables())))

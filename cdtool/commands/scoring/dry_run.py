@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from cdtool.base.remote.remote_path import is_remote
@@ -14,11 +15,12 @@ from cdtool.commands.scoring.learned import Teaching
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
 from cdtool.commands.scoring.pieces import source_files
 from cdtool.commands.scoring.scoring import logs_to_score
-from cdtool.commands.scoring.store.stored_learned import StoreOfRun
+from cdtool.commands.scoring.store.determinants import Determinants
+from cdtool.commands.scoring.store.stored_learned import learned_with_store
+from cdtool.commands.scoring.store.stored_scoring import StoredScoring
 from cdtool.detectors.base import Detector
-from cdtool.execution.store.store import read_speed
-from cdtool.execution.store.use import StoreUse
-from cdtool.execution.workers import Workers
+from cdtool.execution.store.store import Store
+from cdtool.execution.workers import Workers, in_order
 from cdtool.results.results import Skipped
 
 
@@ -60,7 +62,7 @@ def dry_run(
     detectors: Sequence[str | Detector] = (),
     false_alarm_budget: str | None = None,
     workers: Workers | None = None,
-    store: StoreUse | None = None,
+    store: Store | None = None,
 ) -> DryRun:
     """Return which logs of a benchmark `cdtool.benchmark` would compute with the same arguments; nothing is written.
 
@@ -78,26 +80,33 @@ def dry_run(
     return replace(_dry_run(replace(work, setup=setup), workers, store), to_inject=to_inject)
 
 
-def _dry_run(work: BenchmarkWork, workers: Workers, store: StoreUse | None) -> DryRun:
+def _dry_run(work: BenchmarkWork, workers: Workers, store: Store | None) -> DryRun:
     if store is None or not store.exists:
         names = work.setup.detectors
         logs = [(group, path, names) for group, item in work.setup.impacts.items() for path in item.logs]
         learn = [path for path in work.setup.learn if not is_remote(path)]
         runs = load_runs(learn, work.setup.machine_file, work.setup.run_reading(workers))
         return _planned(work.setup, logs, len(logs), None, skipped=runs.skipped)
-    with store.opened(writes=False) as folder:
-        setup, _ = with_synchronisation(work.setup, workers)
-        used = StoreOfRun(folder, store, workers)
-        learned = used.learned(Teaching(setup, workers, every_detector=work.every_detector))
-        setup = with_only(setup, learned.about.detectors)
-        outcomes = used.outcomes(setup, learned, sweep_factors(setup, learned.thresholds))
-        every = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-        plan = outcomes.plan(every, workers)
-        missing = [
-            (*log, outcomes.missing(planned)) for log, planned in zip(every, plan, strict=True) if not planned.is_known
-        ]
-        speed = read_speed(folder.parts)
-        return _planned(setup, missing, len(every), speed, workers.jobs, learned.about.skipped)
+    store = replace(store, writes=False)
+    store.check()
+    setup, _ = with_synchronisation(work.setup, workers)
+    teaching = Teaching(setup, workers, every_detector=work.every_detector)
+    learned, files = learned_with_store(store, teaching)
+    setup = with_only(setup, learned.about.detectors)
+    factors = sweep_factors(setup, learned.thresholds)
+    scoring = StoredScoring(None, store, Determinants(setup, learned, files, factors))
+    every = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
+    plan = list(in_order(scoring.planned, every, len(every), workers, of_lost=partial(_all, setup)))
+    missing = [(*log, detectors) for log, (_, detectors) in zip(every, plan, strict=True) if detectors]
+    done = [known for known, detectors in plan if known is not None and not detectors]
+    seconds = sum(known.seconds for known in done)
+    speed = sum(known.size for known in done) / seconds if seconds else None
+    return _planned(setup, missing, len(every), speed, workers.jobs, learned.about.skipped)
+
+
+def _all(setup: BenchmarkFile, *_: object) -> tuple[None, tuple[str, ...]]:
+    """Return the plan of a log that ended its workers: all of it."""
+    return None, setup.detectors
 
 
 def _planned(

@@ -1,11 +1,10 @@
-"""Score many logs, with detectors or by external alarms, and gather their rows."""
+"""The results of a benchmark from the outcomes of its logs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, partial
-from pathlib import Path
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from cdtool.base.arrays import FloatArray
@@ -15,14 +14,8 @@ from cdtool.commands.judging.impact_free import unchecked
 from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.commands.scoring.counting import Exposure, SweepRows
 from cdtool.commands.scoring.force_rows import point_rows
-from cdtool.commands.scoring.log_outcome import LogOutcome, OfOperation, slowest_of, striking_of
-from cdtool.commands.scoring.pieces import Piece, PieceOutcome, PieceScoring, ScoreLog, lost
-from cdtool.commands.scoring.store.finished_run import TraceKey
-from cdtool.commands.scoring.store.stored_outcomes import Planned, StoredOutcomes, same_content
-from cdtool.execution.store.sources import SourceFile
-from cdtool.execution.workers import Progress, Workers, in_order
+from cdtool.commands.scoring.log_outcome import LogOutcome
 from cdtool.results.results import (
-    CalibrationResult,
     ContactResult,
     FalseAlarmResult,
     ForceResult,
@@ -31,289 +24,120 @@ from cdtool.results.results import (
     Results,
     Skipped,
 )
-from cdtool.results.rows import Rows
-from cdtool.results.traces.choice import TraceChoice
-from cdtool.results.traces.trace import Trace
 from cdtool.truth.force.verdict import ForceVerdict
 
-# The name of its group and the path of each log.
-Logs = Sequence[tuple[str, Path]]
-# The most logs that a worker receives at once.
-_TOGETHER = 8
+
+def results_before(
+    setup: BenchmarkFile,
+    provenance: Mapping[str, Any],
+    detectors: Iterable[str],
+    skipped: Iterable[Skipped] = (),
+    findings: Iterable[RecordingFinding] = (),
+) -> Results:
+    """Return what is known of the results before a log is scored: no row of a log."""
+    of_file = [RecordingFinding.of(str(setup.path), remark(words)) for words in setup.migrated]
+    return Results(
+        provenance=provenance,
+        detectors=tuple(detectors),
+        groups=setup.groups,
+        conditions=setup.conditions,
+        contacts=(),
+        false_alarms=(),
+        exposure=(),
+        skipped=tuple(skipped),
+        findings=(*of_file, *setup.rules_of("").findings, *findings),
+    )
 
 
-@dataclass
-class _Place:
-    """A log, its files, and the number of its operations so far; its traces are kept in the store if there is one."""
+def results_of(
+    setup: BenchmarkFile,
+    before: Results,
+    outcomes: Iterable[tuple[str, LogOutcome]],
+    factors: Mapping[str, FloatArray],
+    learned: Mapping[str, str],
+) -> Results:
+    """Return the results of the `outcomes` of logs, each with its group, in the order of the benchmark file.
 
-    number: int
-    group: str
-    path: Path
-    sources: tuple[SourceFile, ...] | None = None
-    stored: StoredOutcomes | None = None
-    operations: int = 0
-
-    @property
-    def log(self) -> tuple[str, Path]:
-        """Return the group and the path of the log."""
-        return self.group, self.path
-
-    def keep(self, operation: int, trace: Trace) -> None:
-        """Store the trace of an operation."""
-        if self.stored:
-            self.stored.add_trace(self.log, self.sources, operation, trace)
-
-    def trace_key(self, operation: int) -> str | None:
-        """Return under which key the trace of an operation is stored; None if it is not."""
-        return self.stored.trace_key(self.log, self.sources, operation) if self.stored else None
-
-
-class Gathering:
-    """The rows of a benchmark, log by log in the order of the file, and the selected traces.
-
-    `names` are the detectors; `learned` maps the hashes of the logs learned from to their names.
+    `before` is what was known before the first of them, `factors` are the safety factors of the sweep by detector, and
+    `learned` maps the hashes of the logs learned from to their names. Raises ConfigurationError if the same log, under
+    any name, was learned from or given twice, RecordingError if no log could be scored.
     """
-
-    def __init__(
-        self,
-        setup: BenchmarkFile,
-        names: Sequence[str],
-        factors: Mapping[str, FloatArray],
-        learned: Mapping[str, str],
-    ) -> None:
-        self.setup = setup
-        self.names = tuple(names)
-        self.learned = learned
-        self.recordings = Rows(RecordingResult)
-        self.contacts = Rows(ContactResult)
-        self.false_alarms = Rows(FalseAlarmResult)
-        self.forces = Rows(ForceResult)
-        self.skipped = Rows(Skipped)
-        self.findings = Rows(RecordingFinding)
-        self.findings += (RecordingFinding.of(str(setup.path), remark(words)) for words in setup.migrated)
-        self.findings += setup.rules_of("").findings
-        # SHA-256 of the files beside the logs.
-        self._beside: dict[str, str] = {}
-        # By detector: the unit of the value compared with the limits, which may differ from that of the signal.
-        self.units: dict[str, str] = {}
-        self._exposure: dict[tuple[str, str], Exposure] = {}
-        self._sweep = SweepRows(factors, HOLDOUT)
-        self._tests: dict[tuple[str, str], list[ForceVerdict]] = {}
-        self._scored: dict[str, str] = {}
-        self._unchecked: list[tuple[str, Finding]] = []
-        self._traces: dict[int, Trace] = {}
-        # The log of each trace that is kept, made or not, and the number of the operation in it.
-        self._places: dict[int, tuple[_Place, int]] = {}
-        self._place = _Place(0, "", Path())
-        self._choice = TraceChoice(
-            sum(len(setup.impacts[group].logs) for group in setup.groups),
-            frozenset(item.group for item in setup.conditions),
-        )
-        # Time that all logs took [s].
-        self.reading = self.detecting = 0.0
-
-    def score(
-        self,
-        scoring: Callable[[], ScoreLog],
-        logs: Logs,
-        workers: Workers | None = None,
-        progress: Progress | None = None,
-        stored: StoredOutcomes | None = None,
-        plan: Sequence[Planned] = (),
-    ) -> None:
-        """Score the logs that are not `stored`, and add the rows of all; one that ends its workers is left out.
-
-        `plan` is what is stored of each log; `scoring` is called if one has to be scored. Raises ConfigurationError if
-        the same log, under any name, was learned from or given twice.
-        """
-        workers = workers or Workers()
-        plan = plan or [Planned()] * len(logs)
-        missing = [log for log, planned in enumerate(plan) if not planned.is_known]
-
-        @cache
-        def work() -> PieceScoring:
-            return PieceScoring(self.setup, scoring(), with_sources=stored is not None)
-
-        pieces = self._pieces(missing, logs, plan, stored)
-        of_lost = partial(lost, self.setup)
-        computed: Iterator[PieceOutcome] = iter(())
-        if missing:
-            computed = in_order(work(), pieces, len(missing), workers, of_lost=of_lost, together=_TOGETHER)
-        for log, ((group, path), planned) in enumerate(zip(logs, plan, strict=True)):
-            made = None if planned.is_known else next(computed)
-            outcomes = self._complete(group, path, planned, made, stored)
-            if outcomes is None:  # what was stored of it is gone
-                planned, made = Planned(), work()(Piece(log, group, path, self._choice))
-                outcomes = self._complete(group, path, planned, made, stored)
-            assert outcomes is not None, "all of it was computed"
-            self._place = _Place(log, group, path, planned.sources if made is None else made.sources, stored)
-            for outcome in outcomes:
-                self._add(log, group, outcome)
-            if progress:
-                progress(log + 1, len(logs))
-        for _ in computed:  # their processes end
-            pass
-        self._make_absent_traces(work, workers)
-
-    @staticmethod
-    def _complete(
-        group: str, path: Path, planned: Planned, made: PieceOutcome | None, stored: StoredOutcomes | None
-    ) -> Sequence[LogOutcome] | None:
-        """Return the outcomes of a log with what is stored of them; None if that is gone meanwhile."""
-        if stored is None:
-            return made.outcomes if made else None
-        return stored.known(path, planned) if made is None else stored.add(group, path, planned, made)
-
-    def _pieces(
-        self, missing: Sequence[int], logs: Logs, plan: Sequence[Planned], stored: StoredOutcomes | None
-    ) -> Iterator[Piece]:
-        # Known now: more traces are made than are kept at the logs' turn, never fewer. Those of a batch share a choice.
-        choice = self._choice.copy()
-        for log in missing:
-            if choice.offered != self._choice.offered:
-                choice = self._choice.copy()
-            group, path = logs[log]
-            yield stored.piece(log, group, path, plan[log], choice) if stored else Piece(log, group, path, choice)
-
-    def _make_absent_traces(self, work: Callable[[], PieceScoring], workers: Workers) -> None:
-        """Make the traces that are kept and were not made when the logs were scored, as of logs that were stored."""
-        absent: dict[int, list[tuple[int, _Place, int]]] = {}
-        for number in self._choice.kept():
-            if number not in self._traces:
-                place, operation = self._places[number]
-                trace = place.stored.trace(place.log, place.sources, operation) if place.stored else None
-                if trace is not None:
-                    self._traces[number] = trace
-                else:
-                    absent.setdefault(place.number, []).append((number, place, operation))
-        wanted = list(absent.values())
-        if not wanted:
-            return
-        pieces = (Piece(log[0][1].number, *log[0][1].log, operations=tuple(item[2] for item in log)) for log in wanted)
-        made = in_order(work(), pieces, len(wanted), workers, of_lost=partial(lost, self.setup))
-        for log, outcome in zip(wanted, made, strict=True):
-            traces = [trace for of_run in outcome.outcomes for trace in of_run.traces]
-            for number, place, operation in log:
-                trace = traces[operation] if operation < len(traces) else None
-                # The log may have changed since its rows were stored.
-                if trace is not None and same_content(outcome.sources, place.sources):
-                    self._traces[number] = trace
-                    place.keep(operation, trace)
-
-    def _add(self, log: int, group: str, outcome: LogOutcome) -> None:
-        self.reading += outcome.reading
-        self.detecting += outcome.detecting
-        self.skipped += outcome.skipped
-        self.findings += outcome.findings
-        self._unchecked += outcome.rows.unchecked
-        if outcome.recording is None:
-            return
-        self._refuse_learned(outcome.recording)
-        for number in range(outcome.operations):
-            of_operation = tuple(outcome.of_operation(number))
-            for name, item in of_operation:
-                self.units.setdefault(name, item.unit)
-                if (exposure := self._exposure.get((group, name))) is None:
-                    exposure = self._exposure[group, name] = Exposure()
-                exposure.add(item)
-                self._sweep.add(group, name, item)
-            self._offer(log, group, of_operation, outcome.traces[number] if outcome.traces else None)
+    recordings, contents = list[RecordingResult](), dict[str, str]()
+    contacts, false_alarms = list[ContactResult](), list[FalseAlarmResult]()
+    forces, tests = list[ForceResult](), defaultdict[tuple[str, str], list[ForceVerdict]](list)
+    skipped, findings = [*before.skipped], [*before.findings]
+    assumed_free = list[tuple[str, Finding]]()
+    exposure, sweep = defaultdict[tuple[str, str], Exposure](Exposure), SweepRows(factors, HOLDOUT)
+    # The unit of the value compared with the limits may differ from that of the signal.
+    units, beside = dict[str, str](), dict[str, str]()
+    for group, outcome in outcomes:
+        skipped += outcome.skipped
+        findings += outcome.findings
+        assumed_free += outcome.rows.unchecked
+        recording = outcome.recording
+        if recording is None:
+            continue
+        recordings.append(recording)
+        if recording.sha256:
+            _check_content(setup, recording, contents.get(recording.sha256, ""), learned.get(recording.sha256, ""))
+            contents[recording.sha256] = recording.recording
         for detector in outcome.detectors:
-            if any(item is not None for item in detector.operations):
-                self._exposure[group, detector.detector].recordings += 1
-        if outcome.recording.point:
-            self._tests.setdefault((group, outcome.recording.point), []).extend(outcome.rows.verdicts)
-        self.recordings.append(outcome.recording)
-        self.contacts += outcome.contacts
-        self.false_alarms += outcome.false_alarms
-        self.forces += outcome.rows.forces
-        self._beside |= {f"{outcome.recording.recording}, {name}": digest for name, digest in outcome.rows.beside}
+            found = [item for item in detector.operations if item is not None]
+            for item in found:
+                units.setdefault(detector.detector, item.unit)
+                exposure[group, detector.detector].add(item)
+                sweep.add(group, detector.detector, item)
+            if found:
+                exposure[group, detector.detector].recordings += 1
+        if recording.point:
+            tests[group, recording.point] += outcome.rows.verdicts
+        contacts += outcome.contacts
+        false_alarms += outcome.false_alarms
+        forces += outcome.rows.forces
+        beside |= {f"{recording.recording}, {name}": digest for name, digest in outcome.rows.beside}
+    findings += unchecked(assumed_free)
+    if not exposure and not setup.limits:
+        raise _nothing_scored(setup, skipped)
+    provenance = {**before.provenance, **({"load_cell_sha256": beside} if beside else {})}
+    if "units" in provenance:
+        provenance["units"] = provenance["units"] | units
+    return replace(
+        before,
+        provenance=provenance,
+        recordings=tuple(recordings),
+        contacts=tuple(contacts),
+        false_alarms=tuple(false_alarms),
+        exposure=tuple(item.result(*key) for key, item in exposure.items()),
+        forces=tuple(forces),
+        points=tuple(point_rows(tests, {name: group.force for name, group in setup.impacts.items()})),
+        sweep=tuple(sweep.rows(before.detectors, setup.groups)),
+        skipped=tuple(skipped),
+        # One about a file of which several groups have runs is the same in each of them.
+        findings=tuple(dict.fromkeys(findings) if setup.has_runs else findings),
+    )
 
-    def _offer(self, log: int, group: str, outcomes: OfOperation, trace: Trace | None) -> None:
-        number = self._choice.offer(log, group, len(outcomes), striking_of(outcomes), slowest_of(outcomes))
-        operation, self._place.operations = self._place.operations, self._place.operations + 1
-        if number is None:
-            return
-        kept = self._choice.kept()
-        self._traces = {n: made for n, made in self._traces.items() if n in kept}
-        self._places = {n: place for n, place in self._places.items() if n in kept}
-        self._places[number] = self._place, operation
-        if trace is not None:
-            self._traces[number] = trace
-            self._place.keep(operation, trace)
 
-    @property
-    def traces(self) -> tuple[Trace, ...]:
-        """Return the selected traces."""
-        why = self._choice.kept()
-        return tuple(replace(self._traces[number], chosen=why[number]) for number in why if number in self._traces)
+def recordings_in(results: Results) -> set[str]:
+    """Return the names of the recordings that were scored or left out by name."""
+    return {row.recording for row in results.skipped} | {row.recording for row in results.recordings}
 
-    @property
-    def trace_keys(self) -> list[TraceKey] | None:
-        """Return where the store has the selected traces; None if it does not have all of them."""
-        why, found = self._choice.kept(), []
-        for number, chosen in why.items():
-            place, operation = self._places[number]
-            key = place.trace_key(operation) if number in self._traces else None
-            if key is None:
-                return None
-            found.append(TraceKey(key, chosen))
-        return found
 
-    def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
-        """Return all results; raises RecordingError if no log could be scored."""
-        if not self._exposure and not self.setup.limits:
-            first = self.skipped[0] if self.skipped else None
-            reason = f"; first reason: {first.recording}: {first.reason}" if first else ""
-            hint = "" if first else "check with cdtool info"
-            raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", hint)
-        if self._choice.left_out:
-            left_out = Finding("plots_left_out", "", {"count": self._choice.left_out})
-            self.findings.append(RecordingFinding.of(str(self.setup.path), left_out))
-        profiles = {name: group.force for name, group in self.setup.impacts.items()}
-        return Results(
-            provenance={**provenance, "load_cell_sha256": self._beside} if self._beside else provenance,
-            detectors=self.names,
-            groups=self.setup.groups,
-            conditions=self.setup.conditions,
-            recordings=self.recordings,
-            contacts=self.contacts,
-            false_alarms=self.false_alarms,
-            exposure=tuple(item.result(group, name) for (group, name), item in self._exposure.items()),
-            forces=self.forces,
-            points=tuple(point_rows(self._tests, profiles)),
-            sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
-            calibration=tuple(calibration),
-            skipped=self.skipped,
-            findings=self._findings(),
+def _nothing_scored(setup: BenchmarkFile, skipped: Sequence[Skipped]) -> RecordingError:
+    reason = f"; first reason: {skipped[0].recording}: {skipped[0].reason}" if skipped else ""
+    hint = "" if skipped else "check with cdtool info"
+    return RecordingError(f"{setup.path}: no recording could be scored{reason}", hint)
+
+
+def _check_content(setup: BenchmarkFile, recording: RecordingResult, scored: str, learned: str) -> None:
+    """Raise ConfigurationError if a recording has the content of one that was `scored` or `learned` from, by name."""
+    name = recording.recording
+    if scored == name:
+        raise ConfigurationError(f"{setup.path}: {name} is scored twice", "name each run in one group only, and once")
+    if scored:
+        raise ConfigurationError(f"{setup.path}: {name} and {scored} have identical content", "score each log once")
+    # A log in [learn] up to its contact and in a group is scored with what was learned from the others.
+    if learned and not (setup.both and learned == name):
+        raise ConfigurationError(
+            f"{setup.path}: {name} has the same content as {learned}, which is used for learning",
+            "use a recording either in [learn] or for scoring",
         )
-
-    def _findings(self) -> Rows[RecordingFinding]:
-        """Return all findings; one about a file of which several groups have runs is the same in each of them."""
-        self.findings += unchecked(self._unchecked)
-        return Rows(RecordingFinding, dict.fromkeys(self.findings)) if self.setup.has_runs else self.findings
-
-    @property
-    def scored(self) -> frozenset[str]:
-        """Return the names of the recordings that were scored or left out by name."""
-        return frozenset((*self.skipped.values("recording"), *self.recordings.values("recording")))
-
-    def _refuse_learned(self, recording: RecordingResult) -> None:
-        before = self._scored.get(recording.sha256, "") if recording.sha256 else ""
-        self._scored[recording.sha256] = recording.recording
-        if before and before == recording.recording:
-            raise ConfigurationError(
-                f"{self.setup.path}: {before} is scored twice", "name each run in one group only, and once"
-            )
-        if before:
-            raise ConfigurationError(
-                f"{self.setup.path}: {recording.recording} and {before} have identical content", "score each log once"
-            )
-        learned = self.learned.get(recording.sha256, "") if recording.sha256 else ""
-        # A log in [learn] up to its contact and in a group is scored with what was learned from the others.
-        if learned and not (self.setup.both and learned == recording.recording):
-            raise ConfigurationError(
-                f"{self.setup.path}: {recording.recording} has the same content as {learned}, "
-                "which is used for learning",
-                "use a recording either in [learn] or for scoring",
-            )

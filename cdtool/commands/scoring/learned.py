@@ -14,6 +14,7 @@ from time import perf_counter
 from typing import Any
 
 from cdtool.base.files.bounded_loading import parse_own_json
+from cdtool.base.files.typed_json import plain, typed
 from cdtool.base.findings import Finding
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.runs import Runs, load_runs, shown_path
@@ -22,7 +23,6 @@ from cdtool.commands.learning.normal_runs import normals_for
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, with_only
 from cdtool.commands.scoring.learned_thresholds import LearnedThresholds, learn_thresholds, that_can_run
 from cdtool.detectors import DETECTORS
-from cdtool.execution.store.encoding import decoded, encoded
 from cdtool.execution.workers import Workers
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.plausible import LearnedRanges, PlausibleRanges
@@ -69,7 +69,7 @@ class Learned:
     def to_text(self, rule: Threshold) -> str:
         """Return it as JSON; `rule` is that of the thresholds."""
         values = {
-            "about": encoded(self.about, AboutLearning),
+            "about": plain(self.about),
             "thresholds": {
                 name: [fitted_to_dict(rule, item) for item in items] for name, items in self.thresholds.items()
             },
@@ -87,7 +87,7 @@ class Learned:
             values = parse_own_json(text)
             ranges = {name: PlausibleRanges.from_dict(item) for name, item in values["ranges_without"].items()}
             return cls(
-                decoded(values["about"], AboutLearning),
+                typed(AboutLearning, values["about"], "about"),
                 {
                     name: tuple(fitted_from_dict(rule, item) for item in items)
                     for name, items in values["thresholds"].items()

@@ -14,8 +14,8 @@ from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.learning.calibration import calibrate, in_fixed_order, kept
 from cdtool.commands.learning.fitting import NoUsableRunError, Pair, fitting, signals_of, with_left_out
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
-from cdtool.commands.scoring.left_out import LeftOut
-from cdtool.execution.forking import shares_memory
+from cdtool.commands.scoring.scoring import LeftOut
+from cdtool.execution.starting import shares_memory
 from cdtool.execution.workers import Workers, in_order
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.operations import Operation

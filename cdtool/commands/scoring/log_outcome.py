@@ -15,8 +15,7 @@ from cdtool.commands.judging.matched_log import MatchedLog, UncutStrokes
 from cdtool.commands.learning.normal_runs import NormalsWithout
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.detector_inputs import inputs_of
-from cdtool.commands.scoring.left_out import LeftOut
-from cdtool.commands.scoring.scoring import LogRows, ScoredLog
+from cdtool.commands.scoring.scoring import LeftOut, LogRows, ScoredLog
 from cdtool.report.explanation_words import words
 from cdtool.results.curves.sweep import Swept
 from cdtool.results.explanation.explanation import explain_operation

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -50,12 +50,14 @@ class Piece:
 class PieceOutcome:
     """The outcomes of a log or of its runs, the files that they are from, and the time taken [s].
 
-    `sources` is None if they are not asked for, or if the outcomes would not be the same again.
+    `sources` is None if they are not asked for, or if the outcomes would not be the same again. `is_stored`: nothing
+    was computed.
     """
 
     outcomes: tuple[LogOutcome, ...]
     sources: tuple[SourceFile, ...] | None = None
     seconds: float = 0.0
+    is_stored: bool = False
 
 
 @dataclass(frozen=True)
@@ -113,3 +115,10 @@ def lost(setup: BenchmarkFile, piece: Piece, reason: str) -> PieceOutcome:
     """Return the outcome of a log that ended its workers."""
     left_out = Skipped(shown_path(piece.path, setup.path.parent), reason)
     return PieceOutcome((LogOutcome(LogRows(None, skipped=(left_out,), unread=True), lasts=False),))
+
+
+def same_content(one: Sequence[SourceFile] | None, other: Sequence[SourceFile] | None) -> bool:
+    """Return whether the files of a log have the same content at two times; without a store it is not known."""
+    if one is None or other is None:
+        return one is other
+    return [item.digest for item in one] == [item.digest for item in other]

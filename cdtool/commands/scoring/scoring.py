@@ -1,9 +1,13 @@
-"""Score one log of a benchmark: read, cut, detect with every detector, match with its contacts, return the rows."""
+"""Score one log of a benchmark: read, cut, detect with every detector, match with its contacts, return the rows.
+
+Combine the reports of several detectors that left out a run for the same reason.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -16,7 +20,7 @@ from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.impact_free import without_contacts
 from cdtool.commands.judging.judged_operation import Judged, not_assessable
 from cdtool.commands.judging.log_findings import log_warnings
-from cdtool.commands.judging.matched_log import DetectedLog, MatchedLog, match_log
+from cdtool.commands.judging.matched_log import CutLog, MatchedLog, match_log
 from cdtool.commands.judging.runs import (
     absent_truth,
     lost,
@@ -29,7 +33,6 @@ from cdtool.commands.judging.runs import (
 from cdtool.commands.judging.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.force_rows import force_rows
-from cdtool.commands.scoring.left_out import LeftOut
 from cdtool.formats.channels.logged_recording import LoggedRecording
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.recordings.log_section import LogSection
@@ -41,6 +44,29 @@ from cdtool.results.curves.sweep import sweep_operation
 from cdtool.results.results import ForceResult, RecordingFinding, RecordingResult, Skipped
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.verdict import ForceVerdict, assess_force
+
+
+class LeftOut:
+    """Runs left out by detectors: a reason shared by all detectors is listed once, others name their detectors."""
+
+    def __init__(self) -> None:
+        self._detectors: dict[str, None] = {}
+        self._reasons: dict[Skipped, dict[str, None]] = {}
+
+    def add(self, detector: str, skipped: Iterable[Skipped]) -> None:
+        """Add what one detector left out; may be empty."""
+        self._detectors[detector] = None
+        for item in skipped:
+            self._reasons.setdefault(item, {})[detector] = None
+
+    def combined(self) -> list[Skipped]:
+        """Return each run with each reason once."""
+        return [
+            item
+            if len(names) == len(self._detectors)
+            else Skipped(item.recording, f"{', '.join(names)}: {item.reason}")
+            for item, names in self._reasons.items()
+        ]
 
 
 @dataclass(frozen=True)
@@ -163,7 +189,7 @@ def score_runs(
     """
     cut = RunCut.of(setup.operations)
     if cut is None:
-        return [_score(setup, group, path, detect, factors, _WholeLog(setup, group, path, ranges))]
+        return [_score(setup, group, path, detect, factors, path, partial(_whole, setup, group, path, ranges))]
     begin = perf_counter()
     try:
         runs = read_runs(path, setup.machine_file, cut)
@@ -175,7 +201,7 @@ def score_runs(
     scored = [ScoredLog(rows, reading=seconds)]
     for logged in runs.runs:
         run = location(logged.recording.source)
-        scored.append(_score(setup, group, path, detect, factors, _OneRun(setup, run, logged, ranges)))
+        scored.append(_score(setup, group, path, detect, factors, run, partial(_run, setup, run, logged, ranges)))
     return scored
 
 
@@ -184,23 +210,10 @@ def _unread(setup: BenchmarkFile, path: Path, fault: CdtoolError, seconds: float
     return ScoredLog(LogRows(None, skipped=(left_out,), unread=True), lasts=is_lasting(fault), reading=seconds)
 
 
-@dataclass(frozen=True)
-class LogToScore:
-    """A log or run of a benchmark as it is scored: its part that is used, cut into operations, and its contacts.
-
-    `unwanted` are contacts of a log that should have none.
-    """
-
-    recording: Recording
-    operations: Sequence[Operation]
-    contacts: Sequence[Contact] = ()
-    unwanted: Sequence[Contact] = ()
-
-
-def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[LogToScore | Skipped]:
+def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[CutLog | Skipped]:
     """Yield a log as it is scored, or each of its runs; the reason for one that cannot be used."""
     cut = RunCut.of(setup.operations)
-    loads: list[_WholeLog | _OneRun] = [_WholeLog(setup, group, path, None)]
+    loads = [(path, partial(_whole, setup, group, path, None))]
     if cut is not None:
         try:
             runs = read_runs(path, setup.machine_file, cut)
@@ -208,42 +221,25 @@ def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[LogT
             yield unread(path, setup.path.parent, fault)
             return
         yield from reported(runs, path, setup.path.parent)[0]
-        loads = [_OneRun(setup, location(logged.recording.source), logged, None) for logged in runs.runs]
-    for load in loads:
+        names = [location(logged.recording.source) for logged in runs.runs]
+        loads = [(name, partial(_run, setup, name, item, None)) for name, item in zip(names, runs.runs, strict=True)]
+    for name, load in loads:
         try:
-            yield _log_to_score(setup, group, path, load)
+            yield _cut_log(setup, group, path, name, load)
         except CdtoolError as fault:
-            yield unread(load.path, setup.path.parent, fault)
+            yield unread(name, setup.path.parent, fault)
 
 
-@dataclass(frozen=True)
-class _WholeLog:
-    """Reads a log that is one recording."""
-
-    setup: BenchmarkFile
-    group: str
-    path: Path
-    ranges: LearnedRanges | None
-
-    def __call__(self) -> Recording:
-        setup, base = self.setup, self.setup.path.parent
-        ranges = _of_others(self.ranges, shown_path(self.path, base))
-        return read_named(self.path, setup.machine_file_of(self.group), base, ranges, setup.onset)
+def _whole(setup: BenchmarkFile, group: str, path: Path, ranges: LearnedRanges | None) -> Recording:
+    base = setup.path.parent
+    known = _of_others(ranges, shown_path(path, base))
+    return read_named(path, setup.machine_file_of(group), base, known, setup.onset)
 
 
-@dataclass(frozen=True)
-class _OneRun:
-    """Converts a run that has been read; `path` is LOG#ID."""
-
-    setup: BenchmarkFile
-    path: Path
-    logged: LoggedRecording
-    ranges: LearnedRanges | None
-
-    def __call__(self) -> Recording:
-        setup, base = self.setup, self.setup.path.parent
-        ranges = _of_others(self.ranges, shown_path(self.path, base))
-        return named_on_load_side(self.logged, self.path, setup.machine_file, base, ranges, setup.onset)
+def _run(setup: BenchmarkFile, path: Path, logged: LoggedRecording, ranges: LearnedRanges | None) -> Recording:
+    base = setup.path.parent
+    known = _of_others(ranges, shown_path(path, base))
+    return named_on_load_side(logged, path, setup.machine_file, base, known, setup.onset)
 
 
 def _of_others(ranges: LearnedRanges | None, name: str) -> PlausibleRanges | None:
@@ -251,22 +247,23 @@ def _of_others(ranges: LearnedRanges | None, name: str) -> PlausibleRanges | Non
     return None if ranges is None else ranges.without(name)
 
 
-def _log_to_score(setup: BenchmarkFile, group: str, log: Path, load: _WholeLog | _OneRun) -> LogToScore:
-    """Read a log or one of its runs; `log` is its path in the benchmark file. Raises RecordingError."""
-    rules, path = setup.rules_of(group), load.path
+def _cut_log(setup: BenchmarkFile, group: str, log: Path, path: Path, load: Callable[[], Recording]) -> CutLog:
+    """Read and cut a log or a run at `path`; `log` is its path in the benchmark file. Raises RecordingError."""
+    rules = setup.rules_of(group)
     whole = load()
     section = setup.sections.get(log, LogSection())
     recording = section.of(whole)
     operations = operations_of(recording, setup.operations)
     if setup.is_impact_free(group):
         unwanted: Sequence[Contact] = unwanted_contacts(whole, rules)
-        return LogToScore(recording, operations, (), section.contacts_of(whole, unwanted) if section else unwanted)
+        unwanted = section.contacts_of(whole, unwanted) if section else unwanted
+        return CutLog(recording, operations, setup.operations, unwanted=unwanted)
     contacts: Sequence[Contact] = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
     if section and contacts:
         contacts = section.contacts_of(whole, contacts)
         if not contacts:
             raise RecordingError(f"{path}: no contact {section}", "change from and to, or move it to [holdout]")
-    return LogToScore(recording, operations, contacts)
+    return CutLog(recording, operations, setup.operations, contacts)
 
 
 def _score(
@@ -275,13 +272,14 @@ def _score(
     log: Path,
     detect: Detect,
     factors: Mapping[str, FloatArray],
-    load: _WholeLog | _OneRun,
+    path: Path,
+    load: Callable[[], Recording],
 ) -> ScoredLog:
-    """Score a log or one of its runs; `log` is its path in the benchmark file."""
-    rules, path = setup.rules_of(group), load.path
+    """Score a log or one of its runs, at `path`; `log` is its path in the benchmark file."""
+    rules = setup.rules_of(group)
     begin = perf_counter()
     try:
-        read = _log_to_score(setup, group, log, load)
+        read = _cut_log(setup, group, log, path, load)
     except CdtoolError as fault:
         return _unread(setup, path, fault, perf_counter() - begin)
     recording, operations, contacts, unwanted = read.recording, read.operations, read.contacts, read.unwanted
@@ -297,8 +295,7 @@ def _score(
             return ScoredLog(rows, recording, tuple(contacts), reading=reading)
     row = _recording_result(recording, group, log, len(operations), len(contacts), setup)
     found = detect(path, operations)
-    detected = DetectedLog(recording, operations, setup.operations, contacts, found.of_operations)
-    matched = match_log(detected, group, rules, setup.activation.wait)
+    matched = match_log(replace(read, operations=operations), found.of_operations, group, rules, setup.activation.wait)
     skipped += matched.not_scored
     findings += matched.about_log
     forces, verdicts = list[ForceResult](), dict[int, ForceVerdict]()

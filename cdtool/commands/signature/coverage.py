@@ -25,7 +25,7 @@ from cdtool.thresholds.signature_curve import COVERAGE
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeftOutRun:
     """One run, assessed with the signature of all the others: the factor below which it alarms, and whether it does."""
 
     name: str
@@ -34,7 +34,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class Coverage:
+class SignatureCoverage:
     """What the runs of one class of motion show about the signature that is learned from them.
 
     `chance`: predicted, that the next impact-free operation alarms; `target`: the required one. `runs_needed`: the
@@ -46,7 +46,7 @@ class Coverage:
     motion: MotionClass
     safety_factor: float
     target: float
-    runs: tuple[LeftOut, ...]
+    runs: tuple[LeftOutRun, ...]
     not_assessable: tuple[str, ...]
     chance: float
     runs_needed: int | None
@@ -88,7 +88,7 @@ class Coverage:
 
 def check_coverage(
     pairs: Sequence[tuple[Operation, Signal]], rule: Signature, activation: Activation, target: float = 1e-3
-) -> Coverage:
+) -> SignatureCoverage:
     """Assess each impact-free run of a class of motion with the signature of all the others, and predict the next run.
 
     Parameters
@@ -104,7 +104,7 @@ def check_coverage(
 
     Returns
     -------
-    Coverage
+    SignatureCoverage
         The alarms, the predicted chance, and what would meet the target.
 
     Raises
@@ -135,17 +135,17 @@ def check_coverage(
         )
     bare = [(operation.recording.without_ground_truth(), signal) for operation, signal in pairs]
     fitted = rule.fit(bare)
-    left_out: list[LeftOut] = []
+    left_out: list[LeftOutRun] = []
     refused: list[str] = []
     for (operation, signal), (recording, _) in zip(pairs, bare, strict=True):
         detection = judge(operation, "", signal, (fitted.without_run(recording, signal),), activation)
         critical = critical_factor(detection, activation)
         if math.isfinite(critical):
-            left_out.append(LeftOut(operation.name, critical, detection.verdict.outcome == "alarm"))
+            left_out.append(LeftOutRun(operation.name, critical, detection.verdict.outcome == "alarm"))
         else:
             refused.append(operation.name)
     prediction = _prediction(left_out)
-    return Coverage(
+    return SignatureCoverage(
         motion=fitted.motion.without_course,
         safety_factor=fitted.safety_factor,
         target=target,
@@ -158,7 +158,7 @@ def check_coverage(
     )
 
 
-def _prediction(runs: Sequence[LeftOut]) -> Prediction | None:
+def _prediction(runs: Sequence[LeftOutRun]) -> Prediction | None:
     return prediction_of([run.critical_factor for run in runs]) if len(runs) >= LEAST_VALUES else None
 
 

@@ -75,7 +75,7 @@ def audit_drift(
         raise SignatureError(f"no run to compare with the signature{reason}", "give runs of the learned class")
     found = deviations_of(signature, detections)
     unit = "s" if found.axis == "time" else detections[0].operation.recording["position"].unit
-    audited = [_Joint(signature, detections, activation, found, unit, j) for j in range(len(signature.joints))]
+    audited = [_JointAudit(signature, detections, activation, found, unit, j) for j in range(len(signature.joints))]
     return DriftAudit(
         signature.motion.without_course,
         signature.safety_factor,
@@ -88,7 +88,7 @@ def audit_drift(
 
 
 @dataclass(frozen=True)
-class _Joint:
+class _JointAudit:
     """One joint's part of an audit in the making."""
 
     signature: FittedSignature

@@ -13,7 +13,7 @@ from cdtool.commands.console.console import number, plain, say, table
 
 if TYPE_CHECKING:
     from cdtool.commands.signature.audit import DriftAudit
-    from cdtool.commands.signature.coverage import Coverage
+    from cdtool.commands.signature.coverage import SignatureCoverage
     from cdtool.commands.signature.summary import JointSummary, SignatureSummary
     from cdtool.commands.signature.upkeep import Checked, CheckedClass
     from cdtool.formats.signature_file import SignatureFile
@@ -127,7 +127,7 @@ def show_class(item: CheckedClass, *, quiet: bool = False) -> None:
     say(f"advice: {item.advice}")
 
 
-def _show_coverage(found: Coverage) -> None:
+def _show_coverage(found: SignatureCoverage) -> None:
     factors = [run.critical_factor for run in found.runs if math.isfinite(run.critical_factor)]
     share = 100.0 * max(factors) / found.safety_factor if factors else 0.0
     nearest = f"; the nearest run reaches {share:.0f} % of its limit" if factors else ""
@@ -195,7 +195,7 @@ def checked_as_json(checked: Checked) -> dict[str, Any]:
     }
 
 
-def _coverage_as_json(found: Coverage) -> dict[str, Any]:
+def _coverage_as_json(found: SignatureCoverage) -> dict[str, Any]:
     return {**asdict(found), "alarms": found.alarms, "more_runs": found.more_runs, "verdict": found.verdict}
 
 

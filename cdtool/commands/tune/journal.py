@@ -12,7 +12,7 @@ from cdtool.base.files.bounded_loading import parse_own_json
 from cdtool.commands.tune.search.candidate import Candidate, Measured
 
 
-class Journal:
+class TuningJournal:
     """The measurements of one detector in a file of the output folder; those of another search are dropped.
 
     `key` is the digest of everything that determines a measurement beside its candidate.

@@ -16,7 +16,7 @@ from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
 from cdtool.report.model import NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number, short
-from cdtool.report.table import Cell, Column, Table, count_cell, interval_cell, number_cell, tabulate
+from cdtool.report.table import Cell, Heading, Table, count_cell, interval_cell, number_cell, tabulate
 
 _GOALS = {
     Goal.LATENCY: "mean latency",
@@ -48,7 +48,7 @@ def tuning_html(tuning: Tuning) -> str:
         sections += _sections_of(tuning, tuned)
     if tuning.unusable:
         rows = [[Cell(visible(name)), Cell(visible(reason))] for name, reason in tuning.unusable.items()]
-        table = Table("unusable", "Detectors that could not be tuned", (Column("detector"), Column("reason")), rows)
+        table = Table("unusable", "Detectors that could not be tuned", (Heading("detector"), Heading("reason")), rows)
         sections.append(PageSection("Not tuned", (table,)))
     sections += left_out_sections(tuning.left_out, tuning.findings)
     sections.append(PageSection("What this is", note=f"{injected_words(tuning)}{NO_CERTIFICATE}"))
@@ -85,14 +85,14 @@ def _detectors_table(tuning: Tuning) -> Table:
         return Cell(NOTHING) if found is None else number_cell(found.mean_ms)
 
     fields = [
-        (Column("detector"), lambda item: Cell(visible(item.detector))),
-        (Column("threshold"), lambda item: Cell(item.choice.rule.name, (described_choice(item),))),
-        (Column("debounce"), lambda item: Cell(debounce_words(item))),
+        (Heading("detector"), lambda item: Cell(visible(item.detector))),
+        (Heading("threshold"), lambda item: Cell(item.choice.rule.name, (described_choice(item),))),
+        (Heading("debounce"), lambda item: Cell(debounce_words(item))),
     ]
     for name in groups:
-        fields.append((Column(f"{visible(name)}, default [ms]", numeric=True), partial(default, name)))
-        fields.append((Column(f"{visible(name)}, tuned [ms]", numeric=True), partial(mean, name)))
-    fields.append((Column("alarming free runs", numeric=True), lambda item: _alarms_cell(item.honest)))
+        fields.append((Heading(f"{visible(name)}, default [ms]", numeric=True), partial(default, name)))
+        fields.append((Heading(f"{visible(name)}, tuned [ms]", numeric=True), partial(mean, name)))
+    fields.append((Heading("alarming free runs", numeric=True), lambda item: _alarms_cell(item.honest)))
     return tabulate("detectors", "Mean latency, a missed contact counted as its window", fields, tuning.detectors)
 
 
@@ -146,7 +146,7 @@ def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
     tables = [_results_table(tuned)]
     if tuned.steps:
         rows = [[Cell(item.name), Cell(f"{100.0 * item.saved:.1f} %")] for item in tuned.steps]
-        tables.append(Table("steps", "What each choice saved of the cost", (Column("choice"), Column("saved")), rows))
+        tables.append(Table("steps", "What each choice saved of the cost", (Heading("choice"), Heading("saved")), rows))
     figures = []
     if len(groups) > 1 and tuned.pareto and all(len(point.costs) > 1 for point in tuned.pareto):
         words = "Apparent costs of two groups: a choice with less in one of them has more in the other."
@@ -159,7 +159,7 @@ def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
     more = [_sensitivity_table(tuned.sensitivities), _pareto_table(tuned.pareto, groups)]
     if tuned.chosen_in_folds:
         rows = [[Cell(str(number)), Cell(visible(text))] for number, text in enumerate(tuned.chosen_in_folds, 1)]
-        columns = (Column("without fold"), Column("choice"))
+        columns = (Heading("without fold"), Heading("choice"))
         more.append(Table("folds", "What is chosen without a fifth of the recordings", columns, rows))
     return [
         PageSection(f"{name}: results", tuple(tables), note=note),
@@ -177,33 +177,33 @@ def _results_table(tuned: TunedDetector) -> Table:
     items = [(words, figures, name) for words, figures in kinds if figures is not None for name in figures.groups]
 
     fields = (
-        (Column("results"), lambda item: Cell(item[0])),
-        (Column("group"), lambda item: Cell(visible(item[2]))),
-        (Column("contacts", numeric=True), lambda item: count_cell(item[1].groups[item[2]].contacts)),
-        (Column("missed", numeric=True), lambda item: count_cell(item[1].groups[item[2]].missed, "bad")),
+        (Heading("results"), lambda item: Cell(item[0])),
+        (Heading("group"), lambda item: Cell(visible(item[2]))),
+        (Heading("contacts", numeric=True), lambda item: count_cell(item[1].groups[item[2]].contacts)),
+        (Heading("missed", numeric=True), lambda item: count_cell(item[1].groups[item[2]].missed, "bad")),
         (
-            Column("not assessable", numeric=True),
+            Heading("not assessable", numeric=True),
             lambda item: count_cell(item[1].groups[item[2]].not_assessable, "unknown"),
         ),
-        (Column("mean [ms]", numeric=True), lambda item: _mean_cell(item[1].groups[item[2]])),
-        (Column("P95 [ms]", numeric=True), lambda item: number_cell(item[1].groups[item[2]].p95_ms)),
-        (Column("force at alarm [N]", numeric=True), lambda item: number_cell(item[1].groups[item[2]].force_n)),
-        (Column("alarming free runs", numeric=True), lambda item: _alarms_cell(item[1])),
+        (Heading("mean [ms]", numeric=True), lambda item: _mean_cell(item[1].groups[item[2]])),
+        (Heading("P95 [ms]", numeric=True), lambda item: number_cell(item[1].groups[item[2]].p95_ms)),
+        (Heading("force at alarm [N]", numeric=True), lambda item: number_cell(item[1].groups[item[2]].force_n)),
+        (Heading("alarming free runs", numeric=True), lambda item: _alarms_cell(item[1])),
     )
     return tabulate("results", "Latency by group, with the 95 % interval of the mean", fields, items)
 
 
 def _sensitivity_table(items: Sequence[Sensitivity]) -> Table:
     fields = (
-        (Column("gain or setting"), lambda item: Cell(visible(item.name))),
-        (Column("chosen", numeric=True), lambda item: Cell(short(item.chosen))),
-        (Column("tried", numeric=True), lambda item: Cell(str(len(item.tried)))),
+        (Heading("gain or setting"), lambda item: Cell(visible(item.name))),
+        (Heading("chosen", numeric=True), lambda item: Cell(short(item.chosen))),
+        (Heading("tried", numeric=True), lambda item: Cell(str(len(item.tried)))),
         (
-            Column("at most 5 % more cost", numeric=True),
+            Heading("at most 5 % more cost", numeric=True),
             lambda item: Cell(f"{short(item.flat_from)} to {short(item.flat_to)}" if len(item.tried) > 1 else NOTHING),
         ),
         (
-            Column("edge"),
+            Heading("edge"),
             lambda item: Cell("at the edge of the search", tone="unknown") if item.is_at_edge else Cell(""),
         ),
     )
@@ -212,12 +212,12 @@ def _sensitivity_table(items: Sequence[Sensitivity]) -> Table:
 
 def _pareto_table(points: Sequence[ParetoPoint], groups: Sequence[str]) -> Table:
     fields = [
-        (Column("threshold"), lambda item: Cell(item.candidate.rule.name)),
-        (Column("settings"), lambda item: Cell(visible(_settings(item)))),
-        (Column("debounce"), lambda item: Cell(item.debounce)),
+        (Heading("threshold"), lambda item: Cell(item.candidate.rule.name)),
+        (Heading("settings"), lambda item: Cell(visible(_settings(item)))),
+        (Heading("debounce"), lambda item: Cell(item.debounce)),
     ]
     for place, name in enumerate(groups):
-        fields.append((Column(visible(name), numeric=True), partial(_cost_cell, place)))
+        fields.append((Heading(visible(name), numeric=True), partial(_cost_cell, place)))
     return tabulate("pareto", "Choices that none beats in every group (apparent costs)", fields, points, most=20)
 
 

@@ -12,10 +12,10 @@ from cdtool.base.errors import UsageError
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import counted
 from cdtool.commands.judging.log_groups import Split, split_names
-from cdtool.commands.judging.matched_log import contacts_by_operation, force_curves
+from cdtool.commands.judging.matched_log import CutLog, contacts_by_operation, force_curves
 from cdtool.commands.judging.runs import Runs, load_runs
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
-from cdtool.commands.scoring.scoring import LogToScore, logs_to_score
+from cdtool.commands.scoring.scoring import logs_to_score
 from cdtool.commands.tune.search.recordings import FreeRun, StruckLog, TuningRecordings
 from cdtool.execution.workers import Progress, Workers, in_order
 from cdtool.recordings.operations import Operation
@@ -50,7 +50,7 @@ def read_recordings(
     runs = load_runs(setup.learn, setup.machine_file, setup.run_reading(workers))
     check_enough(budget, runs.operations)
     listed = [(name, path) for name in setup.groups_of_impacts for path in setup.impacts[name].logs]
-    read = in_order(_Reading(setup), listed, len(listed), workers, progress=progress, together=8)
+    read = in_order(_Reading(setup), listed, len(listed), workers, progress=progress)
     struck: list[StruckLog] = []
     skipped: list[Skipped] = []
     for made in read:
@@ -79,7 +79,7 @@ class _Reading:
             found += [log] if isinstance(log, Skipped) else [*self._struck(group, path, log)]
         return found
 
-    def _struck(self, group: str, path: Path, log: LogToScore) -> list[StruckLog | Skipped]:
+    def _struck(self, group: str, path: Path, log: CutLog) -> list[StruckLog | Skipped]:
         rules = self.setup.rules_of(group)
         inside: list[tuple[Contact, ...]] = [
             tuple(contact for contact in contacts if not contact.in_progress)

@@ -15,7 +15,7 @@ from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import is_remote, joined, location, relative_name
 from cdtool.base.toml_text import opened_table
 from cdtool.base.version import __version__
-from cdtool.commands.learning.learning import Learned, Setting, learned_from_runs
+from cdtool.commands.learning.learning import LearnedSignature, Setting, learned_from_runs
 from cdtool.commands.tune.search.candidate import Candidate
 from cdtool.commands.tune.search.tuned import ChoiceResults, TunedDetector
 from cdtool.commands.tune.tuned_rows import Tuning
@@ -206,7 +206,7 @@ def factor_words(tuning: Tuning, tuned: TunedDetector) -> str:
     return words
 
 
-def tuned_signature(tuning: Tuning, tuned: TunedDetector) -> Learned:
+def tuned_signature(tuning: Tuning, tuned: TunedDetector) -> LearnedSignature:
     """Return the signature file of a tuned detector, learned from all runs; raises SignatureError, UsageError."""
     setup, activation = tuning.setup, tuning.setup.activation
     if tuned.debounce is not None:

@@ -22,7 +22,7 @@ from cdtool.commands.scoring.benchmark_file import (
     with_detectors,
 )
 from cdtool.commands.scoring.store.determinants import how_logs_are_read
-from cdtool.commands.tune.journal import Journal
+from cdtool.commands.tune.journal import TuningJournal
 from cdtool.commands.tune.options import TuningOptions, Watch, unwatched
 from cdtool.commands.tune.recordings_to_tune import ReadRecordings, read_recordings, to_check
 from cdtool.commands.tune.result import TuningResult
@@ -334,7 +334,7 @@ class _TuningOf:
             recordings, machine, self._detector, setup.watched, self.options.budget, activations, learned, hold
         )
 
-    def _journal(self, folder: Path | None, measuring: Measuring) -> Journal | None:
+    def _journal(self, folder: Path | None, measuring: Measuring) -> TuningJournal | None:
         if folder is None:
             return None
         recordings = measuring.recordings
@@ -355,7 +355,7 @@ class _TuningOf:
             free,
             struck,
         )
-        return Journal(folder / f"{self.name}.jsonl", key)
+        return TuningJournal(folder / f"{self.name}.jsonl", key)
 
     def _result(
         self, found: Searched, objective: Objective, measure: _MeasuresAll, debounces: list[int], words: list[str]
@@ -465,7 +465,7 @@ class _MeasuresAll:
 
     measuring: Measuring
     workers: Workers
-    journal: Journal | None
+    journal: TuningJournal | None
     _held_out: dict[tuple[str, int, int], HeldOut] = field(default_factory=dict)
 
     def __call__(self, candidates: Sequence[Candidate]) -> list[Measured]:

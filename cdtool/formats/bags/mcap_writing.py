@@ -25,7 +25,7 @@ def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provena
     """Write the groups, message by message in the order of their times; the names have the form `/clock_1 torque`."""
     from mcap.writer import CompressionType, Writer
 
-    require_clocks(path, groups)
+    require_clocks(groups)
     start = _start(groups, float(provenance.get("origin_s", "0")))
     fields = [_field_names([column.name for column in group.columns]) for group in groups]
     with path.open("wb") as file:

@@ -45,11 +45,11 @@ class _Ros1Bag(Bag):
         """Yield the messages to the bag's end or to the first damage."""
         from rosbags.highlevel import AnyReader
 
-        with one_line_errors(self.path, "a ROS bag"):
+        with one_line_errors("a ROS bag"):
             reader = AnyReader([Path(os.fspath(self.path))])
             reader.open()
         try:
-            with one_line_errors(self.path, "a ROS bag"):
+            with one_line_errors("a ROS bag"):
                 streams = {connection.id: _stream(connection) for connection in reader.connections}
                 for connection in reader.connections:
                     count = self.counts.get(connection.topic, ("", 0))[1] + connection.msgcount

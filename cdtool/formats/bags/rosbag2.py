@@ -72,7 +72,7 @@ class _Ros2Bag(Bag):
     def messages(self) -> Generator[tuple[Stream, int, bytes], None, None]:
         """Yield the messages to the bag's end or to the first damage."""
         with ExitStack() as stack:
-            with one_line_errors(self.path, "a ROS 2 bag"):
+            with one_line_errors("a ROS 2 bag"):
                 file = stack.enter_context(self._database())
                 base = stack.enter_context(closing(_connect(file)))
                 tables = {name for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}

@@ -20,7 +20,7 @@ from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.remote.remote_path import is_read_by_ranges, version_of
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
-from cdtool.formats.channels.header_units import check_clock_unit, guessed_units, time_unit_findings, unit_findings
+from cdtool.formats.channels.header_units import clock_unit_findings, guessed_units, unit_findings
 from cdtool.formats.source import Source
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.clock import CleanTime, clean_time, differentiate, epoch_start, previous_value
@@ -42,42 +42,49 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
     Each column is removed from the source after its last use, to limit the memory in use. `digest` is that of the
     content if the source is not a whole file.
     """
-    work = _Assembly(source, channels)
-    series = {}
-    findings = (*source.findings, *work.findings)
-    doubted = {item.channel for item in findings if item.kind == "unit_contradicted" and item.severity == "loss"}
+    columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
+    findings: list[Finding] = []
+    table, origin = (None, source.origin) if channels.topics else _table_clock(source, channels, findings)
+    findings += guessed_units(channels, {found.channel for found in findings})
+    reported = (*source.findings, *findings)
+    doubted = {item.channel for item in reported if item.kind == "unit_contradicted" and item.severity == "loss"}
+    clocks: dict[tuple[int, bool], _Clock] = {}  # by the identity of the stamps
+    series: dict[str, Series] = {}
     for number, item in enumerate(channels.sources):
-        made = work.series(item)
+        clock = table or _topic_clock(columns[item.keys[0]].time, item, clocks, findings)
+        made = _series(item, [columns[key].values for key in item.keys], clock, channels.joints, findings)
         if item.channel not in doubted:
             series[item.channel] = made
         elif item.channel not in RIG_UNITS:  # present, so that nothing takes its place, but not assessable
             series[item.channel] = made.with_values(np.full(made.values.shape, np.nan), made.unit)
-        work.drop_columns(item, channels.sources[number + 1 :])
-    work.columns.clear()
+        needed = {key for later in channels.sources[number + 1 :] for key in later.keys}
+        for key in {*item.keys} - needed:
+            columns.pop(key, None)
+        present = {id(column.time) for column in columns.values()}
+        clocks = {key: clock for key, clock in clocks.items() if key[0] in present}
+    columns.clear()
     for item in channels.sources:
         if item.duty is not None:
             if "N m" not in machine.accepted_units("torque"):
                 raise ConfigurationError(
-                    f"{source.path}: torque of kind 'duty' is on the motor side, but the machine file states "
-                    "coordinates = 'load'",
+                    "torque of kind 'duty' is on the motor side, but the machine file states coordinates = 'load'",
                     "describe the machine in motor coordinates",
                 )
-            series[item.channel] = _torque_from_duty(source.path, item, series, channels.speed_low_pass)
+            series[item.channel] = _torque_from_duty(item, series, channels.speed_low_pass)
+    findings += [Finding("confirmed", item.channel) for item in channels.sources if item.confirmed]
+    findings += [*_stuck_findings(series, channels.joints), *_disjoint_clock_findings(series)]
+    rows = None
+    if table is not None:
+        rows = TableRows(table.times.time, None if table.keep.all() else table.keep)
     return Recording(
         name=log_stem(source.path),
         source=str(source.path),
         joints=channels.joints,
         channels=series,
-        origin=work.origin,
-        findings=(
-            *source.findings,
-            *work.findings,
-            *(Finding("confirmed", item.channel) for item in channels.sources if item.confirmed),
-            *_stuck_findings(series, channels.joints),
-            *_disjoint_clock_findings(series),
-        ),
+        origin=origin,
+        findings=(*source.findings, *findings),
         digest=digest or file_digest(source.path),
-        rows=work.rows,
+        rows=rows,
         label_kinds=next((item.kinds for item in channels.sources if item.channel == "label"), ()),
     )
 
@@ -95,157 +102,119 @@ def file_digest(path: Path) -> str:
 
 @dataclass(frozen=True)
 class _Clock:
-    """A clock that channels share: its cleaned times, its `stamps` [s], and findings on gaps that each channel gets."""
+    """A clock that channels share: its times, which rows are kept, and findings that each of its channels gets.
 
-    clean: CleanTime
+    Channels of a table share its one clock. Those of a topic are in columns with these `stamps` [s].
+    """
+
     times: Series
+    keep: BoolArray
+    of_table: bool = False
     gaps: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     stamps: FloatArray | None = None
 
 
-class _Assembly:
-    """Assembles the series of one file, and collects the findings."""
-
-    def __init__(self, source: Source, channels: ChannelMap) -> None:
-        self.source = source
-        self.channels = channels
-        self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
-        self.origin = source.origin
-        self.findings: list[Finding] = []
-        self.table: _Clock | None = None  # the gaps of its times are reported once
-        self._topic_clocks: dict[tuple[int, bool], _Clock] = {}  # by the identity of the stamps
-        if not channels.topics:
-            clean = self._table_clock()
-            self.table = _Clock(clean, _as_series(clean))
-            if channels.time.column is not None:
-                self.findings += gaps_of(clean.time, self.table.times.period, "time")
-            self.findings += unit_findings(source, channels)
-        self.findings += guessed_units(channels, {found.channel for found in self.findings})
-
-    @property
-    def rows(self) -> TableRows | None:
-        """Return the rows of the table on its clock; None for channels with clocks of their own."""
-        if self.table is None:
-            return None
-        keep = self.table.clean.keep
-        return TableRows(self.table.times.time, None if keep.all() else keep)
-
-    def drop_columns(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
-        """Remove the columns of a channel that no later channel needs."""
-        needed = {key for other in later for key in other.keys}
-        for key in item.keys:
-            if key not in needed:
-                self.columns.pop(key, None)
-        present = {id(column.time) for column in self.columns.values()}
-        self._topic_clocks = {key: clock for key, clock in self._topic_clocks.items() if key[0] in present}
-
-    def series(self, item: ChannelSource) -> Series:
-        """Return one channel: its values in SI at its own times."""
-        shared = self.table or self._topic_clock(item)
-        if not len(shared.clean.time):
-            raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
-            )
-        parts = [self.columns[key].values for key in item.keys]
-        values = parts[0] if len(parts) == 1 else np.column_stack(parts)
-        kept, clock, gaps = self._select(item, values, shared.clean.keep), shared.times, shared.gaps
-        if self.table is not None and item.channel not in UNITLESS and np.isnan(kept[:_FIRST_ROWS]).any():
-            kept, clock, gaps = self._at_lower_rate(kept, clock, item.channel)
-        scaled, masked = convert_to_si(item, kept)
-        self.findings += _masked_findings(masked, item, self.channels.joints)
-        self.findings += [replace(finding, channel=item.channel) for finding in gaps]
-        absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
-        self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
-        series = clock.with_values(component_along(item.direction, scaled) if item.direction else scaled, item.unit)
-        return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
-
-    def _at_lower_rate(
-        self, values: FloatArray, clock: Series, channel: str
-    ) -> tuple[FloatArray, Series, tuple[Finding, ...]]:
-        """Return a channel's rows (n, J) in a table, its times, and its gaps; fewer rows if its rate is lower."""
-        rows = sampled_rows(values)
-        if rows is None:
-            return values, clock, ()
-        time = clock.time[rows]
-        own = Series(time, np.zeros(len(time)), "s")
-        share = clock.period / own.period if own.period > 0.0 else np.nan
-        self.findings.append(Finding("lower_rate", channel, {"rate": 1.0 / own.period, "share": share}))
-        return values[rows], own, tuple(gaps_of(own.time, own.period, "time"))
-
-    def _topic_clock(self, item: ChannelSource) -> _Clock:
-        """Return a channel's clock, cleaned once for all channels of its topic, and add the findings on its stamps."""
-        stamps = self.columns[item.keys[0]].time
-        stamps = np.empty(0) if stamps is None else stamps
-        name, sampled = f"{item.channel} time", item.channel != "event"
-        known = self._topic_clocks.get((id(stamps), sampled))
-        if known is not None:
-            self._add_clock_findings(known.clean, name)
-            return known
-        clean = self._clean(stamps, name, sampled=sampled)
-        times = _as_series(clean)
-        known = _Clock(clean, times, tuple(gaps_of(times.time, times.period, "time")), stamps)
-        self._topic_clocks[id(stamps), sampled] = known
-        return known
-
-    def _table_clock(self) -> CleanTime:
-        time = self.channels.time
-        if time.column is None:
-            rows = {len(column.values) for column in self.columns.values()}
-            return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
-        column = self.columns[time.key]
-        self.findings += check_clock_unit(self.source.path, time, column, self.origin)
-        self.findings += time_unit_findings(time, column, self.origin)
+def _table_clock(source: Source, channels: ChannelMap, findings: list[Finding]) -> tuple[_Clock, float]:
+    """Return the clock of a table and what it counts from [s]; the findings on it and on units are added."""
+    time, origin = channels.time, source.origin
+    if time.column is None:
+        rows = {len(column.values) for column in source.columns.values()}
+        clean = clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
+        times = _as_series(clean.time)
+    else:
+        column = source.columns[time.key]
+        findings += clock_unit_findings(time, column, origin)
         start = epoch_start(column.values, time.factor)
-        if start:
-            self.origin += start * time.factor
-        clock = self._clean((column.values - start) * time.factor, "time", counted=column.values)
-        if not len(clock.time):
-            raise RecordingError(
-                f"{self.source.path}: column '{column.name}' contains no time stamp", "see [channels] time"
-            )
-        return clock
+        origin += start * time.factor
+        clean = _clean((column.values - start) * time.factor, "time", source.first_row, counted=column.values)
+        if not len(clean.time):
+            raise RecordingError(f"column '{column.name}' contains no time stamp", "see [channels] time")
+        times = _as_series(clean.time)
+        findings += [*clean.findings, *gaps_of(times.time, times.period, "time")]
+    findings += unit_findings(source, channels)
+    return _Clock(times, clean.keep, of_table=True), origin
 
-    def _clean(
-        self, stamps: FloatArray, clock: str, *, counted: FloatArray | None = None, sampled: bool = True
-    ) -> CleanTime:
-        """Return the cleaned times of a clock's stamps [s]; its findings have `clock` as their channel."""
-        first = self.source.first_row
-        row_name = "line" if first else "sample"
-        try:
-            clean = clean_time(stamps, first, row_name, counted=counted, sampled=sampled)
-        except RecordingError as fault:
-            raise RecordingError(f"{self.source.path}: {clock}: {fault.message}", fault.hint) from fault
-        self._add_clock_findings(clean, clock)
-        return clean
 
-    def _add_clock_findings(self, clean: CleanTime, clock: str) -> None:
-        self.findings += [replace(finding, channel=clock) for finding in clean.findings]
+def _topic_clock(
+    stamps: FloatArray | None, item: ChannelSource, known: dict[tuple[int, bool], _Clock], findings: list[Finding]
+) -> _Clock:
+    """Return a channel's clock, cleaned once for all channels of its topic, and add the findings on its stamps."""
+    stamps = np.empty(0) if stamps is None else stamps
+    name, sampled = f"{item.channel} time", item.channel != "event"
+    clock = known.get((id(stamps), sampled))
+    if clock is None:
+        clean = _clean(stamps, name, sampled=sampled)
+        times = _as_series(clean.time)
+        gaps = tuple(gaps_of(times.time, times.period, "time"))
+        clock = known[id(stamps), sampled] = _Clock(times, clean.keep, False, gaps, clean.findings, stamps)
+    findings += [replace(finding, channel=name) for finding in clock.findings]
+    return clock
 
-    def _select(self, item: ChannelSource, values: FloatArray, keep: BoolArray) -> FloatArray:
-        """Return the kept rows (n, J) of a channel's values; raises RecordingError if their shape does not fit."""
-        table = values.reshape(len(values), -1)
-        if len(table) != len(keep):
-            raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' ({item.described}) has {len(table)} values, "
-                f"its clock {len(keep)}",
-                "all columns of a recording have the same length",
-                channel=item.channel,
-            )
-        if table.shape[1] != len(item.factor):
-            raise RecordingError(
-                f"{self.source.path}: channel '{item.channel}' ({item.described}) has {table.shape[1]} values "
-                f"per sample for {len(item.factor)} {'axes' if item.axes else 'joints'}",
-                f"name one element per {'axis' if item.axes else 'joint, in the order of machine.joints'}",
-                channel=item.channel,
-            )
-        return table if keep.all() else table[keep]
+
+def _clean(
+    stamps: FloatArray, clock: str, first_row: int = 0, *, counted: FloatArray | None = None, sampled: bool = True
+) -> CleanTime:
+    """Return the cleaned times of a clock's stamps [s]; an error names the clock."""
+    try:
+        return clean_time(stamps, first_row, counted=counted, sampled=sampled)
+    except RecordingError as fault:
+        raise RecordingError(f"{clock}: {fault.message}", fault.hint) from fault
+
+
+def _as_series(time: FloatArray) -> Series:
+    return Series(time, np.zeros(len(time)), "s")
+
+
+def _series(
+    item: ChannelSource, parts: Sequence[FloatArray], clock: _Clock, joints: Sequence[str], findings: list[Finding]
+) -> Series:
+    """Return one channel: its values in SI at its own times; `parts` are its columns. The findings on it are added."""
+    if not len(clock.times):
+        raise RecordingError(f"channel '{item.channel}' has no sample with a time", channel=item.channel)
+    values = _kept_rows(item, parts, clock.keep)
+    times, gaps = clock.times, clock.gaps
+    if clock.of_table and item.channel not in UNITLESS and np.isnan(values[:_FIRST_ROWS]).any():
+        rows = sampled_rows(values)
+        if rows is not None:  # its rate is lower than that of the table
+            values, times = values[rows], _as_series(times.time[rows])
+            share = clock.times.period / times.period if times.period > 0.0 else np.nan
+            findings.append(Finding("lower_rate", item.channel, {"rate": 1.0 / times.period, "share": share}))
+            gaps = tuple(gaps_of(times.time, times.period, "time"))
+    scaled, masked = convert_to_si(item, values)
+    findings += _masked_findings(masked, item, joints) if masked.any() else []
+    findings += [replace(finding, channel=item.channel) for finding in gaps]
+    absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
+    findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
+    series = times.with_values(component_along(item.direction, scaled) if item.direction else scaled, item.unit)
+    return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
+
+
+def _kept_rows(item: ChannelSource, parts: Sequence[FloatArray], keep: BoolArray) -> FloatArray:
+    """Return the kept rows (n, J) of a channel's columns; raises RecordingError if their shape does not fit."""
+    count = next((len(part) for part in parts if len(part) != len(keep)), len(keep))
+    if count != len(keep):
+        raise RecordingError(
+            f"channel '{item.channel}' ({item.described}) has {count} values, its clock {len(keep)}",
+            "all columns of a recording have the same length",
+            channel=item.channel,
+        )
+    table = parts[0].reshape(count, -1) if len(parts) == 1 else np.column_stack(parts)
+    if table.shape[1] != len(item.factor):
+        raise RecordingError(
+            f"channel '{item.channel}' ({item.described}) has {table.shape[1]} values "
+            f"per sample for {len(item.factor)} {'axes' if item.axes else 'joints'}",
+            f"name one element per {'axis' if item.axes else 'joint, in the order of machine.joints'}",
+            channel=item.channel,
+        )
+    return table if keep.all() else table[keep]
 
 
 def _masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
     """Return the findings on masked values by joint, or by axis of a force; `masked` (3, J): as of convert_to_si."""
-    parts = [(f"{item.channel} {axis}", "") for axis in item.axes]
     width = masked.shape[1]
-    parts = parts or [(item.channel, _joint_name(joints, j, width)) for j in range(width)]
+    parts = [(f"{item.channel} {axis}", "") for axis in item.axes]
+    parts = parts or [(item.channel, joints[j] if width > 1 else "") for j in range(width)]
     return [
         Finding(kind, channel, {"count": count, "joint": joint})
         for kind, counts in zip(_MASKED, masked.tolist(), strict=True)
@@ -254,20 +223,11 @@ def _masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str])
     ]
 
 
-def _as_series(clean: CleanTime) -> Series:
-    return Series(clean.time, np.zeros(len(clean.time)), "s")
-
-
 def component_along(direction: Sequence[float], values: FloatArray) -> FloatArray:
     """Return the component (n, 1) of vectors (n, axes) along a unit vector; NaN where an axis that it needs is NaN."""
     used = np.flatnonzero(direction)
     along: FloatArray = values[:, used] @ np.array(direction)[used]
     return along[:, np.newaxis]
-
-
-def _joint_name(joints: Sequence[str], joint: int, count: int) -> str:
-    """Return the name of a joint if the channel has several joints, else an empty string."""
-    return joints[joint] if count > 1 else ""
 
 
 def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
@@ -291,7 +251,7 @@ def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, 
     return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, impossible)])
 
 
-def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
+def _torque_from_duty(item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
     """Return tau = k_t (u - k_e omega) / R (thesis 6.2.2); omega is the last motor speed at or before each sample."""
     duty, logged = item.duty, series[item.channel]
     assert duty is not None
@@ -301,7 +261,7 @@ def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series]
         speed = differentiate(series["position"], low_pass, "rad/s")
     else:
         raise ConfigurationError(
-            f"{path}: torque of kind 'duty' needs the motor's speed [rad/s] or angle [rad]",
+            "torque of kind 'duty' needs the motor's speed [rad/s] or angle [rad]",
             "map speed or position of the motor in [channels]",
         )
     voltage = logged.values * (duty.supply_voltage if logged.unit == "1" else 1.0)
@@ -314,7 +274,7 @@ def _stuck_findings(series: Mapping[str, Series], joints: Sequence[str]) -> list
     """Return a finding for each measured channel that is constant while its joint moves."""
     constant = {name: _is_constant(series[name]) for name in MEASURED if name in series}
     return [
-        Finding("stuck_channel", name, {"joint": _joint_name(joints, joint, len(by_joint))})
+        Finding("stuck_channel", name, {"joint": joints[joint] if len(by_joint) > 1 else ""})
         for name, by_joint in constant.items()
         for joint, is_constant in enumerate(by_joint)
         if is_constant

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding, Severity
 from cdtool.base.remote.remote_path import location
 from cdtool.formats.channels.channel_assembly import assemble_recording
@@ -74,7 +74,8 @@ def _read(
     if own.align == "trigger":
         sources.append(ChannelSource("trigger", columns=(own.file_trigger,)))
     source, resolved = read(path, ChannelMap(own.time, tuple(sources), channels.joints))
-    return assemble_recording(source, resolved, machine)
+    with naming(path):
+        return assemble_recording(source, resolved, machine)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Sequence
-from pathlib import Path
 from unicodedata import normalize
 
 import numpy as np
@@ -92,62 +91,44 @@ def _unit_text(item: ChannelSource, column: Column, factor: float) -> str | None
     return min(known, key=lambda text: known[text]) if known else column.unit or bare
 
 
-def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
-    """Return the warning on a clock whose steps are implausible in the unit that the machine file states.
+def clock_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
+    """Return the warnings on a clock with implausible steps, or of another unit than the machine file states.
 
-    `origin`, in seconds according to that unit, has been subtracted from the time stamps. Raises RecordingError if the
-    time stamps cannot be times in that unit, but are times since 1970 in another one.
+    `origin`, in seconds according to that unit, has been subtracted from the time stamps. If these count from 1970 in
+    the machine file's unit, a header that differs is wrong, which is not reported. Raises RecordingError if the time
+    stamps cannot be times in that unit, but are times since 1970 in another one.
     """
-    if time.rate is not None:
-        return []
-    first = _first_stamp(time, column, origin)
-    stated, header_unit = time.unit or "s", find_unit(column.unit) if column.unit else None
-    header = _header_text(column) if header_unit == Unit("s", time.factor) else ""
-    meant = contradicted_by_epoch(first, time.factor)
-    if meant:
-        also = f", as its header says '{header}'" if header else ""
-        readings = {"readings": both_readings(first, time.factor, stated, meant)}
-        raise RecordingError(
-            f"{path}: the machine file states {stated} for the clock '{column.name}'{also}, but "
-            f"{Finding('header_unit_implausible', '', readings).words_for('readings')}",
-            f'write time = {{ column = "{column.name}", unit = "{meant}" }} in [channels]',
-        )
-    likely, step = contradicted_by_steps(column.values, time.factor)
-    if not likely:
-        return []
-    rate = time.factor / (step * SECONDS[likely])
-    return [
-        Finding(
-            "steps_implausible",
-            "time",
-            {"step": step, "stated": stated, "header": header, "likely": likely, "rate": rate},
-        )
-    ]
-
-
-def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
-    """Return the warning on a clock whose column has another unit than the machine file states, or is not a time.
-
-    If the time stamps count from 1970 in the machine file's unit, the header is wrong and there is no warning.
-    """
-    header_unit = find_unit(column.unit) if column.unit else None
-    if header_unit is not None and header_unit.si == "s":
-        meant = contradicted_by_epoch(_first_stamp(time, column, origin), header_unit.factor)
-        if meant and math.isclose(SECONDS[meant], time.factor):
-            return []
+    first, stated = _first_stamp(time, column, origin), time.unit or "s"
+    header_unit, findings = find_unit(column.unit) if column.unit else None, list[Finding]()
+    if time.rate is None:
+        header = _header_text(column) if header_unit == Unit("s", time.factor) else ""
+        if meant := contradicted_by_epoch(first, time.factor):
+            also = f", as its header says '{header}'" if header else ""
+            readings = {"readings": both_readings(first, time.factor, stated, meant)}
+            raise RecordingError(
+                f"the machine file states {stated} for the clock '{column.name}'{also}, but "
+                f"{Finding('header_unit_implausible', '', readings).words_for('readings')}",
+                f'write time = {{ column = "{column.name}", unit = "{meant}" }} in [channels]',
+            )
+        likely, step = contradicted_by_steps(column.values, time.factor)
+        if likely:
+            rate = time.factor / (step * SECONDS[likely])
+            known = {"step": step, "stated": stated, "header": header, "likely": likely, "rate": rate}
+            findings.append(Finding("steps_implausible", "time", known))
     if header_unit is None or header_unit.si in _PLAIN:
-        return []
-    if header_unit.si == "s" and math.isclose(header_unit.factor, time.factor):
-        return []
-    ratio = _ratio(header_unit, Unit("s", time.factor))
+        return findings
+    if header_unit.si == "s":
+        meant = contradicted_by_epoch(first, header_unit.factor)
+        if math.isclose(header_unit.factor, time.factor) or (meant and math.isclose(SECONDS[meant], time.factor)):
+            return findings
     fact = {
         "header": _header_text(column),
         "header_unit": str(column.unit),
-        "stated": time.unit or "s",
+        "stated": stated,
         "rate": time.rate or 0.0,
-        "ratio": ratio,
+        "ratio": _ratio(header_unit, Unit("s", time.factor)),
     }
-    return [Finding("clock_unit_contradicted", "time", fact)]
+    return [*findings, Finding("clock_unit_contradicted", "time", fact)]
 
 
 def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from cdtool.formats.source import Source
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.recordings.recording import Recording
@@ -14,15 +15,13 @@ from cdtool.recordings.recording import Recording
 class LoggedRecording:
     """A log's channels as logged, in SI, not yet on the load side; `factors` converted the logged numbers to SI.
 
-    `format`, `details` and, of a table of text, `dialect` are what its files state.
+    `headers` are its files without their rows: what they state.
     """
 
     recording: Recording
     factors: Mapping[str, tuple[float, ...]]
     speed_low_pass: float
-    format: str = ""
-    details: Mapping[str, str] = field(default_factory=dict)
-    dialect: str = ""
+    headers: tuple[Source, ...] = ()
 
     def on_load_side(
         self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: tuple[float, float] | None = None

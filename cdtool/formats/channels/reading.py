@@ -1,4 +1,7 @@
-"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece."""
+"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece.
+
+The axes of a force vector whose columns or topics have clocks of their own: joined on one clock, causally.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.errors import ConfigurationError, RecordingError, naming
 from cdtool.base.files.kinds import kind_of
 from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem, log_suffix
@@ -19,15 +22,12 @@ from cdtool.formats import FORMATS
 from cdtool.formats.channels.channel_assembly import assemble_recording
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
 from cdtool.formats.channels.file_beside import add_files_beside
-from cdtool.formats.channels.force_axes import fields_by_axis, join_axes, join_fields
 from cdtool.formats.channels.header_units import unit_findings
 from cdtool.formats.channels.logged_recording import LoggedRecording
 from cdtool.formats.channels.parts import (
     Span,
-    join_details,
     join_recordings,
     join_sources,
-    join_topics,
     loss_findings,
     missing_part_findings,
     named_parts,
@@ -38,13 +38,87 @@ from cdtool.formats.csv.gzipped import MAGIC
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.machine_file import MachineFile
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
-from cdtool.formats.source import Format, Source, in_words
+from cdtool.formats.source import Format, Source
+from cdtool.recordings.clock import HOLD_PERIODS, clean_time, previous_value
 from cdtool.recordings.clock.stamps import epoch_start
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.recordings.recording import Recording, Series
 
+
+def fields_by_axis(channels: ChannelMap) -> ChannelMap:
+    """Return a map of topics in which every axis of a force is a source of its own; any other map is unchanged."""
+    if not any(item.fields for item in channels.sources):
+        return channels
+    return replace(channels, sources=tuple(axis for item in channels.sources for axis in item.by_axis))
+
+
+def join_fields(source: Source, resolved: ChannelMap, wanted: ChannelMap) -> tuple[Source, ChannelMap]:
+    """Return a source in which the fields of a force vector are one column, and its map; the inverse of fields_by_axis.
+
+    `wanted` is the map of the machine file. A vector without one of its axes is missing. Raises RecordingError.
+    """
+    vectors = [item for item in wanted.sources if item.fields]
+    if not vectors:
+        return source, resolved
+    present = {key for item in resolved.sources for key in item.keys}
+    sources = [item for item in resolved.sources if item.channel not in {vector.channel for vector in vectors}]
+    columns, findings = dict(source.columns), list(source.findings)
+    for vector in vectors:
+        keys = [axis.described for axis in vector.by_axis]
+        if not present.issuperset(keys):
+            continue
+        column, notes = join_axes(vector, [source.columns[key] for key in keys])
+        columns[vector.channel] = column
+        findings += notes
+        sources.append(replace(vector, keys=(vector.channel,)))
+    return replace(source, columns=columns, findings=tuple(findings)), replace(resolved, sources=tuple(sources))
+
+
+def join_axes(item: ChannelSource, axes: Sequence[Column]) -> tuple[Column, list[Finding]]:
+    """Return the axes of a force as one column (n, axes), and a note if they have different clocks.
+
+    The clock is then that of the axis with the longest period; of every other axis, each time has the last sample at or
+    before it, NaN if that is older than 5 of its periods. Raises RecordingError if an axis has no sample.
+    """
+    for axis in axes:
+        if axis.time is None or axis.values.ndim != 1 or not len(axis.values):
+            problem = "is not one number per sample" if axis.values.ndim != 1 else "has no sample with a time"
+            raise RecordingError(
+                f"'{axis.name}' (channel '{item.channel}') {problem}",
+                "name one element per axis, each with a clock",
+                channel=item.channel,
+            )
+    first = axes[0].time
+    if all(axis.time is first or np.array_equal(axis.time, first) for axis in axes):  # type: ignore[arg-type]
+        return Column(item.channel, np.column_stack([axis.values for axis in axes]), first), []
+    clean = [_cleaned(item, axis) for axis in axes]
+    slowest = max(range(len(axes)), key=lambda k: clean[k].period if np.isfinite(clean[k].period) else 0.0)
+    clock = clean[slowest].time
+    held = np.column_stack([previous_value(series, clock)[:, 0] for series in clean])
+    ages = [_longest_age(series, clock) for k, series in enumerate(clean) if k != slowest]
+    fact = {"slowest": axes[slowest].name, "age": max(ages, default=0.0)}
+    return Column(item.channel, held, clock), [Finding("axes_held", item.channel, fact)]
+
+
+def _cleaned(item: ChannelSource, axis: Column) -> Series:
+    clean = clean_time(axis.time)  # type: ignore[arg-type]
+    if not len(clean.time):
+        raise RecordingError(f"'{axis.name}' has no sample with a time", channel=item.channel)
+    return Series(clean.time, axis.values[clean.keep], "1")
+
+
+def _longest_age(series: Series, clock: np.ndarray) -> float:
+    """Return the largest age of the samples that are held [s], among those that are not too old."""
+    at = np.searchsorted(series.time, clock, side="right") - 1
+    age = (clock - series.time[np.maximum(at, 0)])[at >= 0]
+    age = age[age <= HOLD_PERIODS * series.period] if np.isfinite(series.period) else age
+    return float(age.max(initial=0.0))
+
+
 # The parts of a log in a folder; the first kind that is there is read.
 _PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
+# What a part of a log is that cannot be read.
+Unread = Literal["error", "loss"]
 # Opens a file of a format, for some or all of its columns.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
 
@@ -78,34 +152,35 @@ _WIDE = {
 
 def choose_format(path: Path) -> Format:
     """Return the format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
-    head = _read_head(path)
-    suffix = log_suffix(path).lower()
-    if suffix == ".toml" and (kind := kind_of(head)):  # its numbers could be read as a table
-        raise RecordingError(f"{path}: is not a recording: it is {kind}", "give a log in its place")
-    for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
-        likely: Format = FORMATS.load(name)()
-        if suffix in likely.suffixes and likely.sniff(path):
-            return likely
-    formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
-    by_suffix = [item for item in formats if suffix in item.suffixes]
-    # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
-    claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
-    for item in [*by_suffix, *formats]:
-        if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
-            return item
-    wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
-    start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
-    content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
-    content = kind_of(head) or content if content == "JSON" else content
-    if wide and not content and _is_damaged_text(path, wide):
+    with naming(path):
+        head = _read_head(path)
+        suffix = log_suffix(path).lower()
+        if suffix == ".toml" and (kind := kind_of(head)):  # its numbers could be read as a table
+            raise RecordingError(f"is not a recording: it is {kind}", "give a log in its place")
+        for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
+            likely: Format = FORMATS.load(name)()
+            if suffix in likely.suffixes and likely.sniff(path):
+                return likely
+        formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
+        by_suffix = [item for item in formats if suffix in item.suffixes]
+        # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
+        claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
+        for item in [*by_suffix, *formats]:
+            if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
+                return item
+        wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
+        start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
+        content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
+        content = kind_of(head) or content if content == "JSON" else content
+        if wide and not content and _is_damaged_text(path, wide):
+            raise RecordingError(
+                f"begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
+            )
+        expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
         raise RecordingError(
-            f"{path}: begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
+            f"is not a recording{f': it is {content}' if content else expected}",
+            _NEXT_STEPS.get(content, f"cdtool reads {', '.join(item.name for item in formats)}"),
         )
-    expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
-    raise RecordingError(
-        f"{path}: is not a recording{f': it is {content}' if content else expected}",
-        _NEXT_STEPS.get(content, f"cdtool reads {', '.join(item.name for item in formats)}"),
-    )
 
 
 def survey(path: Path) -> Source:
@@ -167,16 +242,32 @@ def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRange
     return read_as_logged(path, machine_file).on_load_side(machine_file.machine, ranges)
 
 
-def read_as_logged(
-    path: Path, machine_file: MachineFile, unread: Literal["error", "loss"] = "error"
-) -> LoggedRecording:
+def read_as_logged(path: Path, machine_file: MachineFile, unread: Unread = "error") -> LoggedRecording:
     """Return one log, a file or a folder of parts, as logged; raises RecordingError or ConfigurationError.
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
-    logged = _read_log_itself(path, machine_file, unread)
-    if not (machine_file.columns.beside or machine_file.topics.beside):
-        return logged
+    paths, lost = _parts_of(path, unread) if path.is_dir() else ([path], [])
+    parts: list[Recording] = []
+    headers: list[Source] = []
+    factors: dict[str, tuple[float, ...]] = {}
+    for part in paths:
+        source, channels = mapped_source(part, machine_file)
+        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
+        with naming(part):
+            parts.append(assemble_recording(source, channels, machine_file.machine))
+        headers.append(replace(source, columns={}))
+    name = path.name if path.is_dir() else log_stem(path)
+    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
+    if path.is_dir():
+        whole = replace(whole, source=str(path), findings=(*lost, *whole.findings))
+    if machine_file.columns.beside or machine_file.topics.beside:
+        whole = _with_files_beside(whole, path, machine_file, unread)
+    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
+
+
+def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFile, unread: Unread) -> Recording:
+    """Return the recording of a log with the channels in files beside it."""
     by_topics = has_topics(choose_format(log_parts(path)[0]))
     channels = machine_file.topics if by_topics else machine_file.columns
 
@@ -186,28 +277,20 @@ def read_as_logged(
             topic, _, field = str(name).rpartition(" ")
             source = ChannelSource("trigger", topic=topic, field=field)
         only = replace(channels, sources=(source,), beside=())
-        return _read_log_itself(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
+        return read_as_logged(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
 
-    recording = logged.recording
-    recording = add_files_beside(recording, path, channels, machine_file.machine, _resolved_source, read_trigger)
-    return replace(logged, recording=recording)
+    return add_files_beside(recording, path, channels, machine_file.machine, mapped_source, read_trigger)
 
 
-def _read_log_itself(path: Path, machine_file: MachineFile, unread: Literal["error", "loss"]) -> LoggedRecording:
-    """Return one log without the channels in files beside it."""
-    if not path.is_dir():
-        return read_parts([path], machine_file, log_stem(path))
-    if unread == "loss":
-        folder = LogFolder.of(path)
-        parts, lost = list(folder.filled), list(folder.findings)
-        if not parts:
-            raise RecordingError(f"{path}: no part of the log contains a message", "was the recording stopped at once?")
-    else:
-        parts = log_parts(path)
-        lost = missing_part_findings(path, parts)
-    logged = read_parts(parts, machine_file, path.name)
-    findings = (*lost, *logged.recording.findings)
-    return replace(logged, recording=replace(logged.recording, source=str(path), findings=findings))
+def _parts_of(folder: Path, unread: Unread) -> tuple[list[Path], Sequence[Finding]]:
+    """Return the files of a folder in the order of their times or names, and the losses; raises RecordingError."""
+    if unread == "error":
+        parts = log_parts(folder)
+        return parts, missing_part_findings(folder, parts)
+    log = LogFolder.of(folder)
+    if not log.filled:
+        raise RecordingError(f"{folder}: no part of the log contains a message", "was the recording stopped at once?")
+    return list(log.filled), log.findings
 
 
 @dataclass(frozen=True)
@@ -256,35 +339,39 @@ def log_parts(path: Path) -> list[Path]:
             return parts
     if path.is_dir() and (lost := missing_part_findings(path, [])):
         raise RecordingError(f"{path}: {lost[0]}", "copy the complete folder that rosbag2 wrote")
-    _read_head(path)
+    with naming(path):
+        _read_head(path)
     return [path]
 
 
 def mapped_source(
-    path: Path, machine_file: MachineFile, also: Callable[[bool], ChannelSource] | None = None
+    path: Path, mapping: MachineFile | ChannelMap, also: Callable[[bool], ChannelSource] | None = None
 ) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that the machine file maps, and the map for them; raises RecordingError.
+    """Return the columns of one file that are mapped, and the map for them; raises RecordingError.
 
-    A mapped load cell or label that is not in the file is left out of the map, with a note. `also` returns a further
-    column, given whether the file contains topics; it becomes the last source of the map.
+    The map is that of a machine file for a format of columns or topics, or given. A mapped load cell or label that is
+    not in the file is left out of the map, with a note. `also` returns a further column, given whether the file
+    contains topics; it becomes the last source of the map.
     """
-    return _resolved_source(path, _map_for(choose_format(path), machine_file, path), also)
-
-
-def _resolved_source(
-    path: Path, channels: ChannelMap, also: Callable[[bool], ChannelSource] | None = None
-) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that a map names, with that of `also`, and the map; raises RecordingError."""
     file_format = choose_format(path)
-    if has_topics(file_format) and not channels.topics:
-        raise RecordingError(f"{path}: contains topics, but columns are mapped", "give a file of columns")
+    topics = has_topics(file_format)
+    channels = mapping if isinstance(mapping, ChannelMap) else mapping.topics if topics else mapping.columns
+    if isinstance(mapping, MachineFile) and not channels.sources:
+        section, what = ("[channels.mcap]", "topic and field") if topics else ("[channels]", "column and unit")
+        raise ConfigurationError(
+            f"{mapping.path}: no channel in {section}, which {path} needs",
+            f"write {section} with the {what} of each channel",
+        )
     if also is not None:
-        channels = replace(channels, sources=(*channels.sources, also(channels.topics)))
-    asked = fields_by_axis(channels)
-    source, resolved = resolve_columns(file_format.columns(path, asked), asked)
-    if resolved.time.nanoseconds_key:
-        source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
-    return with_own_clocks(*join_fields(source, resolved, channels))
+        channels = replace(channels, sources=(*channels.sources, also(topics)))
+    with naming(path):
+        if topics and not channels.topics:
+            raise RecordingError("contains topics, but columns are mapped", "give a file of columns")
+        asked = fields_by_axis(channels)
+        source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+        if resolved.time.nanoseconds_key:
+            source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
+        return with_own_clocks(*join_fields(source, resolved, channels))
 
 
 def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: float = 1.0) -> Source:
@@ -301,34 +388,6 @@ def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: flo
 def has_topics(file_format: Format) -> bool:
     """Return True if a format contains messages of topics, mapped by [channels.mcap]; optional for plug-ins."""
     return bool(getattr(file_format, "topics", False))
-
-
-def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
-    """Return the parts of a log as one recording, in the order of their times; raises RecordingError."""
-    parts: list[Recording] = []
-    headers: list[Source] = []
-    factors: dict[str, tuple[float, ...]] = {}
-    for path in paths:
-        source, channels = mapped_source(path, machine_file)
-        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
-        parts.append(assemble_recording(source, channels, machine_file.machine))
-        headers.append(replace(source, columns={}))
-    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
-    details = in_words(join_details(headers), join_topics(headers))
-    return LoggedRecording(whole, factors, channels.speed_low_pass, source.format, details, source.dialect)
-
-
-def _map_for(file_format: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
-    topics = has_topics(file_format)
-    channels = machine_file.topics if topics else machine_file.columns
-    if not channels.sources:
-        section = "[channels.mcap]" if topics else "[channels]"
-        what = "topic and field" if topics else "column and unit"
-        raise ConfigurationError(
-            f"{machine_file.path}: no channel in {section}, which {path} needs",
-            f"write {section} with the {what} of each channel",
-        )
-    return channels
 
 
 def _sniffs_any_text(file_format: Format) -> bool:
@@ -372,20 +431,20 @@ def _first_time(part: Path) -> float:
 def _read_head(path: Path) -> bytes:
     try:
         if path.is_dir():
-            raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
+            raise RecordingError("is a folder", "name the recordings in it, e.g. with *.csv")
         if not path.exists():
             whole, mark, _ = str(path).rpartition("#")
             is_run = mark and location(whole).exists()
             hint = f"for a run of {whole}, state how it is cut, as detect --operations column:NAME" if is_run else ""
-            raise RecordingError(f"{path}: no such file", hint or "check the path")
+            raise RecordingError("no such file", hint or "check the path")
         if not path.is_file():
-            raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")
+            raise RecordingError("is not a regular file", "save the stream to a file first")
         with path.open("rb") as file:
             head = file.read(512)
     except OSError as fault:
-        raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the file's permissions") from fault
+        raise RecordingError(f"cannot be read: {fault.strerror}", "check the file's permissions") from fault
     if not head or (head.startswith(MAGIC) and not read_sample(path, 1)):
-        raise RecordingError(f"{path}: is empty", "was the recording stopped at once, or the copy cut off?")
+        raise RecordingError("is empty", "was the recording stopped at once, or the copy cut off?")
     return head
 
 
@@ -403,8 +462,7 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
         return replace(source, columns=plain), channels
     if channels.time.factor != 1.0:
         raise ConfigurationError(
-            f"{source.path}: its own clock is in s, but [channels] time states another unit",
-            'time = { column = "time", unit = "s" }',
+            "its own clock is in s, but [channels] time states another unit", 'time = { column = "time", unit = "s" }'
         )
     joined, notes = dict[str, Column](), list[Finding]()
     for item in channels.sources:
@@ -421,18 +479,18 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
 def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]:
     parts = [source.columns[key] for key in item.keys]
     if item.axes and all(part.time is not None for part in parts):
-        return join_axes(source.path, item, parts)
+        return join_axes(item, parts)
     time = parts[0].time
     for part in parts:
         if part.time is None or time is None:
             raise RecordingError(
-                f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock",
+                f"column '{part.name}' (channel '{item.channel}') has no clock",
                 "name the column with its clock in [channels] time",
                 channel=item.channel,
             )
         if not np.array_equal(part.time, time):
             raise RecordingError(
-                f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
+                f"'{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
                 "all joints of a channel must have the same clock",
                 channel=item.channel,
             )

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.errors import ConfigurationError, RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.plain_text import counted, first_of
@@ -28,7 +28,8 @@ from cdtool.formats.channels.reading import log_parts, mapped_source
 from cdtool.formats.channels.run_segments import Rows, Segments, segments_by_id, segments_by_reset
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import MachineFile
-from cdtool.formats.source import Source, in_words
+from cdtool.formats.source import Source
+from cdtool.machines.dynamics import Machine
 from cdtool.recordings.operations import RunCut
 from cdtool.recordings.recording import GROUND_TRUTH
 
@@ -106,37 +107,14 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
             f"{machine_file.path}: a channel in a file of its own cannot be divided into the runs of {path}",
             "write each run to a log of its own, or map a channel of the log",
         )
-    whole = _CutLog.of(path, machine_file, cut)
-    segments = whole.segments
-    lengths = whole.lengths
-    long_enough = np.flatnonzero(lengths >= FEWEST_SAMPLES)
-    if not len(long_enough):
-        raise whole.no_run(int(lengths.max(initial=0)))
-    names = segments.names(long_enough)
-    chosen = [(int(run), name) for run, name in zip(long_enough, names, strict=True) if _fits(name, pattern)]
-    if not chosen:
-        raise RecordingError(f"{path}: no run '{pattern}'", f"its runs are {first_of(names)}")
-    digest = join_digests([file_digest(part) for part in whole.files])
-    runs: list[LoggedRecording] = []
-    left_out: list[tuple[Path, str]] = []
-    for run, name in chosen:
-        try:
-            runs.append(whole.recording(run, name, digest))
-        except RecordingError as fault:
-            left_out.append((location(f"{path}{_MARK}{name}"), str(fault).removeprefix(f"{path}{_MARK}{name}: ")))
-    if not runs:
-        raise RecordingError(f"{left_out[0][0]}: {left_out[0][1]}", "check the log with cdtool info")
-    findings = [*whole.source.findings, *whole.outside()]
-    later = tuple(name for (run, name) in chosen if segments.number[run])
-    if later and cut.by == "column":
-        findings.append(Finding("returning_ids", "", {"names": later, "column": cut.column}))
-    short = np.flatnonzero(lengths < FEWEST_SAMPLES)
-    if pattern:
-        fits = [_fits(name, pattern) for name in segments.names(short)]
-        short = short[np.array(fits, dtype=bool)]
-    if len(short):
-        left_out.append((path, _too_short(segments, short, lengths)))
-    return LogRuns(tuple(runs), tuple(findings), tuple(left_out))
+    files = log_parts(path)
+    also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
+    mapped = [mapped_source(file, machine_file, also) for file in files]
+    with naming(path):
+        channels = _common_map([item for _, item in mapped])
+        source = _joined(path, [item for item, _ in mapped]) if path.is_dir() else mapped[0][0]
+        whole = _by_reset(source, channels, cut) if also is None else _by_id(source, channels, cut)
+        return whole.runs(pattern, machine_file.machine, join_digests([file_digest(file) for file in files]))
 
 
 def _fits(name: str, pattern: str) -> bool:
@@ -174,96 +152,50 @@ class _CutLog:
     table by 0. `begins` (r,) is when the runs begin [s], where ids have a clock of their own.
     """
 
-    path: Path
     source: Source
     channels: ChannelMap
     cut: RunCut
-    machine_file: MachineFile
-    files: tuple[Path, ...]
     segments: Segments
-    rows: Mapping[int, Sequence[Rows]] = field(default_factory=dict)
+    rows: Mapping[int, Sequence[Rows]]
     begins: FloatArray | None = None
 
-    @classmethod
-    def of(cls, path: Path, machine_file: MachineFile, cut: RunCut) -> _CutLog:
-        """Read and cut a log; raises RecordingError."""
-        files = tuple(log_parts(path))
-        also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
-        mapped = [mapped_source(file, machine_file, also) for file in files]
-        channels = _common_map(path, [item for _, item in mapped])
-        source = _joined(path, [item for item, _ in mapped]) if path.is_dir() else mapped[0][0]
-        ids: Column | None = None
-        if cut.by != "clock-reset":
-            *others, last = channels.sources
-            ids = source.columns[last.keys[0]]
-            if ids.words and any(last.keys[0] in other.keys for other in others):
-                raise RecordingError(f"{path}: column '{cut.column}' has texts", "map another column to the channel")
-            channels = replace(channels, sources=tuple(others))
-        log = cls(path, source, channels, cut, machine_file, files, _none())
-        return log._by_reset() if ids is None else log._by_id(ids)
+    def runs(self, pattern: str, machine: Machine, digest: str) -> LogRuns:
+        """Return the runs whose ids fit a pattern; raises RecordingError if none can be used."""
+        path, segments = self.source.path, self.segments
+        counts = [list(map(len, rows)) for rows in self.rows.values()]  # a run is as long as its longest channel
+        lengths = np.max(counts, axis=0) if counts else np.zeros(0, dtype=np.intp)
+        long_enough = np.flatnonzero(lengths >= FEWEST_SAMPLES)
+        if not len(long_enough):
+            raise self.no_run(int(lengths.max(initial=0)))
+        names = segments.names(long_enough)
+        chosen = [(int(run), name) for run, name in zip(long_enough, names, strict=True) if _fits(name, pattern)]
+        if not chosen:
+            raise RecordingError(f"no run '{pattern}'", f"its runs are {first_of(names)}")
+        runs: list[LoggedRecording] = []
+        left_out: list[tuple[Path, str]] = []
+        for run, name in chosen:
+            try:
+                runs.append(self.recording(run, name, machine, digest))
+            except RecordingError as fault:
+                left_out.append((location(f"{path}{_MARK}{name}"), str(fault)))
+        if not runs:
+            raise RecordingError(f"{left_out[0][0]}: {left_out[0][1]}", "check the log with cdtool info")
+        findings = [*self.source.findings, *self.outside()]
+        later = tuple(name for (run, name) in chosen if segments.number[run])
+        if later and self.cut.by == "column":
+            findings.append(Finding("returning_ids", "", {"names": later, "column": self.cut.column}))
+        short = np.flatnonzero(lengths < FEWEST_SAMPLES)
+        if pattern:
+            fits = [_fits(name, pattern) for name in segments.names(short)]
+            short = short[np.array(fits, dtype=bool)]
+        if len(short):
+            left_out.append((path, _too_short(segments, short, lengths)))
+        return LogRuns(tuple(runs), tuple(findings), tuple(left_out))
 
-    def _by_id(self, ids: Column) -> _CutLog:
-        values = ids.values.reshape(len(ids.values), -1)
-        if values.shape[1] != 1:
-            raise RecordingError(
-                f"{self.path}: column '{self.cut.column}' (channel '{_ID}') has {values.shape[1]} values per sample",
-                "select one element, e.g. data[0]",
-            )
-        bridged = self.cut.by == "column"
-        if not self.channels.topics:
-            segments = segments_by_id(values[:, 0], ids.words, bridged)
-            return replace(self, segments=segments, rows={0: _consecutive(segments)})
-        assert ids.time is not None
-        time, id_values = ids.time, values[:, 0]
-        if np.any(time[1:] < time[:-1]):
-            order = np.argsort(time, kind="stable")
-            time, id_values = time[order], id_values[order]
-        segments = segments_by_id(id_values, ids.words, bridged)
-        begins = time[segments.start]
-        ends = np.append(time, np.inf)[segments.stop]
-        rows = {clock: _between(time, begins, ends) for clock, time in self._clocks().items()}
-        return replace(self, segments=segments, rows=rows, begins=begins)
-
-    def _by_reset(self) -> _CutLog:
-        if any(item.topic for item in self.channels.sources):
-            raise RecordingError(
-                f"{self.path}: messages are in the order of their times: their clock cannot start again",
-                'cut them by a field: by = "column:TOPIC FIELD"',
-            )
-        if not self.channels.topics:
-            if self.channels.time.column is None:
-                raise RecordingError(
-                    f"{self.path}: has no clock that could start again: [channels] time states a rate",
-                    'cut it by a column: by = "column:NAME"',
-                )
-            segments = segments_by_reset(self.source.columns[self.channels.time.key].values)
-            return replace(self, segments=segments, rows={0: _consecutive(segments)})
-        found = {clock: segments_by_reset(time) for clock, time in self._clocks().items()}
-        counts = sorted({len(item) for item in found.values()})
-        if len(counts) > 1:
-            raise RecordingError(
-                f"{self.path}: its clocks start again at different numbers of places: "
-                f"{' and '.join(str(count - 1) for count in counts)}",
-                'cut it by a column: by = "column:NAME"',
-            )
-        rows = {clock: _consecutive(segments) for clock, segments in found.items()}
-        return replace(self, segments=next(iter(found.values())), rows=rows)
-
-    def _clocks(self) -> dict[int, FloatArray]:
-        """Return the clocks of the channels by their identity; empty for a table."""
-        columns = (self.source.columns[key] for item in self.channels.sources for key in item.keys)
-        return {id(column.time): column.time for column in columns if column.time is not None}
-
-    @property
-    def lengths(self) -> Rows:
-        """The samples (r,) of each run, in the channel with most of them."""
-        counts = [list(map(len, rows)) for rows in self.rows.values()]
-        return np.max(counts, axis=0) if counts else np.zeros(0, dtype=np.intp)
-
-    def recording(self, run: int, name: str, digest: str) -> LoggedRecording:
+    def recording(self, run: int, name: str, machine: Machine, digest: str) -> LoggedRecording:
         """Return a run as logged; raises RecordingError if a channel has no sample in it."""
-        path = location(f"{self.path}{_MARK}{name}")
         source, first_row = self.source, self.source.first_row
+        path = location(f"{source.path}{_MARK}{name}")
         times, start = self._times(run)
         columns: dict[str, Column] = {}
         for key, column in source.columns.items():
@@ -277,11 +209,10 @@ class _CutLog:
         mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
         origin = source.origin + start
         part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=tuple(absent))
-        recording = assemble_recording(part, channels, self.machine_file.machine, mark)
-        recording = replace(recording, name=f"{log_stem(self.path)}{_MARK}{name}")
+        recording = assemble_recording(part, channels, machine, mark)
+        recording = replace(recording, name=f"{log_stem(source.path)}{_MARK}{name}")
         factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
-        details = in_words(source.details, source.topics)
-        return LoggedRecording(recording, factors, channels.speed_low_pass, source.format, details, source.dialect)
+        return LoggedRecording(recording, factors, channels.speed_low_pass, (replace(source, columns={}),))
 
     def _times(self, run: int) -> tuple[dict[int, FloatArray], float]:
         """Return the times of a run by clock, and their start [s].
@@ -289,7 +220,11 @@ class _CutLog:
         A message's time, and one that counts from an epoch, is what it is in a file with this run alone: it counts from
         the run's start.
         """
-        times = {clock: time[self.rows[clock][run]] for clock, time in self._clocks().items() if clock in self.rows}
+        times = {
+            clock: time[self.rows[clock][run]]
+            for clock, time in _clocks(self.source, self.channels).items()
+            if clock in self.rows
+        }
         if not self.source.origin and not any(item.topic for item in self.channels.sources):
             return times, 0.0
         starts = [float(time[0]) for time in times.values() if len(time)]
@@ -335,13 +270,69 @@ class _CutLog:
         """Return the error for a log without a run that can be used."""
         if not len(self.segments):
             return RecordingError(
-                f"{self.path}: column '{self.cut.column}' has no value in any sample", "name the column of the runs"
+                f"column '{self.cut.column}' has no value in any sample", "name the column of the runs"
             )
         return RecordingError(
-            f"{self.path}: none of {counted(len(self.segments), 'run')} by {_described(self.cut)} has "
+            f"none of {counted(len(self.segments), 'run')} by {_described(self.cut)} has "
             f"{FEWEST_SAMPLES} samples: the longest has {longest}",
             "see cdtool info" if self.cut.by == "clock-reset" else "name a column whose value stays the same in a run",
         )
+
+
+def _by_id(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
+    """Cut a log by the ids in the last column of the map, beside the channels; raises RecordingError."""
+    *others, last = channels.sources
+    channels = replace(channels, sources=tuple(others))
+    ids = source.columns[last.keys[0]]
+    if ids.words and any(last.keys[0] in other.keys for other in others):
+        raise RecordingError(f"column '{cut.column}' has texts", "map another column to the channel")
+    values = ids.values.reshape(len(ids.values), -1)
+    if values.shape[1] != 1:
+        raise RecordingError(
+            f"column '{cut.column}' (channel '{_ID}') has {values.shape[1]} values per sample",
+            "select one element, e.g. data[0]",
+        )
+    time, id_values = ids.time, values[:, 0]
+    if channels.topics and time is not None and np.any(time[1:] < time[:-1]):
+        order = np.argsort(time, kind="stable")
+        time, id_values = time[order], id_values[order]
+    segments = segments_by_id(id_values, ids.words, cut.by == "column")
+    if not channels.topics or time is None:
+        return _CutLog(source, channels, cut, segments, {0: _consecutive(segments)})
+    begins, ends = time[segments.start], np.append(time, np.inf)[segments.stop]
+    rows = {clock: _between(stamps, begins, ends) for clock, stamps in _clocks(source, channels).items()}
+    return _CutLog(source, channels, cut, segments, rows, begins)
+
+
+def _by_reset(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
+    """Cut a log where its clocks start again; raises RecordingError."""
+    if any(item.topic for item in channels.sources):
+        raise RecordingError(
+            "messages are in the order of their times: their clock cannot start again",
+            'cut them by a field: by = "column:TOPIC FIELD"',
+        )
+    if not channels.topics and channels.time.column is None:
+        raise RecordingError(
+            "has no clock that could start again: [channels] time states a rate",
+            'cut it by a column: by = "column:NAME"',
+        )
+    clocks = _clocks(source, channels) if channels.topics else {0: source.columns[channels.time.key].values}
+    found = {clock: segments_by_reset(time) for clock, time in clocks.items()}
+    counts = sorted({len(item) for item in found.values()})
+    if len(counts) > 1:
+        raise RecordingError(
+            f"its clocks start again at different numbers of places: "
+            f"{' and '.join(str(count - 1) for count in counts)}",
+            'cut it by a column: by = "column:NAME"',
+        )
+    rows = {clock: _consecutive(segments) for clock, segments in found.items()}
+    return _CutLog(source, channels, cut, next(iter(found.values())), rows)
+
+
+def _clocks(source: Source, channels: ChannelMap) -> dict[int, FloatArray]:
+    """Return the clocks of the channels by their identity; empty for a table."""
+    columns = (source.columns[key] for item in channels.sources for key in item.keys)
+    return {id(column.time): column.time for column in columns if column.time is not None}
 
 
 def _consecutive(segments: Segments) -> list[Rows]:
@@ -358,20 +349,15 @@ def _between(time: FloatArray, begins: FloatArray, ends: FloatArray) -> list[Row
     return np.split(order, np.searchsorted(run[order], np.arange(1, len(begins) + 1)))[: len(begins)]
 
 
-def _none() -> Segments:
-    nothing = np.empty(0, dtype=np.intp)
-    return Segments(nothing, nothing, np.empty(0), nothing, {})
-
-
 def _described(cut: RunCut) -> str:
     return cut.by if cut.by == "clock-reset" else f"{cut.by} '{cut.column}'"
 
 
-def _common_map(path: Path, maps: Sequence[ChannelMap]) -> ChannelMap:
+def _common_map(maps: Sequence[ChannelMap]) -> ChannelMap:
     """Return the map of all parts of a log; raises RecordingError if their channels differ."""
     for other in maps[1:]:
         if [item.channel for item in other.sources] != [item.channel for item in maps[0].sources]:
-            raise RecordingError(f"{path}: its parts have different channels", "cut each part as a log of its own")
+            raise RecordingError("its parts have different channels", "cut each part as a log of its own")
     return maps[0]
 
 
@@ -384,7 +370,7 @@ def _joined(path: Path, parts: Sequence[Source]) -> Source:
     for key in first.columns:
         own = [part.columns[key] for part in ordered]
         if len({item.values.shape[1:] for item in own}) > 1:
-            raise RecordingError(f"{path}: the length of '{key}' differs between its parts", "select one element")
+            raise RecordingError(f"the length of '{key}' differs between its parts", "select one element")
         times = [item.time for item in own if item.time is not None]
         clock = tuple(map(id, times))
         if clock not in clocks:

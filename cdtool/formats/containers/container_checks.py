@@ -23,12 +23,12 @@ _LARGEST_EXACT = 2**53
 _FILTERS_WITHOUT_COMPRESSION = (2, 3)
 
 
-def library(module: str, extra: str, path: Path) -> Any:
+def library(module: str, extra: str) -> Any:
     """Return an optional library; raises RecordingError that names the extra if the library is not installed."""
     try:
         return import_module(module)
     except ImportError as fault:
-        raise RecordingError(f"{path}: {module.partition('.')[0]} is not installed", installing(extra)) from fault
+        raise RecordingError(f"{module.partition('.')[0]} is not installed", installing(extra)) from fault
 
 
 def check_size(path: Path, values: int) -> None:
@@ -36,7 +36,7 @@ def check_size(path: Path, values: int) -> None:
     declared = min(8 * values, 2**63)  # a product of damaged dimensions may exceed every float
     if declared > _FREE and declared > _RATIO * (size := path.stat().st_size):
         raise RecordingError(
-            f"{path}: unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",
+            f"unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",
             "name fewer columns in the machine file, or save it without compression",
         )
 
@@ -50,11 +50,11 @@ def check_chunks(path: Path, name: str, dataset: Any) -> None:
     properties = dataset.id.get_create_plist()
     filters = [properties.get_filter(i)[0] for i in range(properties.get_nfilters())]
     if sum(number not in _FILTERS_WITHOUT_COMPRESSION for number in filters) > 1:
-        raise RecordingError(f"{path}: dataset '{name}' is compressed more than once: refused", "save it again")
+        raise RecordingError(f"dataset '{name}' is compressed more than once: refused", "save it again")
 
 
 @contextmanager
-def one_line_errors(path: Path, kind: str) -> Iterator[None]:
+def one_line_errors(kind: str) -> Iterator[None]:
     """Raise any error of a library as one RecordingError."""
     try:
         yield
@@ -62,7 +62,7 @@ def one_line_errors(path: Path, kind: str) -> Iterator[None]:
         raise
     except Exception as fault:  # damaged bytes cause errors of any type
         reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
-        raise RecordingError(f"{path}: damaged or not {kind}: {reason}", "copy or save it again") from fault
+        raise RecordingError(f"damaged or not {kind}: {reason}", "copy or save it again") from fault
 
 
 def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> FloatArray:

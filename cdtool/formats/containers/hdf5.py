@@ -143,14 +143,14 @@ class Hdf5(PiecewiseFormat):
         return False
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        h5py = library("h5py", "hdf5", path)
+        h5py = library("h5py", "hdf5")
         findings: list[Finding] = []
-        with one_line_errors(path, "an HDF5 file"), h5py.File(path, "r") as file:
+        with one_line_errors("an HDF5 file"), h5py.File(path, "r") as file:
             tree = _Datasets(path, h5py, file, findings, wanted.worded if wanted is not None else ())
             names = tuple(tree.locations)
-            keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
+            keys = [key for key in requested_keys(wanted, names) if some is None or key in some]
             if not keys:
-                raise RecordingError(f"{path}: has no dataset of numbers", "list its contents with h5dump -n")
+                raise RecordingError("has no dataset of numbers", "list its contents with h5dump -n")
             check_size(path, sum(tree.rows(key) for key in keys))
             for name in dict.fromkeys(tree.locations[key][0] for key in keys):
                 check_chunks(path, name, tree.datasets[name])

@@ -26,7 +26,7 @@ def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Ma
 
     Raises OSError if the disk is full or cannot be written.
     """
-    h5py = library("h5py", "hdf5", path)
+    h5py = library("h5py", "hdf5")
     # An exception within the library's calls of `write` would leave it with a file that it cannot close.
     with deferred_signals() as deliver, _CheckedFile(path, "wb+") as disk:
 

@@ -60,18 +60,18 @@ class Mdf(PiecewiseFormat):
             return file.read(8) in _MAGICS
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        asammdf = _library(path)
+        asammdf = _library()
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its problems are reported as errors or findings
         findings: list[Finding] = []
         with path.open("rb") as file:
             unfinished = file.read(8) == _MAGICS[1]
-        with one_line_errors(path, "an MDF file"), _opened(asammdf, path) as log:
+        with one_line_errors("an MDF file"), _opened(asammdf, path) as log:
             if unfinished:
                 findings.append(Finding("never_finalised"))
             channels = _channels(log, findings)
-            keys = [key for key in requested_keys(path, wanted, tuple(channels)) if some is None or key in some]
+            keys = [key for key in requested_keys(wanted, tuple(channels)) if some is None or key in some]
             if not keys:
-                raise RecordingError(f"{path}: has no channel of numbers", "see cdtool info")
+                raise RecordingError("has no channel of numbers", "see cdtool info")
             check_size(path, sum(log.groups[channels[key][0]].channel_group.cycles_nr for key in keys))
             columns: list[SlicedColumn] = []
             for key in keys:
@@ -79,9 +79,9 @@ class Mdf(PiecewiseFormat):
                 if column is not None:
                     columns.append(column)
                 elif wanted is not None:
-                    raise RecordingError(f"{path}: channel '{key}' is not numeric", "map another channel")
+                    raise RecordingError(f"channel '{key}' is not numeric", "map another channel")
             if not columns:
-                raise RecordingError(f"{path}: has no channel of numbers", "see cdtool info")
+                raise RecordingError("has no channel of numbers", "see cdtool info")
             yield from interleave(columns)
             stated = _ORIGIN.search(str(log.header.description)) if hasattr(log.header, "description") else None
             details = {"version": str(log.version), "start": str(log.start_time)}
@@ -90,13 +90,13 @@ class Mdf(PiecewiseFormat):
         return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, tuple(channels))
 
 
-def _library(path: Path) -> Any:
+def _library() -> Any:
     """Return asammdf; raises RecordingError if it is not installed.
 
     A log that is interrupted while it is made is closed by its destructor, which needs an attribute that it does not
     have yet: it is closed until it is open.
     """
-    asammdf = library("asammdf", "mdf", path)
+    asammdf = library("asammdf", "mdf")
     for module, name in (("asammdf.blocks.mdf_v4", "MDF4"), ("asammdf.blocks.mdf_v3", "MDF3")):
         version = getattr(import_module(module), name)
         version._closed = getattr(version, "_closed", True)
@@ -117,7 +117,7 @@ def _opened(asammdf: Any, path: Path) -> Any:
         clear_frames(fault.__traceback__)
     gc.collect()
     sys.unraisablehook = hook
-    raise RecordingError(f"{path}: damaged or not an MDF file: {reason}", "copy or save it again")
+    raise RecordingError(f"damaged or not an MDF file: {reason}", "copy or save it again")
 
 
 def _channels(log: Any, findings: list[Finding]) -> dict[str, tuple[int, int]]:
@@ -190,8 +190,8 @@ def _time_factor(log: Any, group: int) -> float | None:
 
 def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
     """Write MDF 4.10: one channel per column with its unit, one group per clock; provenance as the file's comment."""
-    asammdf = _library(path)
-    require_clocks(path, groups)
+    asammdf = _library()
+    require_clocks(groups)
     shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with asammdf.MDF(version="4.10") as log:
         # The log's own start, or the epoch: with the time of writing the same log would give different bytes.

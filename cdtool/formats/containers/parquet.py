@@ -48,19 +48,19 @@ class Parquet(PiecewiseFormat):
         return head == _ARROW or head.startswith(_PARQUET)
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        arrow = library("pyarrow", "parquet", path)
+        arrow = library("pyarrow", "parquet")
         findings: list[Finding] = []
-        with one_line_errors(path, "a Parquet or Feather file"):
+        with one_line_errors("a Parquet or Feather file"):
             table = _ArrowTable(path, arrow, findings, wanted.worded if wanted is not None else ())
             names = tuple(table.schema.names)
-            keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
+            keys = [key for key in requested_keys(wanted, names) if some is None or key in some]
             read = [key for key in keys if table.is_number(key)]
             findings += [left_out_finding(key, str(table.schema.field(key).type)) for key in keys if key not in read]
             not_read = [key for key in keys if key not in read]
             if wanted is not None and not_read:
-                raise RecordingError(f"{path}: column '{not_read[0]}' is not numeric", "map another column")
+                raise RecordingError(f"column '{not_read[0]}' is not numeric", "map another column")
             if not read:
-                raise RecordingError(f"{path}: has no column of numbers", "see cdtool info")
+                raise RecordingError("has no column of numbers", "see cdtool info")
             yield from table.pieces(read)
         details = {"rows": str(table.rows), "container": table.kind}
         unique = tuple(dict.fromkeys(findings))
@@ -79,7 +79,7 @@ class _ArrowTable:
         with path.open("rb") as file:
             self.kind = "parquet" if file.read(4) == _PARQUET else "feather"
         if self.kind == "parquet":
-            self._file = library("pyarrow.parquet", "parquet", path).ParquetFile(os.fspath(path))
+            self._file = library("pyarrow.parquet", "parquet").ParquetFile(os.fspath(path))
             self.schema, self._batches = self._file.schema_arrow, self._of_parquet
         else:
             self._file = _Feather(path, arrow, findings)
@@ -173,12 +173,12 @@ class _Feather:
 
     def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
         self._path, self._arrow, self._findings = path, arrow, findings
-        self._ipc = library("pyarrow.ipc", "parquet", path)
+        self._ipc = library("pyarrow.ipc", "parquet")
         try:
             self._whole = self._ipc.open_file(os.fspath(path))
             self.schema = self._whole.schema
             # A batch is decompressed as a whole; this counts its rows by its head.
-            counted = library("pyarrow.dataset", "parquet", path).dataset(os.fspath(path), format="feather")
+            counted = library("pyarrow.dataset", "parquet").dataset(os.fspath(path), format="feather")
             check_size(path, counted.count_rows() * len(self.schema.names))
         except arrow.ArrowInvalid:
             self._whole = None

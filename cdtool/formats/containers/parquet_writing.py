@@ -36,10 +36,10 @@ def write_feather(path: Path, groups: Sequence[Group], parts: Parts, provenance:
 def _write_table(
     path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str], *, feather: bool
 ) -> WrittenNames:
-    arrow = library("pyarrow", "parquet", path)
+    arrow = library("pyarrow", "parquet")
     several = len(groups) > 1
     if several:
-        require_clocks(path, groups)
+        require_clocks(groups)
     columns = [Column(OWN_CLOCK, np.empty(0), unit="s")] if several or groups[0].own_clock else []
     columns += [column for group in groups for column in chain(*group.flat)]
     fields = [
@@ -59,10 +59,10 @@ def _write_table(
 def _opened(arrow: Any, path: Path, schema: Any, *, feather: bool) -> Iterator[Callable[[Any], None]]:
     """Yield a function that writes the next rows of the file; it buffers them until a row group is full."""
     if feather:
-        ipc = library("pyarrow.ipc", "parquet", path)
+        ipc = library("pyarrow.ipc", "parquet")
         writer = ipc.new_file(str(path), schema, options=ipc.IpcWriteOptions(compression="zstd"))
     else:
-        writer = library("pyarrow.parquet", "parquet", path).ParquetWriter(path, schema, compression="zstd")
+        writer = library("pyarrow.parquet", "parquet").ParquetWriter(path, schema, compression="zstd")
     buffered: list[Any] = []
     group_rows = max(_FEWEST_ROWS, _VALUES // len(schema.names))
 

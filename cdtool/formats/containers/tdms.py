@@ -52,17 +52,17 @@ class Tdms(PiecewiseFormat):
             return file.read(len(_MAGIC)) == _MAGIC
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        nptdms = library("nptdms", "tdms", path)
+        nptdms = library("nptdms", "tdms")
         findings: list[Finding] = []
         with (
-            one_line_errors(path, "a TDMS file"),
+            one_line_errors("a TDMS file"),
             collect_warnings("nptdms") as warnings,
             nptdms.TdmsFile.open(os.fspath(path)) as file,
         ):
             channels = _channels(file, findings)
-            keys = [key for key in requested_keys(path, wanted, tuple(channels)) if some is None or key in some]
+            keys = [key for key in requested_keys(wanted, tuple(channels)) if some is None or key in some]
             if not keys:
-                raise RecordingError(f"{path}: has no channel of numbers", "see cdtool info")
+                raise RecordingError("has no channel of numbers", "see cdtool info")
             check_size(path, sum(len(channels[key]) for key in keys))
             incomplete = getattr(file.file_status, "incomplete_final_segment", False)
             if incomplete:
@@ -213,7 +213,7 @@ def _unit(channel: Any) -> str | None:
 
 def write_tdms(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
     """Write one channel per column with its unit, one group per clock with its `time`, and one segment per part."""
-    nptdms = library("nptdms", "tdms", path)
+    nptdms = library("nptdms", "tdms")
     many = len(groups) > 1
     shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with nptdms.TdmsWriter(str(path)) as writer:

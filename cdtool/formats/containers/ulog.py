@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, ClassVar
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import requested_keys
@@ -53,19 +53,20 @@ class Ulog:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all columns of numbers; raises RecordingError."""
-        pyulog = library("pyulog", "ulog", path)
-        with one_line_errors(path, "a ULog file"), redirect_stdout(StringIO()) as printed:
-            _check_formats(path, pyulog)
-            with path.open("rb") as file:
-                ends = _EndCheck(file)
-                log = pyulog.ULog(ends)
-        findings = _losses(log, ends, printed.getvalue())
-        topics = _Topics(log.data_list, findings)
-        keys = requested_keys(path, wanted, topics.names)
-        if not keys:
-            raise RecordingError(f"{path}: contains no message with numbers", "was the logger stopped at once?")
-        check_size(path, sum(len(topics.fields[key][1]) for key in keys))
-        columns, origin = topics.columns(keys)
+        with naming(path):
+            pyulog = library("pyulog", "ulog")
+            with one_line_errors("a ULog file"), redirect_stdout(StringIO()) as printed:
+                _check_formats(path, pyulog)
+                with path.open("rb") as file:
+                    ends = _EndCheck(file)
+                    log = pyulog.ULog(ends)
+            findings = _losses(log, ends, printed.getvalue())
+            topics = _Topics(log.data_list, findings)
+            keys = requested_keys(wanted, topics.names)
+            if not keys:
+                raise RecordingError("contains no message with numbers", "was the logger stopped at once?")
+            check_size(path, sum(len(topics.fields[key][1]) for key in keys))
+            columns, origin = topics.columns(keys)
         return Source(path, self.name, columns, origin, tuple(findings), _details(log), topics.names)
 
 
@@ -108,7 +109,7 @@ def _check_formats(path: Path, pyulog: Any) -> None:
 
     def count(name: str, inside: tuple[str, ...]) -> int:
         if name in inside or len(inside) > _MOST_FIELDS:
-            raise RecordingError(f"{path}: damaged: message '{name}' contains itself", "copy it again")
+            raise RecordingError(f"damaged: message '{name}' contains itself", "copy it again")
         if name not in known:
             sizes = (
                 max(1, size) * (count(kind, (*inside, name)) if kind in formats else 1)
@@ -116,9 +117,7 @@ def _check_formats(path: Path, pyulog: Any) -> None:
             )
             known[name] = sum(sizes)
         if known[name] > _MOST_FIELDS:
-            raise RecordingError(
-                f"{path}: message '{name}' has more than {_MOST_FIELDS} fields: refused", "is it a log?"
-            )
+            raise RecordingError(f"message '{name}' has more than {_MOST_FIELDS} fields: refused", "is it a log?")
         return known[name]
 
     for name in formats:

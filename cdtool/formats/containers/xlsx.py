@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys, split_unit
@@ -75,12 +75,12 @@ class Xlsx:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError."""
-        openpyxl = library("openpyxl", "xlsx", path)
-        with one_line_errors(path, "an Excel workbook"), TemporaryDirectory(prefix="cdtool-") as folder:
+        with naming(path), one_line_errors("an Excel workbook"), TemporaryDirectory(prefix="cdtool-") as folder:
+            openpyxl = library("openpyxl", "xlsx")
             sheets = _read_sheets(path, openpyxl, Path(folder))
             tables = [sheet for sheet in sheets if sheet.rows_of_numbers > 1]
             if not tables:
-                raise RecordingError(f"{path}: no sheet contains rows of numbers", "is it the right workbook?")
+                raise RecordingError("no sheet contains rows of numbers", "is it the right workbook?")
             source = tables[0].source(wanted) if len(tables) == 1 else _join(path, tables, wanted)
         left_out = tuple(
             Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": "it contains no rows of numbers"})
@@ -122,7 +122,7 @@ class _Sheet:
         try:
             source = Csv().columns(self.file, wanted)
         except RecordingError as fault:
-            message = fault.message.replace(f"{self.file}", f"{self.path}: sheet '{self.name}'", 1)
+            message = fault.message.replace(f"{self.file}", f"sheet '{self.name}'", 1)
             raise RecordingError(message, fault.hint, channel=fault.channel) from fault
         shown = {i: name for i, name in enumerate(source.names) if name in source.columns}
         findings = [
@@ -146,7 +146,7 @@ class _Sheet:
         for row in rows:
             if len(lines) >= _MOST_ROWS or len(row) > _MOST_COLUMNS:
                 raise RecordingError(
-                    f"{self.path}: a sheet has more than {_MOST_COLUMNS} columns or {_MOST_ROWS} rows: refused",
+                    f"a sheet has more than {_MOST_COLUMNS} columns or {_MOST_ROWS} rows: refused",
                     "delete the columns and rows that contain no data",
                 )
             texts = [self._text(cell, column, len(lines) + 1) for column, cell in enumerate(row)]
@@ -269,7 +269,7 @@ def _check_archive(path: Path, archive: zipfile.ZipFile) -> None:
     check_size(path, sum(part.file_size for part in parts) // 8)
     for part in parts:
         if part.filename.endswith("sharedStrings.xml") and part.file_size > _MOST_TEXT:
-            raise RecordingError(f"{path}: contains {part.file_size >> 20} MiB of texts: refused", "save it as CSV")
+            raise RecordingError(f"contains {part.file_size >> 20} MiB of texts: refused", "save it as CSV")
 
 
 def _join(path: Path, tables: list[_Sheet], wanted: ChannelMap | None) -> Source:
@@ -280,12 +280,12 @@ def _join(path: Path, tables: list[_Sheet], wanted: ChannelMap | None) -> Source
         try:
             sources[sheet] = sheet.source()
         except RecordingError as fault:
-            reason = fault.message.replace(f"{path}: sheet '{sheet.name}': ", "", 1)
+            reason = fault.message.replace(f"sheet '{sheet.name}': ", "", 1)
             findings.append(Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": reason}, "loss"))
     if not sources:
-        raise RecordingError(f"{path}: no sheet can be read: {findings[0]}", "save each sheet as CSV")
+        raise RecordingError(f"no sheet can be read: {findings[0]}", "save each sheet as CSV")
     names = tuple(f"{sheet.name}!{name}" for sheet, source in sources.items() for name in source.names)
-    keys = requested_keys(path, wanted, names)
+    keys = requested_keys(wanted, names)
     own_clocks = wanted is None or wanted.time.column == OWN_CLOCK
     start = min((source.origin for source in sources.values() if source.origin), default=0.0)
     columns: dict[str, Column] = {}
@@ -306,7 +306,7 @@ def _join(path: Path, tables: list[_Sheet], wanted: ChannelMap | None) -> Source
         columns |= found
     missing = [key for key in keys if key not in columns]
     if wanted is not None and missing:
-        raise RecordingError(f"{path}: column '{missing[0]}' has cells that are not numbers", "see cdtool info")
+        raise RecordingError(f"column '{missing[0]}' has cells that are not numbers", "see cdtool info")
     origin = common_origin([] if start else [clock for clock, _ in clock_of.values()])
     times = {key: clock.times(0, count, origin) for key, (clock, count) in clock_of.items()}
     shown = {key: replace(column, name=key, time=times.get(key)) for key, column in columns.items() if key in {*keys}}

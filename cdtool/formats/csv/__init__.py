@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError, UsageError
+from cdtool.base.errors import RecordingError, UsageError, naming
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
 from cdtool.formats.columns import Column, Piece
@@ -55,44 +55,36 @@ class Csv:
             return False
         return bool(head.strip() or read_sample(path).strip()) and looks_like_text(head)
 
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line."""
-        if wanted is None:
-            return self.columns_by(path, TablePins())
-        return _read_wanted(path, _dialect(path, wanted.pins), wanted)
+    def columns(self, path: Path, wanted: ChannelMap | None = None, pins: TablePins | None = None) -> Source:
+        """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line.
 
-    def columns_by(self, path: Path, pins: TablePins) -> Source:
-        """Return all numeric columns of a table with pins; raises RecordingError with the line."""
+        `pins` are in place of those of the map.
+        """
         from cdtool.formats.csv.several_clocks import Clocks
         from cdtool.formats.csv.table import read_table
+        from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
-        dialect = _dialect(path, pins)
-        table = read_table(path, dialect, dialect.names)
-        return join_pieces(_by_clock(path, dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
+        with naming(path):
+            dialect = find_dialect(path, pins or (TablePins() if wanted is None else wanted.pins))
+            if wanted is not None:
+                return _read_wanted(dialect, wanted)
+            table = read_table(dialect, dialect.names)
+            return join_pieces(_by_clock(dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
         from cdtool.formats.csv.several_clocks import Clocks
         from cdtool.formats.csv.table import table_pieces
+        from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
-        dialect = _dialect(path, TablePins())
-        clocks = Clocks.by_names(dialect)
-        # The last column is always read: it shows whether the file's end is complete.
-        read = dialect.names if keys is None else {*keys, dialect.names[-1]}
-        if len(clocks.groups) > 1:
-            read = {*read, *(dialect.names[i] for i in clocks.columns)}
-        return (yield from _by_clock(path, dialect, clocks, keys, table_pieces(path, dialect, read)))
-
-
-def _dialect(path: Path, pins: TablePins) -> Dialect:
-    from cdtool.formats.csv.text import SAMPLE_BYTES, read_sample, read_small
-    from cdtool.formats.csv_dialect.find_dialect import find_dialect
-
-    content = read_small(path)
-    sample = read_sample(path) if content is None else content[:SAMPLE_BYTES]
-    if not sample.strip():
-        raise RecordingError(f"{path}: is empty", "was the recording stopped immediately, or the copy cut off?")
-    return find_dialect(path, sample, pins, content)
+        with naming(path):
+            dialect = find_dialect(path, TablePins())
+            clocks = Clocks.by_names(dialect)
+            # The last column is always read: it shows whether the file's end is complete.
+            read = dialect.names if keys is None else {*keys, dialect.names[-1]}
+            if len(clocks.groups) > 1:
+                read = {*read, *(dialect.names[i] for i in clocks.columns)}
+            return (yield from _by_clock(dialect, clocks, keys, table_pieces(dialect, read)))
 
 
 def _as_piece(table: TextTable) -> Generator[Piece, None, TextTable]:
@@ -102,7 +94,6 @@ def _as_piece(table: TextTable) -> Generator[Piece, None, TextTable]:
 
 
 def _by_clock(
-    path: Path,
     dialect: Dialect,
     clocks: Clocks,
     keys: Collection[str] | None,
@@ -115,16 +106,16 @@ def _by_clock(
     table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys, stated)
     table.findings += findings
     if origin is None:
-        return _source(path, dialect, table)
+        return _source(dialect, table)
     times = {dialect.names[column] for column in clocks.columns}
     kept = {key for key in table.values if key not in times and (keys is None or key in keys)}
     table.values = {key: values for key, values in table.values.items() if key in kept}
-    source = _source(path, dialect, table)
+    source = _source(dialect, table)
     columns = {key: replace(column, time=np.empty(0)) for key, column in source.columns.items()}
-    return replace(source, columns=columns, origin=origin or written_origin(path), first_row=0)
+    return replace(source, columns=columns, origin=origin or written_origin(dialect.text.path), first_row=0)
 
 
-def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
+def _read_wanted(dialect: Dialect, wanted: ChannelMap) -> Source:
     from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clocks
     from cdtool.formats.csv.table import read_table
 
@@ -133,27 +124,27 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     clocks = Clocks.by_names(dialect, clock)
     own = time.column == OWN_CLOCK and time.factor == 1.0
     if len(clocks.groups) < 2 or (clock is None and not own):
-        return _source(path, dialect, read_table(path, dialect, wanted_keys(path, wanted, names), clock, wanted))
-    keys = wanted_keys(path, wanted if clock is not None else replace(wanted, time=TimeSource()), names)
-    table = read_table(path, dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
+        return _source(dialect, read_table(dialect, wanted_keys(wanted, names), clock, wanted))
+    keys = wanted_keys(wanted if clock is not None else replace(wanted, time=TimeSource()), names)
+    table = read_table(dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
     other = [] if clock is None else other_clocks(dialect, clocks, clock, keys, table.values)
     if other and not own:
         beside = f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}'"
         differs = other[0].words_for("difference[what]")
-        raise RecordingError(f"{path}: {beside}, but the machine file names '{clock}': {differs}", HINT)
+        raise RecordingError(f"{beside}, but the machine file names '{clock}': {differs}", HINT)
     if clock is not None and not other:
         table.values = {key: values for key, values in table.values.items() if key in keys}
-        return _source(path, dialect, table)
+        return _source(dialect, table)
     if clock is not None:  # back to the file's values, which can be compared with the other clocks
         table.values[clock] = table.values[clock] + table.origin
     channels = [key for key in keys if key != clock]
     for key in channels:
         if dialect.names.index(key) not in clocks.of:
-            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
-    return join_pieces(_by_clock(path, dialect, clocks, channels, _as_piece(table), stated=True), sort=False)
+            raise RecordingError(f"no clock is beside column '{key}'", "name its clock in [channels] time")
+    return join_pieces(_by_clock(dialect, clocks, channels, _as_piece(table), stated=True), sort=False)
 
 
-def _source(path: Path, dialect: Dialect, table: TextTable) -> Source:
+def _source(dialect: Dialect, table: TextTable) -> Source:
     from cdtool.formats.csv.several_clocks import unit_from_header
 
     columns = {
@@ -166,10 +157,10 @@ def _source(path: Path, dialect: Dialect, table: TextTable) -> Source:
         for key, values in table.values.items()
     }
     return Source(
-        path=path,
+        path=dialect.text.path,
         format=Csv.name,
         columns=columns,
-        origin=table.origin or written_origin(path),
+        origin=table.origin or written_origin(dialect.text.path),
         findings=(*dialect.findings, *table.findings),
         details=dialect.details,
         names=dialect.names,

@@ -12,8 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.formats.channels.channel_map import TablePins
+from cdtool.formats.csv.cells import NULLS, kind, split_line
+from cdtool.formats.csv.lines import COMMENTS
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.formats.csv_dialect.head import LABVIEW_UNITS
+from cdtool.formats.csv_dialect.marks import Marks
 
 # Samples with fewer rows, or with more lines above the rows, are not shortened.
 _FEWEST_ROWS, _MOST_ABOVE = 100, 40
@@ -36,6 +40,38 @@ class ShorterSample:
     separator: str
     width: int
 
+    def plain(self, text: Text) -> Dialect | None:
+        """Return the dialect of the whole sample, without pins, if names are all that is above the rows; else None.
+
+        With two columns a line of names may also state a unit.
+        """
+        line, *rows = text.decode(self.stream).replace("\r", "").split("\n")[:-1]
+        names, cells = split_line(line, self.separator), {cell for row in rows for cell in row.split(self.separator)}
+        if self.first != 2 or not 2 < len({*names}) == self.width == len(names) or text.encoding != "utf-8":
+            return None
+        if {*map(kind, cells)} != {"N"} or '"' in line or names[0] == LABVIEW_UNITS:
+            return None
+        if not all(name[:1].isalpha() and kind(name) == "X" for name in names):
+            return None
+        mark = "," if self.separator != "," and any("," in cell for cell in cells) else "."
+        return Dialect(
+            text=text,
+            pins=TablePins(),
+            separator=self.separator,
+            marks=Marks(mark, sure=any(mark in cell for cell in cells)),
+            comment=COMMENTS[0],
+            missing=NULLS,
+            header=tuple(names),
+            header_line=1,
+            header_text=(line,),
+            first_line=self.first,
+            sampled=self.left_out + len(rows),
+            offset=self.stream.index(b"\n") + 1,
+            width=self.width,
+            kinds="N" * self.width,
+            words={},
+        )
+
     def whole(self, dialect: Dialect) -> Dialect | None:
         """Return the dialect of the whole sample, given that of `stream`; None if the two may differ."""
         if (dialect.separator, dialect.width) != (self.separator, self.width) or dialect.first_line > self.first:
@@ -50,7 +86,8 @@ class ShorterSample:
 def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample | None:
     """Return the shortened sample; None if its rows are not alike or are few."""
     pinned_line = max(pins.skip_lines, int(pins.header or 0), int(pins.units or 0))
-    if text.line_end != b"\n" or pinned_line > _MOST_ABOVE or _begins_rows(pins.comment or ""):
+    may_begin_rows = bool(pins.comment) and str(pins.comment)[0] in "+-.,;|\t nN0123456789"
+    if text.line_end != b"\n" or pinned_line > _MOST_ABOVE or may_begin_rows:
         return None
     if text.size > SAMPLE_BYTES or stream.endswith(b"\n"):
         stream = stream[: stream.rfind(b"\n") + 1]
@@ -88,11 +125,6 @@ def _alike(rows: bytes, separator: bytes, width: int) -> int:
     filled[:, -1] = np.diff(places)[width - 1 :: width] > 1 + rows.endswith(b"\r\n")
     alike = filled[:, :-1].all() and filled[:, -1].all() == filled[:, -1].any()
     return lines if alike and not before_signs.translate(None, b"\neE" + separator) else 0
-
-
-def _begins_rows(comment: str) -> bool:
-    """Return whether rows of numbers may start with a pinned comment mark."""
-    return bool(comment) and comment[0] in "+-.,;|\t nN0123456789"
 
 
 def _separator(stream: bytes) -> bytes | None:

@@ -121,7 +121,7 @@ class CellValues:
         elif STAMP_LIKE.fullmatch(cell):
             problem = "is not a number, nor a date or time with a known layout"
         where = f"line {line}, column '{self.dialect.names[column]}'"
-        return RecordingError(f"{self.dialect.text.path}: {where}: {cell[:60]!r} {problem}", hint)
+        return RecordingError(f"{where}: {cell[:60]!r} {problem}", hint)
 
     def _not_numeric(self, line: int, cell: str, column: int) -> Finding:
         numbers = {"column": self.dialect.names[column], "line": line, "cell": cell}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.gzipped import is_gzipped, measure
-from cdtool.formats.csv.text import UNIT_BYTES, Text, recoded
+from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text, read_sample, read_small, recoded
 from cdtool.formats.csv_dialect.east_asian import east_asian
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
@@ -55,18 +55,27 @@ def looks_like_text(sample: bytes) -> bool:
     return not controls or (b"\0" not in text and controls <= max(_FEW, _SHARE * len(text)))
 
 
+def open_table(path: Path, encoding: str, most: int = SAMPLE_BYTES) -> tuple[Text, bytes]:
+    """Return the encoding and line ends of a text, and its first bytes; raises RecordingError if it is empty."""
+    content = read_small(path)
+    sample = read_sample(path, most) if content is None else content[:most]
+    if not sample.strip():
+        raise RecordingError("is empty", "was the recording stopped immediately, or the copy cut off?")
+    return detect_text(path, sample, encoding, content)
+
+
 def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | None = None) -> tuple[Text, bytes]:
     """Return encoding and line ends, and the sample as part of the stream; raises RecordingError.
 
     `content` are all bytes of the file if they have been read.
     """
     if not looks_like_text(sample):
-        raise RecordingError(f"{path}: is not a table of numbers: binary or markup", "name a CSV, MCAP or MAT file")
+        raise RecordingError("is not a table of numbers: binary or markup", "name a CSV, MCAP or MAT file")
     marked, mark = _by_mark(sample)
     encoding = pinned or marked or _wide_without_mark(sample) or _narrow(sample)
     if pinned and marked and codecs.lookup(pinned).name != marked:
         raise RecordingError(
-            f"{path}: line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
+            f"line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
         )
     stream = sample[mark:]
@@ -76,13 +85,13 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     total, size = _without_padding(path, content)
     stream = stream[: max(size - mark, 0)]
     if pinned and encoding not in UNIT_BYTES:
-        _check_pinned(path, stream, encoding)
+        _check_pinned(stream, encoding)
     head = stream[:HEAD_BYTES]
     control = _CONTROL.search(head) if head.translate(None, _ALLOWED) else None
     if control is not None:
         line = stream.count(b"\n", 0, control.start()) + 1
         raise RecordingError(
-            f"{path}: line {line} contains a control character (byte 0x{control[0][0]:02x})",
+            f"line {line} contains a control character (byte 0x{control[0][0]:02x})",
             "save the table as plain text, without terminal colours",
         )
     # A single line feed at the end of a file with carriage returns does not count as its line end.
@@ -124,14 +133,14 @@ def _narrow(sample: bytes) -> str:
     return "utf-8"
 
 
-def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
+def _check_pinned(stream: bytes, encoding: str) -> None:
     try:
         codecs.getincrementaldecoder(encoding)().decode(stream)
     except UnicodeError as fault:
         at = getattr(fault, "start", 0)
         line = stream.count(b"\n", 0, at) + 1
         raise RecordingError(
-            f"{path}: line {line} is not valid {encoding}, as [csv] encoding states", "correct or remove encoding"
+            f"line {line} is not valid {encoding}, as [csv] encoding states", "correct or remove encoding"
         ) from fault
 
 

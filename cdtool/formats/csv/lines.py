@@ -77,7 +77,7 @@ def refuse_long_line(text: Text, stream: bytes) -> None:
     left = len(stream) - stream.rfind(text.line_end) - 1
     if text.size > SAMPLE_BYTES and 2 * left > SAMPLE_BYTES:
         raise RecordingError(
-            f"{text.path}: line {stream.count(text.line_end) + 1} continues after the first {SAMPLE_BYTES >> 10} KB, "
+            f"line {stream.count(text.line_end) + 1} continues after the first {SAMPLE_BYTES >> 10} KB, "
             "which are searched for the head of a table",
             "is it a table? a table with fewer columns can be read",
         )

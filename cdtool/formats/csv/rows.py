@@ -35,6 +35,8 @@ _BY_LINES = 1 << 14
 # pandas reads the nearest float64 by itself since 3.1; before that it must be asked.
 _VERSION = tuple(map(int, pd.__version__.split(".")[:2]))
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _VERSION < (3, 1) else {}
+# The number of plain rows, and by their column the numbers and the texts of their cells.
+PlainRows = tuple[int, dict[int, FloatArray], dict[int, list[str]]]
 _END = re.compile(r"(?:.*(?P<mark>[.,eE]))?[+-]?(?P<digits>[0-9]*)")
 
 
@@ -62,17 +64,6 @@ class RowReader:
         self.lines = TableLines(dialect, self.values)
         self.findings: list[Finding] = []
         self._texts = sorted({*requested.stamps, *requested.whole})
-        encoding = dialect.text.stream_encoding
-        comment = dialect.comment.encode(encoding, "replace")
-        # pandas cannot read a repeated header as a row, unless its words are in other columns.
-        cells = {text.strip(): split_line(text, dialect.separator) for text in dialect.header_text}
-        headers = [
-            text.encode(encoding, "replace")
-            for text, words in cells.items()
-            if not any(kind(cell) == "X" for i, cell in enumerate(words) if i in requested.numeric)
-        ]
-        self._odd = [mark for mark in (b'"', b"\0", comment, *headers) if mark]
-        self._missing = [*MISSING, *(text.encode(encoding, "replace").decode("latin-1") for text in dialect.missing)]
 
     def pieces(self) -> Iterator[Rows]:
         """Yield the rows block by block; after the last one `findings` are those on lines, cells and the file's end.
@@ -105,81 +96,17 @@ class RowReader:
 
     def _plain(self, block: bytes, ended: bool) -> Rows | None:
         """Return the rows of a block that has only plain rows; None if it may have anything else."""
-        dialect, separator = self.dialect, self.dialect.separator.encode()
-        if dialect.text.line_end != b"\n" or self.requested.categories:
+        if self.lines.may_end or self.requested.categories:
             return None
-        if separator != b" " and b'"' in block:
-            block = without_quotes(block, separator)
-        if self.lines.may_end or any(mark in block for mark in self._odd):
+        if (plain := plain_rows(self.dialect, self.values.numeric, self._texts, block, ended)) is None:
             return None
-        if separator == b" ":  # one between two cells
-            block = re.sub(rb"^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block), flags=re.MULTILINE)
-        data, width = np.frombuffer(block, dtype=np.uint8), dialect.width
-        count = int(np.count_nonzero(data == ord("\n"))) + (not ended)
-        seem_full = np.count_nonzero(data == separator[0]) == count * (width - 1)
-        if not seem_full and not self._have_cells(data, ended):
-            return None
-        if dialect.trailing and sum(block.count(separator + end) for end in (b"\n", b"\r\n")) < count:
-            return None
-        try:
-            with catch_warnings(action="error", category=pd.errors.ParserWarning):
-                numbers, texts = self._parsed(block)
-        except (ValueError, pd.errors.ParserWarning):  # a cell is not a number in plain notation; a first row too long
-            return None
+        count, numbers, texts = plain
         whole, unread = self._whole(texts)
-        if unread or {*map(len, numbers.values()), *map(len, texts.values())} != {count}:  # line ends are mixed
-            return None
-        if np.isnan(numbers.get(width - 1, np.nan)).any() and (
-            width == 1  # a blank line is no row
-            or (seem_full and not self._have_cells(data, ended))
-        ):
+        if unread:
             return None
         self.lines.line += count
         self.lines.rows += count
         return Rows(self.lines.rows - count, count, self.lines.line - 1, numbers, whole)
-
-    def _have_cells(self, data: npt.NDArray[np.uint8], ended: bool) -> bool:
-        """Return whether each line has as many cells as a row."""
-        ends = np.flatnonzero(data == ord("\n")) if ended else [*np.flatnonzero(data == ord("\n")), len(data)]
-        separators = np.flatnonzero(data == ord(self.dialect.separator))
-        cells = 1 + np.diff(np.searchsorted(separators, ends), prepend=0)
-        short = cells[cells != self.dialect.width]
-        return all(self.dialect.may_end_after(each) for each in np.unique(short)) and (
-            ended or cells[-1] == self.dialect.width
-        )
-
-    def _parsed(self, block: bytes) -> tuple[dict[int, FloatArray], dict[int, list[str]]]:
-        """Return the columns of numbers and the texts of the others, as parsed by pandas.
-
-        The bytes are decoded as Latin-1, one letter each: a stamp that is not ASCII cannot be read.
-        """
-        columns = [*self.values.numeric, *self._texts]
-        dtypes: Any = np.float64  # one type is quicker than one for each column
-        if self._texts:
-            dtypes = dict.fromkeys(columns, np.float64) | dict.fromkeys(self._texts, np.object_)
-        frame = pd.read_csv(
-            io.BytesIO(block),
-            sep=self.dialect.separator,
-            header=None,
-            names=range(self.dialect.width),
-            usecols=None if len(columns) == self.dialect.width else columns,
-            index_col=False,
-            dtype=dtypes,
-            engine="c",
-            encoding="latin-1",
-            skip_blank_lines=False,
-            keep_default_na=False,
-            na_values=self._missing,
-            quoting=csv.QUOTE_NONE,
-            skipinitialspace=b" " in block,
-            decimal=self.dialect.marks.decimal,
-            low_memory=False,
-            **_EXACT,
-        )
-        texts = {
-            column: [cell.strip(" \t") for cell in frame.pop(column).fillna("").tolist()] for column in self._texts
-        }
-        return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True)), texts
 
     def _by_lines(self, block: bytes, ended: bool) -> Iterator[Rows]:
         """Yield the rows of a block of any lines."""
@@ -251,6 +178,91 @@ class RowReader:
         rows.whole = {column: values[:-1] for column, values in rows.whole.items()}
         self.lines.rows -= 1
         return [] if text.padding else [Finding("last_line_dropped", "", fact)]
+
+
+def plain_rows(
+    dialect: Dialect, numeric: Sequence[int], texts: Sequence[int], block: bytes, ended: bool
+) -> PlainRows | None:
+    """Return the plain rows of a block that has no others, as read by pandas; None if it may have anything else.
+
+    `ended`: the last line has a line end.
+    """
+    separator, width = dialect.separator.encode(), dialect.width
+    if dialect.text.line_end != b"\n":
+        return None
+    if separator != b" " and b'"' in block:
+        block = without_quotes(block, separator)
+    # A repeated header is no row, even if its words are in columns that are not read.
+    encoding = dialect.text.stream_encoding
+    odd = (text.strip().encode(encoding, "replace") for text in (dialect.comment, *dialect.header_text))
+    if any(mark in block for mark in (b'"', b"\0", *odd) if mark):
+        return None
+    if separator == b" ":  # one between two cells
+        block = re.sub(rb"^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block), flags=re.MULTILINE)
+    data = np.frombuffer(block, dtype=np.uint8)
+    count = int(np.count_nonzero(data == ord("\n"))) + (not ended)
+    seem_full = np.count_nonzero(data == separator[0]) == count * (width - 1)
+    if not seem_full and not _have_cells(dialect, data, ended):
+        return None
+    if dialect.trailing and sum(block.count(separator + end) for end in (b"\n", b"\r\n")) < count:
+        return None
+    try:
+        with catch_warnings(action="error", category=pd.errors.ParserWarning):
+            numbers, words = _parsed(dialect, numeric, texts, block)
+    except (ValueError, pd.errors.ParserWarning):  # a cell is not a number in plain notation; a first row too long
+        return None
+    if {*map(len, numbers.values()), *map(len, words.values())} != {count}:  # line ends are mixed
+        return None
+    if np.isnan(numbers.get(width - 1, np.nan)).any() and (
+        width == 1  # a blank line is no row
+        or (seem_full and not _have_cells(dialect, data, ended))
+    ):
+        return None
+    return count, numbers, words
+
+
+def _have_cells(dialect: Dialect, data: npt.NDArray[np.uint8], ended: bool) -> bool:
+    """Return whether each line has as many cells as a row."""
+    ends = np.flatnonzero(data == ord("\n")) if ended else [*np.flatnonzero(data == ord("\n")), len(data)]
+    separators = np.flatnonzero(data == ord(dialect.separator))
+    cells = 1 + np.diff(np.searchsorted(separators, ends), prepend=0)
+    short = cells[cells != dialect.width]
+    return all(dialect.may_end_after(each) for each in np.unique(short)) and (ended or cells[-1] == dialect.width)
+
+
+def _parsed(
+    dialect: Dialect, numeric: Sequence[int], texts: Sequence[int], block: bytes
+) -> tuple[dict[int, FloatArray], dict[int, list[str]]]:
+    """Return the columns of numbers and the texts of the others, as parsed by pandas.
+
+    The bytes are decoded as Latin-1, one letter each: a stamp that is not ASCII cannot be read.
+    """
+    columns = [*numeric, *texts]
+    dtypes: Any = np.float64  # one type is quicker than one for each column
+    if texts:
+        dtypes = dict.fromkeys(columns, np.float64) | dict.fromkeys(texts, np.object_)
+    missing = [text.encode(dialect.text.stream_encoding, "replace").decode("latin-1") for text in dialect.missing]
+    frame = pd.read_csv(
+        io.BytesIO(block),
+        sep=dialect.separator,
+        header=None,
+        names=range(dialect.width),
+        usecols=None if len(columns) == dialect.width else columns,
+        index_col=False,
+        dtype=dtypes,
+        engine="c",
+        encoding="latin-1",
+        skip_blank_lines=False,
+        keep_default_na=False,
+        na_values=[*MISSING, *missing],
+        quoting=csv.QUOTE_NONE,
+        skipinitialspace=b" " in block,
+        decimal=dialect.marks.decimal,
+        low_memory=False,
+        **_EXACT,
+    )
+    cells = {column: [cell.strip(" \t") for cell in frame.pop(column).fillna("").tolist()] for column in texts}
+    return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True)), cells
 
 
 def without_quotes(block: bytes, separator: bytes) -> bytes:

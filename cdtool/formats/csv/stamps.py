@@ -56,7 +56,7 @@ _YEARS = (1680, 2260)
 
 
 @dataclass(frozen=True)
-class Layout:
+class StampLayout:
     """A layout of time stamps; `dated` if it has a day, `timed` if it has an hour."""
 
     pattern: str
@@ -153,12 +153,12 @@ class StampLayouts:
     `doubt` is the reason why the fraction of a second can be read in two ways; empty if it is unambiguous.
     """
 
-    layouts: tuple[Layout, ...]
+    layouts: tuple[StampLayout, ...]
     example: str = ""
     doubt: str = ""
 
     @property
-    def layout(self) -> Layout | None:
+    def layout(self) -> StampLayout | None:
         """Return the layout if it is unambiguous, otherwise None."""
         return self.layouts[0] if len(self.layouts) == 1 and not self.doubt else None
 
@@ -187,7 +187,7 @@ def find_layout(cells: Sequence[str], pinned: str = "") -> StampLayouts:
     ]
     if not texts or not (pinned or likely):
         return StampLayouts(())
-    possible = [Layout(pinned)] if pinned else [x for x in _known() if (x.read_all(likely) != MISSING_STAMP).any()]
+    possible = [StampLayout(pinned)] if pinned else [x for x in _known() if (x.read_all(likely) != MISSING_STAMP).any()]
     # All days are needed to decide between two orders of day and month; for times of day some cells are sufficient.
     first_of_day = {text.split()[0]: text for text in texts} if len(possible) > 1 else {}
     checked = list(dict.fromkeys((*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values())))
@@ -195,7 +195,7 @@ def find_layout(cells: Sequence[str], pinned: str = "") -> StampLayouts:
     counts = {layout: int(np.count_nonzero(read != MISSING_STAMP)) for layout, read in stamps.items()}
     most = max(counts.values(), default=0)
     matching = [layout for layout in possible if counts[layout] == most and 2 * most >= len(checked)]
-    different: dict[bytes, Layout] = {}
+    different: dict[bytes, StampLayout] = {}
     for layout in matching:
         different.setdefault(stamps[layout].tobytes(), layout)
     example = next((text for text in checked if len({item.read(text) for item in different.values()}) > 1), texts[0])
@@ -222,12 +222,12 @@ def _fraction_doubt(texts: Sequence[str]) -> str:
 
 
 @cache
-def _known() -> tuple[Layout, ...]:
+def _known() -> tuple[StampLayout, ...]:
     patterns = [*_TIMES, _MINUTES, *(date for date in _DATES if date != "%Y%m%d")]
     for date in _DATES:
         for time in _TIMES:
             patterns += [f"{date} {time}", f"{date} {time}%z"]
-    return tuple(Layout(pattern) for pattern in patterns)
+    return tuple(StampLayout(pattern) for pattern in patterns)
 
 
 def unwrap(stamps: Integers, period: int = _DAY) -> int:

@@ -1,6 +1,12 @@
 """Read the columns of a text table as float64 (time stamps as seconds), with findings on losses and skipped lines.
 
 A table is read at once, or block by block if it need not fit into memory.
+
+Clocks of numbers: days as counted by Excel, and stamps with more digits than float64 can represent.
+
+45231.5417 days since 1899-12-30 are 2023-11-01 13:00. Stamps such as 1700000000123456789 ns or 1700000000.123456789 s
+count from 1970. They are read a second time, as whole nanoseconds, and the first stamp is subtracted before anything is
+rounded: float64 represents the stamps with a resolution of 0.24 us only, but their differences exactly.
 """
 
 from __future__ import annotations
@@ -10,23 +16,97 @@ from collections import Counter
 from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
-from pathlib import Path
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
+from cdtool.base.plain_text import digits
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import column_key
 from cdtool.formats.columns import Categories, Piece
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
-from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
-from cdtool.formats.csv.rows import RowReader, Rows
-from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, Layout, seconds_since, unwrap
+from cdtool.formats.csv.rows import RowReader, Rows, plain_rows
+from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, StampLayout, seconds_since, unwrap
+from cdtool.formats.csv.text import BLOCK_BYTES
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import PieceRun
+from cdtool.recordings.clock.stamps import EPOCH, count_leading_strays
+
+# Days since 1899-12-30, as counted by Excel, of 1970-01-01, and of the start of the years 2000 and 2100.
+_DAY_1970, _FIRST_DAY, _LAST_DAY = 25569.0, 36526.0, 73051.0
+DAY_S = 86400.0
+# A clock in days steps by less than 10 s [days]; a clock that steps by less than this in seconds samples above 20 kHz.
+_DAYS_STEP, _SECONDS_STEP = 10.0 / DAY_S, 5e-5
+# A unit's factor to s -> its decimals down to 1 ns.
+_DECIMALS = {1.0: 9, 1e-3: 6, 1e-6: 3, 1e-9: 0}
+# Above _FIRST [s] float64 cannot represent nanoseconds; up to _LAST [s] 64-bit integers can.
+_FIRST, _LAST = 2.0**53 / NS, 2.0**63 / NS
+
+
+def two_readings(stamps: FloatArray, factor: float) -> str:
+    """Return both readings of a clock that may be in days or in the unit of `factor` [s]; empty if it is not in days.
+
+    `stamps` (n,) are all stamps of the column; missing ones are ignored. The step is the mean over the middle half:
+    stamps with four decimals repeat, and the first or last stamp may be an outlier. A clock above 20 kHz whose stamps
+    are in the range of the days from 2000 to 2100 cannot be distinguished from a clock in days.
+    """
+    known = stamps[np.isfinite(stamps)]
+    if len(known) < 2 or known.max() <= _FIRST_DAY or not _FIRST_DAY < np.median(known) < _LAST_DAY:
+        return ""
+    quarter = len(known) // 4
+    step = float(known[-1 - quarter] - known[quarter]) / (len(known) - 1 - 2 * quarter)
+    if not 0.0 < step < min(_DAYS_STEP, _SECONDS_STEP / factor):
+        return ""
+    start = np.datetime64(round(since_1970(float(known[0]))), "s")
+    return (
+        f"starts at {known[0]:.9g} in steps of {step:.3g}: days of Excel ({str(start).replace('T', ' ')}, "
+        f"{digits(1.0 / (step * DAY_S), 3)} Hz), or {known[0] * factor:.9g} s at {digits(1.0 / (step * factor), 3)} Hz?"
+    )
+
+
+def since_1970(days: float) -> float:
+    """Return the seconds since 1970 of a day as counted by Excel."""
+    return (days - _DAY_1970) * DAY_S
+
+
+def exact_differences(
+    dialect: Dialect, column: int, stamps: FloatArray, factor: float
+) -> tuple[FloatArray, float] | None:
+    """Return the stamps (n,) minus the first one, in the column's unit, and the first stamp [s].
+
+    The result is None if float64 can represent the stamps. `factor` is the factor from the unit to s. Outliers are not
+    used as the first stamp. Stamps that are not plain digits (in quotes, with an exponent) are rounded to float64;
+    missing stamps are NaN.
+    """
+    decimals = _DECIMALS.get(factor)
+    if decimals is None or np.fmax.reduce(stamps, initial=-np.inf) * factor <= _FIRST:  # the usual case
+        return None
+    known = np.isfinite(stamps)
+    if not known.any():
+        return None
+    first_row = count_leading_strays(stamps[known], EPOCH / factor)
+    if not _is_large(stamps[known] * factor, first_row):
+        return None
+    scale = 10**decimals
+    whole = np.rint(stamps[known])
+    exact = np.zeros(len(stamps), dtype=np.int64)
+    exact[known] = whole.astype(np.int64) * scale + np.rint((stamps[known] - whole) * scale).astype(np.int64)
+    reader = RowReader(dialect, RequestedColumns((), whole=(column,), decimals=decimals), survey=True)
+    ticks = np.concatenate([rows.whole[column] for rows in reader.pieces()])[: len(stamps)]
+    plain = ticks != MISSING_STAMP
+    exact[plain] = ticks[plain]
+    start = int(exact[known][first_row])
+    differences = np.full(len(stamps), np.nan)
+    differences[known] = (exact[known] - start) / scale
+    return differences, start / NS
+
+
+def _is_large(seconds: FloatArray, first: int) -> bool:
+    return bool(seconds[first] > _FIRST and np.all(np.abs(seconds) < _LAST))
+
 
 # A total is of so many rows, and as exact as the written numbers are.
 _FEWEST_SUMMED, _SAME_SUM = 3, 1e-6
@@ -79,7 +159,7 @@ class StampColumns:
     def _dated(self, column: int) -> bool:
         return self._layout(column).dated or column in self._dates
 
-    def _layout(self, column: int) -> Layout:
+    def _layout(self, column: int) -> StampLayout:
         return self._dialect.stamped[column].layouts[0]
 
     def _start(self, column: int) -> int:
@@ -119,10 +199,35 @@ class TextTable:
 
 
 def read_table(
-    path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
+    dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> TextTable:
     """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
-    run = PieceRun(table_pieces(path, dialect, keys, clock, wanted))
+    table = None if wanted is None or wanted.worded else _plain_table(dialect, keys)
+    table = table or _joined_blocks(dialect, keys, clock, wanted)
+    if clock is not None and wanted is not None:
+        _set_clock(dialect, table, clock, wanted)
+    return table
+
+
+def _plain_table(dialect: Dialect, keys: Collection[str]) -> TextTable | None:
+    """Return a small table that has only numbers in plain rows, read at once; None if it may have anything else."""
+    text, names = dialect.text, dialect.names
+    if dialect.stamped or text.padding or text.content is None or not 0 < len(text.content) <= BLOCK_BYTES:
+        return None
+    rows, columns = (
+        text.content[text.mark + dialect.offset : text.size],
+        [i for i, name in enumerate(names) if name in keys],
+    )
+    plain = plain_rows(dialect, columns, (), rows, ended=True) if rows.endswith(b"\n") and columns else None
+    if plain is None:
+        return None
+    values = {names[column]: plain[1][column] for column in columns}
+    return TextTable(values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))])
+
+
+def _joined_blocks(dialect: Dialect, keys: Collection[str], clock: str | None, wanted: ChannelMap | None) -> TextTable:
+    """Return the columns of a table that is read block by block."""
+    run = PieceRun(table_pieces(dialect, keys, clock, wanted))
     first, *more = islice(pieces := iter(run), 2)
     values, count = first.values, first.rows
     if more:  # in one array per column: half the memory of a list of pieces
@@ -134,14 +239,11 @@ def read_table(
             count += piece.rows
     table = run.source
     table.values = {key: values[key][:count] for key in table.values}
-    if clock is not None and wanted is not None:
-        _set_clock(path, table, clock, wanted)
-        _set_exact(dialect, table, clock, wanted.time.factor)
     return table
 
 
 def table_pieces(
-    path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
+    dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> Generator[Piece, None, TextTable]:
     """Yield those of the columns `keys` that have numbers, block by block; return the table without its rows.
 
@@ -151,7 +253,7 @@ def table_pieces(
     names, worded = dialect.names, () if wanted is None else wanted.worded
     categories = {names.index(key): Categories() for name in worded if (key := column_key(name, names))}
     columns = [i for i, name in enumerate(names) if name in keys]
-    requested = _requested(path, dialect, columns, clock, survey=wanted is None)
+    requested = _requested(dialect, columns, clock, survey=wanted is None)
     reader = RowReader(dialect, replace(requested, categories=categories), survey=wanted is None)
     stamped = StampColumns(dialect, requested)
     rounded: Counter[str] = Counter()
@@ -168,7 +270,7 @@ def table_pieces(
     findings += stamped.findings()
     remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
     if wanted is None and not remaining:
-        raise RecordingError(f"{path}: no column has only numbers", str(findings[0]) if findings else "")
+        raise RecordingError("no column has only numbers", str(findings[0]) if findings else "")
     for key in names:
         findings += rounding_finding(key, rounded[key]) if key in remaining else []
     return TextTable(
@@ -181,9 +283,7 @@ def table_pieces(
     )
 
 
-def _requested(
-    path: Path, dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool
-) -> RequestedColumns:
+def _requested(dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool) -> RequestedColumns:
     """Return these columns by kind, with a finding on those that a survey leaves out.
 
     Raises RecordingError if their stamps can be read in two ways.
@@ -202,7 +302,7 @@ def _requested(
         elif stamped.layout is None:
             timed = stamped.layouts[0].timed or _beside(dialect, column, dated=False) is not None
             if not survey or timed:
-                raise _two_readings(path, dialect, column)
+                raise _two_readings(dialect, column)
             left_out[column] = Finding("ambiguous_times", "", {"column": name, "readings": stamped.readings})
         else:
             stamps.append(column)
@@ -212,7 +312,7 @@ def _requested(
         days = _beside(dialect, column, dated=True) if layout.timed and not layout.dated else None
         if days is not None:
             if dialect.stamped[days].layout is None:
-                raise _two_readings(path, dialect, days)
+                raise _two_readings(dialect, days)
             dates[column] = days
     return RequestedColumns(numeric, sorted({*stamps, *dates.values()}), dates, left_out)
 
@@ -226,19 +326,22 @@ def _beside(dialect: Dialect, column: int, dated: bool) -> int | None:
     return None
 
 
-def _two_readings(path: Path, dialect: Dialect, column: int) -> RecordingError:
+def _two_readings(dialect: Dialect, column: int) -> RecordingError:
     stamped = dialect.stamped[column]
     return RecordingError(
-        f"{path}: column '{dialect.names[column]}': {stamped.readings}", "pin time_format in [csv] of the machine file"
+        f"column '{dialect.names[column]}': {stamped.readings}", "pin time_format in [csv] of the machine file"
     )
 
 
-def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> None:
-    """Check the machine file's unit against the clock's column, and convert days of Excel to seconds."""
+def _set_clock(dialect: Dialect, table: TextTable, clock: str, wanted: ChannelMap) -> None:
+    """Check the machine file's unit against the clock's column, and convert days of Excel to seconds.
+
+    It is read again if its stamps have more digits than float64 can represent.
+    """
     if clock in table.stamped:
         if wanted.time.factor != 1.0:
             raise RecordingError(
-                f"{path}: column '{clock}' has dates or times of day, which are read in s",
+                f"column '{clock}' has dates or times of day, which are read in s",
                 'write unit = "s" in [channels] time',
             )
         return
@@ -253,16 +356,9 @@ def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> 
     readings = "" if wanted.pins.time_format else two_readings(values, wanted.time.factor)
     if readings:
         raise RecordingError(
-            f"{path}: column '{clock}' {readings}",
-            'pin time_format = "excel" or "number" in [csv] of the machine file',
+            f"column '{clock}' {readings}", 'pin time_format = "excel" or "number" in [csv] of the machine file'
         )
-
-
-def _set_exact(dialect: Dialect, table: TextTable, clock: str, factor: float) -> None:
-    """Read the clock again if its stamps have more digits than float64 can represent."""
-    if clock in table.stamped or table.origin:
-        return
-    exact = exact_differences(dialect, dialect.names.index(clock), table.values[clock], factor)
+    exact = exact_differences(dialect, dialect.names.index(clock), values, wanted.time.factor)
     if exact is not None:
         table.values[clock], table.origin = exact
         table.findings = [

@@ -147,31 +147,31 @@ class TableLines:
 
     def _check_row(self, line: int, text: str, cells: list[str], unfinished: bool) -> None:
         """Raise RecordingError if a line is no row, or if a line above is neither a row nor the footer."""
-        path, width = self.dialect.text.path, self.dialect.width
+        width = self.dialect.width
         if "\r" in text.rstrip("\r\n"):
             raise RecordingError(
-                f"{path}: line {line} contains a carriage return: line ends are mixed",
+                f"line {line} contains a carriage return: line ends are mixed",
                 "save the file again with one kind of line end",
             )
         fits = len(cells) == width or (self.dialect.may_end_after(len(cells)) and not unfinished)
         if text.count('"') % 2 and (len(cells) != width or has_open_quote(text, self.dialect.separator)):
-            raise RecordingError(f"{path}: line {line} has a quote that is not closed", "write quotes in pairs")
+            raise RecordingError(f"line {line} has a quote that is not closed", "write quotes in pairs")
         words = next((each for each in self._footer if len(each.cells) != width), None)
         if words is not None:
             raise RecordingError(
-                f"{path}: line {words.line} has {counted(len(words.cells), 'cell')}, the header has {width}: "
+                f"line {words.line} has {counted(len(words.cells), 'cell')}, the header has {width}: "
                 f"{words.text.strip()[:40]!r} between the rows",
                 "repair or remove the line; pin comment in [csv] if such lines are comments",
             )
         stated = f"the {'header' if self.dialect.header else 'first'} has"
         if not fits:
             raise RecordingError(
-                f"{path}: line {line} has {counted(len(cells), 'cell')}, {stated} {width}",
+                f"line {line} has {counted(len(cells), 'cell')}, {stated} {width}",
                 "repair or remove the line; the first row sets the width",
             )
         if self.dialect.trailing and any(cells[width - 1 :]):
             raise RecordingError(
-                f"{path}: line {line} has {counted(width, 'cell')}, {stated} {width - 1}",
+                f"line {line} has {counted(width, 'cell')}, {stated} {width - 1}",
                 "the other rows end with a separator; repair the line",
             )
 
@@ -179,9 +179,7 @@ class TableLines:
         """Raise RecordingError if a file has many more lines of other kinds than rows."""
         skipped = len(self._blank) + sum(map(len, self._skipped.values()))
         if skipped > max(_MOST_SKIPPED, 2 * (self.line - self.dialect.first_line - skipped)):
-            raise RecordingError(
-                f"{self.dialect.text.path}: more than {_MOST_SKIPPED} lines are not rows", "is it a table?"
-            )
+            raise RecordingError(f"more than {_MOST_SKIPPED} lines are not rows", "is it a table?")
 
     def findings(self, last_line: int) -> list[Finding]:
         """Return the findings on skipped lines, one per kind; blank lines after the last row are not reported."""

@@ -91,7 +91,7 @@ class Text:
             block = piece if whole else b"".join((rest, memoryview(piece)[:cut]))
             rest = piece[cut:] if cut else rest + piece
             if len(rest) > BLOCK_BYTES // 2:
-                raise RecordingError(f"{self.path}: has a line of more than {BLOCK_BYTES >> 11} KB", "is it a table?")
+                raise RecordingError(f"has a line of more than {BLOCK_BYTES >> 11} KB", "is it a table?")
             if cut:
                 yield block
         if rest:
@@ -100,7 +100,7 @@ class Text:
 
 def read_sample(path: Path, most: int = SAMPLE_BYTES) -> bytes:
     """Return the first bytes of a file, in which its dialect is detected; raises RecordingError."""
-    with _readable(path), open_text(path) as file:
+    with _readable(), open_text(path) as file:
         return file.read(most) or b""
 
 
@@ -117,14 +117,14 @@ def recoded(path: Path, encoding: str, mark: int, content: bytes | None) -> byte
             pieces.append(decoder.decode(b"", final=True).encode())
         except UnicodeError as fault:
             raise RecordingError(
-                f"{path}: damaged: not valid {encoding.upper()} near byte {mark + size}", "save it again as UTF-8"
+                f"damaged: not valid {encoding.upper()} near byte {mark + size}", "save it again as UTF-8"
             ) from fault
     return b"".join(pieces)
 
 
 def read_small(path: Path) -> bytes | None:
     """Return the bytes of a file of at most one block; None for a larger file. Raises RecordingError."""
-    with _readable(path):
+    with _readable():
         with path.open("rb", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
             content = file.readall() if size <= BLOCK_BYTES else None
@@ -134,11 +134,9 @@ def read_small(path: Path) -> bytes | None:
 
 
 @contextmanager
-def _readable(path: Path) -> Iterator[None]:
+def _readable() -> Iterator[None]:
     """Raise RecordingError if the file cannot be read."""
     try:
         yield
     except OSError as fault:
-        raise RecordingError(
-            f"{path}: cannot be read: {fault.strerror}", "check the path and its permissions"
-        ) from fault
+        raise RecordingError(f"cannot be read: {fault.strerror}", "check the path and its permissions") from fault

@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from pathlib import Path
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.cells import kind, split_line
@@ -39,7 +38,7 @@ _ROWS_HELD = 2000
 
 
 def refuse_commas_that_may_be_decimal(
-    path: Path, data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, named: bool
+    data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, named: bool
 ) -> None:
     """Raise RecordingError if a row without a header may be one number: `0,05` may be two cells or 0.05.
 
@@ -58,8 +57,7 @@ def refuse_commas_that_may_be_decimal(
     if ambiguous is not None:
         line, row, i = ambiguous
         raise RecordingError(
-            f"{path}: line {line.number}: '{row[i - 1]},{row[i]}' may be one number (decimal comma) or two cells",
-            _HINT,
+            f"line {line.number}: '{row[i - 1]},{row[i]}' may be one number (decimal comma) or two cells", _HINT
         )
 
 
@@ -96,7 +94,7 @@ def _is_counter(data: Sequence[tuple[Line, list[str]]]) -> bool:
 
 
 def refuse_one_column_of_decimals(
-    path: Path, rows: Sequence[tuple[Line, list[str]]], head: Head, data: Sequence[tuple[Line, list[str]]]
+    rows: Sequence[tuple[Line, list[str]]], head: Head, data: Sequence[tuple[Line, list[str]]]
 ) -> None:
     """Raise RecordingError if one name or number is above lines such as `1,5`.
 
@@ -109,7 +107,7 @@ def refuse_one_column_of_decimals(
     if kind(word) != "N" and not _may_be_one(data):
         return
     raise RecordingError(
-        f"{path}: line {head.first.number} ({head.first.text[:40]!r}) may be one number (decimal comma) or two cells; "
+        f"line {head.first.number} ({head.first.text[:40]!r}) may be one number (decimal comma) or two cells; "
         f"line {above[-1][0].number} has one ({word[:40]!r})",
         _HINT,
     )
@@ -120,7 +118,7 @@ def resolve_marks(dialect: Dialect) -> Marks:
 
     Raises RecordingError if the rows can be read in two ways.
     """
-    pins, path = dialect.pins, dialect.text.path
+    pins = dialect.pins
     numbers: list[tuple[str, int]] = []
     points: dict[int, tuple[str, int]] = {}
     for text, line, column in _marked_cells(dialect):
@@ -130,14 +128,14 @@ def resolve_marks(dialect: Dialect) -> Marks:
         if _GROUPED.fullmatch(text) is None or len(numbers) == _ENOUGH:
             break  # this number decides, or enough of them were seen
         points.setdefault(column, (text, line))
-    marks = find_marks(path, numbers, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
+    marks = find_marks(numbers, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
     if marks.sure or marks.decimal != ".":
         return marks
     for column, (text, line) in points.items():
         whole = next((cells[column] for cells in _first_rows(dialect) if _WHOLE.fullmatch(cells[column])), None)
         if whole is not None:
             raise RecordingError(
-                f"{path}: line {line}, column '{dialect.names[column]}': '{text}' next to '{whole}' may be "
+                f"line {line}, column '{dialect.names[column]}': '{text}' next to '{whole}' may be "
                 f"{text.replace('.', '')} (thousands) or {text} (decimal point)",
                 'pin decimal = "," if the point separates thousands, or decimal = ".", in [csv] of the machine file',
             )

@@ -81,40 +81,35 @@ class Dialect:
 
     @property
     def as_pins(self) -> str:
-        """Return the dialect as `[csv]` of a machine file."""
-        return _pins_text(self)
+        """Return the dialect as `[csv]` of a machine file.
 
-
-def _pins_text(dialect: Dialect) -> str:
-    """Return the dialect as TOML.
-
-    Lines of names and units that were detected are written as comments, because the next log may have more or fewer
-    lines above them; only pinned lines are written as keys.
-    """
-    pins = dialect.pins
-    lines = ["[csv]"]
-    if dialect.width > 1 or pins.separator:
-        lines.append(f"separator = {quoted(SEPARATORS.get(dialect.separator, dialect.separator))}")
-    lines += [f"decimal = {quoted(dialect.marks.decimal)}", f"thousands = {quoted(dialect.marks.thousands)}"]
-    lines.append(f"encoding = {quoted(dialect.text.encoding)}")
-    if not dialect.header and not dialect.preamble:
-        lines.append("header = false")
-    elif dialect.header and not dialect.from_comment:
-        lines.append(_line("header", pins.header, dialect.header_line))
-    if dialect.header and (dialect.units_line or pins.units is not None) and not dialect.from_comment:
-        lines.append(_line("units", pins.units, dialect.units_line))
-    if pins.skip_lines:
-        lines.append(f"skip_lines = {pins.skip_lines}")
-    if pins.comment is not None:
-        lines.append(f"comment = {quoted(pins.comment)}")
-    if pins.missing:
-        lines.append(f"missing = [{', '.join(map(quoted, pins.missing))}]")
-    layouts = {each.layout.pattern for each in dialect.stamped.values() if each.layout}
-    if len(layouts) == 1:
-        lines.append(f"time_format = {quoted(layouts.pop())}")
-    elif pins.time_format:
-        lines.append(f"time_format = {quoted(pins.time_format)}")
-    return "\n".join(lines)
+        Lines of names and units that were detected are written as comments, because the next log may have more or fewer
+        lines above them; only pinned lines are written as keys.
+        """
+        pins = self.pins
+        lines = ["[csv]"]
+        if self.width > 1 or pins.separator:
+            lines.append(f"separator = {quoted(SEPARATORS.get(self.separator, self.separator))}")
+        lines += [f"decimal = {quoted(self.marks.decimal)}", f"thousands = {quoted(self.marks.thousands)}"]
+        lines.append(f"encoding = {quoted(self.text.encoding)}")
+        if not self.header and not self.preamble:
+            lines.append("header = false")
+        elif self.header and not self.from_comment:
+            lines.append(_line("header", pins.header, self.header_line))
+        if self.header and (self.units_line or pins.units is not None) and not self.from_comment:
+            lines.append(_line("units", pins.units, self.units_line))
+        if pins.skip_lines:
+            lines.append(f"skip_lines = {pins.skip_lines}")
+        if pins.comment is not None:
+            lines.append(f"comment = {quoted(pins.comment)}")
+        if pins.missing:
+            lines.append(f"missing = [{', '.join(map(quoted, pins.missing))}]")
+        layouts = {each.layout.pattern for each in self.stamped.values() if each.layout}
+        if len(layouts) == 1:
+            lines.append(f"time_format = {quoted(layouts.pop())}")
+        elif pins.time_format:
+            lines.append(f"time_format = {quoted(pins.time_format)}")
+        return "\n".join(lines)
 
 
 def quoted(text: str) -> str:

@@ -17,7 +17,7 @@ from cdtool.base.findings import Finding, lines_of
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
-from cdtool.formats.csv.encoding import detect_text
+from cdtool.formats.csv.encoding import open_table
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import Text
@@ -48,7 +48,7 @@ _TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
 
 
 @dataclass(frozen=True)
-class Split:
+class LineSplit:
     """The result of splitting lines at a separator: cells per line, share of such lines, share of numbers in them."""
 
     separator: str
@@ -57,7 +57,7 @@ class Split:
     numeric: float
 
 
-def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal: str = "") -> Split:
+def find_separator(lines: Sequence[Line], pinned: str = "", decimal: str = "") -> LineSplit:
     """Return the separator that splits the lines into equal numbers of cells, most of which are numbers.
 
     Raises RecordingError if a pinned separator splits no line but another one does. With a pinned decimal comma a table
@@ -72,7 +72,7 @@ def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal:
             _split(scored, other).width > 1 for other in SEPARATORS if other not in (pinned, decimal)
         ):
             raise RecordingError(
-                f"{path}: line {body[0].number} has one cell with the separator {pinned!r}: {body[0].text[:40]!r}",
+                f"line {body[0].number} has one cell with the separator {pinned!r}: {body[0].text[:40]!r}",
                 "correct or remove separator in [csv], or the line sep= of the file",
             )
         return split
@@ -110,7 +110,7 @@ def _is_part_of_times(lines: Sequence[Line]) -> bool:
     return any(len({text.count(mark) for text in alike} | {0}) == 2 and mark in alike[0] for mark in ",\t|")
 
 
-def _split(texts: Sequence[str], separator: str) -> Split:
+def _split(texts: Sequence[str], separator: str) -> LineSplit:
     rows = [split_line(text, separator) for text in texts]
     if separator == " ":
         rows = [_no_blank_separator(text, row) for text, row in zip(texts, rows, strict=True)]
@@ -121,11 +121,11 @@ def _split(texts: Sequence[str], separator: str) -> Split:
         if 2 * seen >= count:
             width, count = wider, seen
     if width < 2:
-        return Split(separator, 1, 1.0, 0.0)
+        return LineSplit(separator, 1, 1.0, 0.0)
     shares = [sum(_is_number(cell, separator) for cell in row) / len(row) for row in rows if len(row) == width]
     missing = [sum(kind(cell) == "M" for cell in row) / len(row) for row in rows if len(row) == width]
     numeric = sum(share / max(1.0 - lost, 1.0 / width) for share, lost in zip(shares, missing, strict=True))
-    return Split(separator, width, count / len(rows), numeric / len(shares))
+    return LineSplit(separator, width, count / len(rows), numeric / len(shares))
 
 
 def _no_blank_separator(text: str, row: list[str]) -> list[str]:
@@ -157,7 +157,7 @@ class SampleLines:
     skipped: Sequence[int]
 
 
-def classify_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> SampleLines:
+def classify_lines(text: Text, stream: bytes, pins: TablePins) -> SampleLines:
     """Sort the lines of the sample by kind; raises RecordingError if no line of a table is left."""
     every = sample_lines(text, stream)
     filled = [line for line in every if not line.blank]
@@ -167,7 +167,7 @@ def classify_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Sa
     mark = comment_mark(lines, pins.comment)
     table = [line for line in lines if not line.is_comment(mark)]
     if not table:
-        raise RecordingError(f"{path}: contains no row of numbers", "a header line and rows of numbers are needed")
+        raise RecordingError("contains no row of numbers", "a header line and rows of numbers are needed")
     comments = [line for line in lines if line.is_comment(mark)]
     return SampleLines(
         every, table, comments, mark, separator, [line.number for line in filled if line.number <= pins.skip_lines]
@@ -195,11 +195,11 @@ class CellGrid:
         return [i for i, letter in enumerate(self.kinds) if letter in "TX"]
 
 
-def split_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
+def split_rows(lines: SampleLines, pins: TablePins) -> CellGrid:
     """Find separator, width and head; raises RecordingError if there is no table, or one that is ambiguous."""
     named = lines.separator.separator or "" if lines.separator else ""
     without_rulers = [line for line in lines.table if not is_ruler(line.text)] or lines.table
-    split = find_separator(path, without_rulers, pins.separator or named, pins.decimal)
+    split = find_separator(without_rulers, pins.separator or named, pins.decimal)
     rows = [(line, split_line(line.text, split.separator)) for line in lines.table]
     # Between blanks, an empty cell cannot be seen: rows may be without any of their cells.
     width = _full_width(rows, split.width) if split.separator != " " else split.width
@@ -211,7 +211,7 @@ def split_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
     wide = [(line, cells) for line, cells in rows if len(cells) == split.width]
     lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
     kinds = column_kinds([cells for _, cells in _sample_evenly(lower)], split.width)
-    head = HeadFinder(path, split.separator, split.width, kinds, pins).find(lines.table, lines.comments)
+    head = HeadFinder(split.separator, split.width, kinds, pins).find(lines.table, lines.comments)
     end = next((line.number for line, cells in reversed(wide) if kind(cells[0]) != "X" or kinds[0] not in "NT"), 0)
     data = [(line, cells) for line, cells in wide if head.first.number <= line.number <= end]  # without a footer
     kinds = column_kinds([cells for _, cells in _sample_evenly(data)], split.width)
@@ -244,13 +244,13 @@ def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
     return rows[:: max(1, len(rows) // (2 * _LOOKED))]
 
 
-def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | None = None) -> Dialect:
-    """Return the dialect of a text file from its first bytes; `content` are all its bytes if they have been read.
+def find_dialect(path: Path, pins: TablePins) -> Dialect:
+    """Return the dialect of a text file from its first bytes.
 
     Raises RecordingError if the file is not a table, or is ambiguous.
     """
-    text, stream = detect_text(path, sample, pins.encoding, content)
-    dialect = _dialect(path, text, stream, pins)
+    text, stream = open_table(path, pins.encoding)
+    dialect = _dialect(text, stream, pins)
     if dialect.marks.sure:
         return dialect
     marks = resolve_marks(dialect)
@@ -262,25 +262,27 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | No
     return replace(dialect, marks=marks, findings=(*dialect.findings, *doubt))
 
 
-def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
+def _dialect(text: Text, stream: bytes, pins: TablePins) -> Dialect:
     """Return the dialect, footer and ambiguous marks not considered, from a shortened sample if that is sufficient."""
     refuse_long_line(text, stream)
     if (shorter := shorter_sample(text, stream, pins)) is not None:
+        if pins == TablePins() and (dialect := shorter.plain(text)) is not None:
+            return dialect
         try:
-            if (dialect := shorter.whole(_by_lines(path, text, shorter.stream, pins))) is not None:
+            if (dialect := shorter.whole(_by_lines(text, shorter.stream, pins))) is not None:
                 return dialect
         except RecordingError:  # the number of a line in the message may be wrong: read the whole sample
             pass
-    return _by_lines(path, text, stream, pins)
+    return _by_lines(text, stream, pins)
 
 
-def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
+def _by_lines(text: Text, stream: bytes, pins: TablePins) -> Dialect:
     """Return the dialect from all lines of a sample."""
-    lines = classify_lines(path, text, stream, pins)
-    grid = split_rows(path, lines, pins)
+    lines = classify_lines(text, stream, pins)
+    grid = split_rows(lines, pins)
     head = grid.head
-    marks = _marks(path, grid.data, grid.kinds, grid.separator, pins)
-    _refuse_other_readings(path, lines, grid, pins)
+    marks = _marks(grid.data, grid.kinds, grid.separator, pins)
+    _refuse_other_readings(lines, grid, pins)
     trailing = _trailing(head, grid.kinds, grid.data)
     names = head.names[: grid.width - trailing] if head.names is not None else None
     return Dialect(
@@ -326,17 +328,17 @@ def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
     return not blank or 2 * len(blank) < rows[-1] - first
 
 
-def _refuse_other_readings(path: Path, lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
+def _refuse_other_readings(lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
     """Raise RecordingError if the commas may be decimal marks, or if another table is above this one."""
     head = grid.head
     if head.names is None and not pins.separator and not lines.separator:
         above = [line for line in lines.comments if line.number < head.first.number]
         named = any(len(line.text.strip(lines.mark).split()) == 1 for line in above)
-        refuse_commas_that_may_be_decimal(path, grid.data, grid.kinds, grid.separator, named)
+        refuse_commas_that_may_be_decimal(grid.data, grid.kinds, grid.separator, named)
     if grid.width == 2 and grid.separator == "," and not pins.separator:
-        refuse_one_column_of_decimals(path, grid.rows, head, grid.data)
+        refuse_one_column_of_decimals(grid.rows, head, grid.data)
     if pins.header is None:  # a pinned header selects the table, and rows above it are reported as a loss
-        refuse_table_above(path, head, grid.width)
+        refuse_table_above(head, grid.width)
 
 
 def _has_comments(lines: SampleLines, grid: CellGrid) -> bool:
@@ -371,7 +373,7 @@ def _first_words(data: Sequence[tuple[Line, list[str]]], column: int) -> SampleC
     return SampleCell(*next((cell for cell in cells if kind(cell[0]) in "TX"), cells[0]))
 
 
-def _marks(path: Path, data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, pins: TablePins) -> Marks:
+def _marks(data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, pins: TablePins) -> Marks:
     if pins.decimal and pins.thousands is not None:
         return Marks(pins.decimal, pins.thousands)
     # Lines without any of these marks have decimal points or whole numbers: a limited number of them is sufficient.
@@ -383,7 +385,7 @@ def _marks(path: Path, data: Sequence[tuple[Line, list[str]]], kinds: str, separ
         for i, cell in enumerate(row)
         if kinds[i] == "N" and cell and (cell[0].isdigit() or cell[0] in "+-.,\u2212")
     ]
-    return find_marks(path, cells, separator, pins.decimal, pins.thousands)
+    return find_marks(cells, separator, pins.decimal, pins.thousands)
 
 
 def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) -> bool:

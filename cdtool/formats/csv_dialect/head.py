@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.plain_text import counted, shown_lines
@@ -20,7 +19,7 @@ _SINGLE_CELL = 1
 # A single line of numbers above the names may be a setting; this many lines are rows of another table.
 _ROWS_OF_A_TABLE = 2
 # In LabVIEW's measurement files a line of the preamble has the units of Y; its first cell is this word.
-_LABVIEW_UNITS = "Y_Unit_Label"
+LABVIEW_UNITS = "Y_Unit_Label"
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,7 @@ class _SplitLine:
 class HeadFinder:
     """Finds the head of a table with rows of `width` cells; `kinds` has one letter per column (see `Dialect`)."""
 
-    def __init__(self, path: Path, separator: str, width: int, kinds: str, pins: TablePins) -> None:
-        self.path = path
+    def __init__(self, separator: str, width: int, kinds: str, pins: TablePins) -> None:
         self.separator = separator
         self.width = width
         self.kinds = kinds
@@ -138,9 +136,9 @@ class HeadFinder:
         self, names: list[str], header: _SplitLine, units: _SplitLine | None, first: Line, above: Sequence[_SplitLine]
     ) -> Head:
         if units is None and self.pins.units is None:
-            units = next((row for row in above if row.cells[0] == _LABVIEW_UNITS), None)
+            units = next((row for row in above if row.cells[0] == LABVIEW_UNITS), None)
         texts: Sequence[str] = () if units is None or are_types(units.cells) else units.cells
-        if texts and texts[0] == _LABVIEW_UNITS:
+        if texts and texts[0] == LABVIEW_UNITS:
             texts = ("", *texts[1:])
         line = 0 if units is None else units.line.number
         used = {header.line.number, line}
@@ -218,8 +216,7 @@ class HeadFinder:
             words = next((row for row in cut[:start] if len(row.cells) == self.width), None)
             if words is not None:
                 raise RecordingError(
-                    f"{self.path}: line {words.line.number} has no numbers ({words.line.text[:40]!r}), "
-                    "but [csv] header is false",
+                    f"line {words.line.number} has no numbers ({words.line.text[:40]!r}), but [csv] header is false",
                     "set header to the line of the names, or use skip_lines",
                 )
             preamble = tuple(row.line.number for row in cut[:start])
@@ -230,9 +227,7 @@ class HeadFinder:
             width = (
                 f"has {counted(len(header.cells), 'cell')}, the rows have {self.width}" if header else "has no cells"
             )
-            raise RecordingError(
-                f"{self.path}: line {number}, [csv] header, {width}", "correct or remove header in [csv]"
-            )
+            raise RecordingError(f"line {number}, [csv] header, {width}", "correct or remove header in [csv]")
         below = [i for i, row in enumerate(cut) if row.line.number > header.line.number]
         units = next((cut[i] for i in below if cut[i].line.number == self.pins.units), None)
         types = [i for i in below[:2] if are_types(cut[i].cells)]
@@ -248,13 +243,12 @@ class HeadFinder:
     def _no_rows(self, cut: Sequence[_SplitLine]) -> RecordingError:
         if len(cut) == 1:
             return RecordingError(
-                f"{self.path}: contains a header in line {cut[0].line.number} and no row of numbers",
+                f"contains a header in line {cut[0].line.number} and no row of numbers",
                 "was the recording stopped immediately?",
             )
         shown = f": line {cut[1].line.number} is {cut[1].line.text[:60]!r}" if cut else ""
         return RecordingError(
-            f"{self.path}: contains no row of numbers{shown}",
-            "a table with a header line (or none) and rows of numbers is needed",
+            f"contains no row of numbers{shown}", "a table with a header line (or none) and rows of numbers is needed"
         )
 
     def _refuse_other_width(self, above: Sequence[_SplitLine], first: _SplitLine) -> None:
@@ -265,7 +259,7 @@ class HeadFinder:
         if self.separator == " ":
             hint = "write names with blanks in quotes or separate them by two blanks; or pin header = false in [csv]"
         raise RecordingError(
-            f"{self.path}: line {last.line.number} has {counted(len(last.cells), 'name')} or words, "
+            f"line {last.line.number} has {counted(len(last.cells), 'name')} or words, "
             f"line {first.line.number} has {counted(self.width, 'cell')}",
             hint,
         )
@@ -276,7 +270,7 @@ class HeadFinder:
             return
         number = header.line.number
         raise RecordingError(
-            f"{self.path}: line {number} ({header.line.text[:40]!r}) may be the names, or a row with a word in it",
+            f"line {number} ({header.line.text[:40]!r}) may be the names, or a row with a word in it",
             f"pin header = {number} or header = false in [csv]; the first unambiguous row is line {first.line.number}",
         )
 
@@ -286,19 +280,18 @@ class HeadFinder:
         points = sum("." in cell or "," in cell for cell in below)
         if self.width > 2 and cut[0].cells == numbered and 2 * points > len(below):
             raise RecordingError(
-                f"{self.path}: line {cut[0].line.number} ({','.join(numbered)[:40]}) may number the columns "
-                "or be a row",
+                f"line {cut[0].line.number} ({','.join(numbered)[:40]}) may number the columns or be a row",
                 "pin header = 1 or header = false in [csv]",
             )
 
 
-def refuse_table_above(path: Path, head: Head, width: int) -> None:
+def refuse_table_above(head: Head, width: int) -> None:
     """Raise RecordingError if rows of another table are above this one: they would be lost."""
     if len(head.numbers) < _ROWS_OF_A_TABLE:
         return
     below = f"the header in line {head.header_line}" if head.names else f"line {head.first.number}"
     raise RecordingError(
-        f"{path}: {shown_lines(head.numbers)} above {below} have numbers, but not in {width} columns: "
+        f"{shown_lines(head.numbers)} above {below} have numbers, but not in {width} columns: "
         "does the file contain several tables?",
         f"split the file, or skip the upper table: skip_lines = {head.numbers[-1]} in [csv]",
     )

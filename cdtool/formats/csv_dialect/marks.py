@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.cells import MINUS_SIGN
@@ -84,7 +83,7 @@ class _Evidence:
 
 
 def find_marks(
-    path: Path, cells: Iterable[tuple[str, int]], separator: str, decimal: str = "", thousands: str | None = None
+    cells: Iterable[tuple[str, int]], separator: str, decimal: str = "", thousands: str | None = None
 ) -> Marks:
     """Return the marks of (cell, line) pairs; `decimal` and `thousands` are pinned marks.
 
@@ -96,7 +95,7 @@ def find_marks(
     # A single cell with a blank may be two cells without a separator.
     if evidence.blank_groups < 2 or separator == " ":
         evidence.thousands.pop(" ", None)
-    mark = decimal or {",": ".", ".": ","}.get(thousands or "") or _decimal(path, evidence)
+    mark = decimal or {",": ".", ".": ","}.get(thousands or "") or _decimal(evidence)
     if thousands is not None:
         return Marks(mark, thousands)
     other = "." if mark == "," else ","
@@ -109,30 +108,30 @@ def find_marks(
     if ambiguous and other not in groups:
         sure = evidence.decimal.get(mark)
         raise RecordingError(
-            f"{path}: {ambiguous} next to {sure}: '{other}' may separate thousands, or be a decimal mark, too",
+            f"{ambiguous} next to {sure}: '{other}' may separate thousands, or be a decimal mark, too",
             "pin decimal and thousands in [csv] of the machine file",
         )
     if len(groups) > 1:
         shown = " and ".join(str(cell) for cell in groups.values())
-        raise RecordingError(f"{path}: two thousands separators: {shown}", "pin thousands in [csv]")
+        raise RecordingError(f"two thousands separators: {shown}", "pin thousands in [csv]")
     group_mark = next(iter(groups), "")
     certain = bool(decimal or evidence.decimal or groups)
     is_ambiguous = separator != "," and mark == "." and not certain
     return Marks(mark, group_mark, evidence.either.get(mark) if is_ambiguous else None, certain)
 
 
-def _decimal(path: Path, evidence: _Evidence) -> str:
+def _decimal(evidence: _Evidence) -> str:
     comma, point = evidence.decimal.get(","), evidence.decimal.get(".")
     if comma and point:
         raise RecordingError(
-            f"{path}: {comma} has a decimal comma, {point} a decimal point",
+            f"{comma} has a decimal comma, {point} a decimal point",
             "pin decimal in [csv], and repair the lines with the other mark",
         )
     if comma or point:
         return "," if comma else "."
     if "," in evidence.thousands and "." in evidence.thousands:
         raise RecordingError(
-            f"{path}: two thousands separators: {evidence.thousands[',']} and {evidence.thousands['.']}",
+            f"two thousands separators: {evidence.thousands[',']} and {evidence.thousands['.']}",
             "pin thousands in [csv]",
         )
     if "." in evidence.thousands:
@@ -142,12 +141,12 @@ def _decimal(path: Path, evidence: _Evidence) -> str:
     ambiguous = evidence.either.get(",")
     if ambiguous and "." in evidence.either:
         raise RecordingError(
-            f"{path}: {ambiguous} and {evidence.either['.']}: which is the decimal mark?", "pin decimal in [csv]"
+            f"{ambiguous} and {evidence.either['.']}: which is the decimal mark?", "pin decimal in [csv]"
         )
     if ambiguous:
         text = ambiguous.text
         raise RecordingError(
-            f"{path}: line {ambiguous.line}: '{text}' may be {text.replace(',', '.')} (decimal comma) or "
+            f"line {ambiguous.line}: '{text}' may be {text.replace(',', '.')} (decimal comma) or "
             f"{text.replace(',', '')} (thousands)",
             'pin decimal = "," or thousands = "," in [csv] of the machine file',
         )

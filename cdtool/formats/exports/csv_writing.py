@@ -15,7 +15,7 @@ _ROWS = 2**14
 
 def write_csv_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
     """Write a table with its provenance in lines that start with #, and with units in the header: `torque [N m]`."""
-    group = single_group(path, groups)
+    group = single_group(groups)
     header = [_heading(column) for column in chain(*group.flat)]
     if group.own_clock:
         header.insert(0, f"{OWN_CLOCK} [s]")

@@ -31,15 +31,15 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.containers.container_checks import left_out_finding
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, number
-from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
-from cdtool.formats.csv.text import Text, read_sample
+from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text, open_table
+from cdtool.formats.csv.text import BLOCK_BYTES, Text, read_sample
 from cdtool.formats.csv_dialect.foreign_heads import is_measurement
 from cdtool.formats.exports.timed_text import (
     ClockGroup,
@@ -48,7 +48,6 @@ from cdtool.formats.exports.timed_text import (
     details_of,
     dialect_of_rows,
     number_in_head,
-    opened,
 )
 from cdtool.formats.source import Source
 
@@ -83,7 +82,8 @@ class Lvm:
         pins, clock = (TablePins(), None) if wanted is None else (wanted.pins, wanted.time.column)
         if clock not in (None, OWN_CLOCK) or pins.header is not None or pins.skip_lines > 0:
             return Csv().columns(path, wanted)
-        return _read_heads(path, pins).source(path, self.name, wanted)
+        with naming(path):
+            return _read_heads(path, pins).source(path, self.name, wanted)
 
 
 @dataclass(frozen=True)
@@ -151,13 +151,13 @@ class _Style:
 
 
 def _read_heads(path: Path, pins: TablePins) -> TimedText:
-    text, lines = opened(path, pins)
-    style = _style(path, [text.decode(line).strip(" \r\n") for line in lines], pins)
-    heads, end = _heads(path, text, style)
+    text, stream = open_table(path, pins.encoding, BLOCK_BYTES)
+    style = _style([text.decode(line).strip(" \r\n") for line in stream.split(text.line_end)], pins)
+    heads, end = _heads(text, style)
     if not heads:
-        raise RecordingError(f"{path}: has no row of numbers", "was the recording stopped immediately?")
+        raise RecordingError("has no row of numbers", "was the recording stopped immediately?")
     for head in heads:
-        _check_head(path, head)
+        _check_head(head)
     findings = [] if end is None else [Finding("last_segment_incomplete")]
     origin, absolute = _origin(heads, style, findings)
     units: dict[str, str | None] = {}
@@ -180,27 +180,25 @@ def _read_heads(path: Path, pins: TablePins) -> TimedText:
     return TimedText(tuple(segments), units, start, details, tuple(findings))
 
 
-def _style(path: Path, lines: Sequence[str], pins: TablePins) -> _Style:
+def _style(lines: Sequence[str], pins: TablePins) -> _Style:
     """Return what the head of the file states; raises RecordingError for an unknown separator."""
     end = next((i for i, line in enumerate(lines) if line.startswith(_END)), None)
     if end is None:
-        raise RecordingError(f"{path}: its head has no end ({_END})", "was the copy cut off? copy it again")
+        raise RecordingError(f"its head has no end ({_END})", "was the copy cut off? copy it again")
     stated = next((line for line in lines[:end] if line.startswith("Separator")), "Separator\tTab")
     mark, word = stated[len("Separator") : len("Separator") + 1], stated[len("Separator") + 1 :].strip(" \t,").lower()
     separator = pins.separator or _SEPARATOR_WORDS.get(word, "")
     if not separator or (mark != separator and not pins.separator):
-        raise RecordingError(
-            f"{path}: states the separator '{word[:20]}', which is not Tab or Comma", "pin separator in [csv]"
-        )
+        raise RecordingError(f"states the separator '{word[:20]}', which is not Tab or Comma", "pin separator in [csv]")
     keys = {cells[0]: (cells[1:] or [""])[0].strip() for cells in (line.split(separator) for line in lines[:end])}
     decimal = pins.decimal or keys.get("Decimal_Separator") or "."
     if decimal not in (".", ",") or decimal == separator:
-        raise RecordingError(f"{path}: states the decimal separator '{decimal}'", "pin decimal in [csv]")
+        raise RecordingError(f"states the decimal separator '{decimal}'", "pin decimal in [csv]")
     started = _instant(keys.get("Date", ""), keys.get("Time", ""))
     return _Style(separator, decimal, keys.get("X_Columns", "").lower() == "no", started)
 
 
-def _heads(path: Path, text: Text, style: _Style) -> tuple[list[_Head], int | None]:
+def _heads(text: Text, style: _Style) -> tuple[list[_Head], int | None]:
     """Return the heads of the segments, and the byte of one that the file's end cuts off (None: no head is).
 
     Other words between and below the rows are left to the reader of the rows.
@@ -218,13 +216,13 @@ def _heads(path: Path, text: Text, style: _Style) -> tuple[list[_Head], int | No
         if is_head and len(below) > 1:
             wrong = below[1]
             raise RecordingError(
-                f"{path}: line {wrong.number} ({wrong.cells[0][:30]!r}) is below the names, but not a row of numbers",
+                f"line {wrong.number} ({wrong.cells[0][:30]!r}) is below the names, but not a row of numbers",
                 "repair the line",
             )
         if is_head and below:
             heads.append(_Head(keys, lines[0].start, below[0], row))
         if len(heads) > _MOST_SEGMENTS:
-            raise RecordingError(f"{path}: has more than {_MOST_SEGMENTS} segments", "write one heading only")
+            raise RecordingError(f"has more than {_MOST_SEGMENTS} segments", "write one heading only")
     return heads, None
 
 
@@ -247,24 +245,22 @@ def _lines_of_words(text: Text, separator: str) -> Iterator[tuple[list[_Line], _
         yield lines, None
 
 
-def _check_head(path: Path, head: _Head) -> None:
+def _check_head(head: _Head) -> None:
     """Raise RecordingError if a head contradicts its names, or is not of samples over time."""
     names, stated = head.names, head.keys.get("Channels", ["", ""])[1:]
     if names.cells[0] != _X:
         raise RecordingError(
-            f"{path}: line {names.number} begins with {names.cells[0][:30]!r}, not with {_X}", "repair the line"
+            f"line {names.number} begins with {names.cells[0][:30]!r}, not with {_X}", "repair the line"
         )
     if stated and stated[0].isdigit() and int(stated[0][:12]) != len(head.channels):
         raise RecordingError(
-            f"{path}: line {names.number} has {len(head.channels)} names, but {stated[0][:12]} channels are stated "
-            "above it",
+            f"line {names.number} has {len(head.channels)} names, but {stated[0][:12]} channels are stated above it",
             "was the file edited, or the copy damaged?",
         )
     for at, key in head.channels.items():
         if (dimension := head.cell("X_Dimension", at)) not in ("", "Time"):
             raise RecordingError(
-                f"{path}: the x axis of channel '{key}' is '{dimension[:30]}', not Time",
-                "a log of samples over time is needed",
+                f"the x axis of channel '{key}' is '{dimension[:30]}', not Time", "a log of samples over time is needed"
             )
 
 

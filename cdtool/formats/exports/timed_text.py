@@ -22,9 +22,8 @@ from cdtool.formats.column_names import requested_keys
 from cdtool.formats.columns import Column
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.cells import SEPARATORS, kind, number
-from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.rows import RowReader
-from cdtool.formats.csv.text import SAMPLE_BYTES, Text, read_sample, read_small
+from cdtool.formats.csv.text import Text
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell
@@ -95,7 +94,7 @@ class Segment:
     stated: int = 0
 
     def read(
-        self, path: Path, keys: Collection[str], survey: bool, findings: list[Finding]
+        self, keys: Collection[str], survey: bool, findings: list[Finding]
     ) -> tuple[dict[str, tuple[FloatArray, FloatArray]], set[str]]:
         """Return times and values of the channels `keys`, and which of these are left out; findings are added.
 
@@ -119,7 +118,7 @@ class Segment:
         findings += reader.findings
         read, lost = reader.values.numeric, {*numeric} - {*reader.values.numeric} | worded.keys()
         for column in sorted(lost & clocks):
-            raise RecordingError(f"{path}: {reader.values.left_out[column]}", "it is the clock of a channel")
+            raise RecordingError(str(reader.values.left_out[column]), "it is the clock of a channel")
         cells: dict[int, npt.NDArray[Any]] = {
             **{column: np.concatenate([rows.numbers[column] for rows in blocks]) for column in read},
             **{column: np.concatenate([rows.whole[column] for rows in blocks]) for column in ticks},
@@ -144,11 +143,11 @@ class TimedText:
 
     def source(self, path: Path, name: str, wanted: ChannelMap | None) -> Source:
         """Return the channels that `wanted` names, or all, as read by the format `name`; raises RecordingError."""
-        keys = requested_keys(path, wanted, tuple(self.units))
+        keys = requested_keys(wanted, tuple(self.units))
         findings, left_out = [*self.findings], set[str]()
         parts: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
         for each in self.segments:
-            samples, words = each.read(path, keys, wanted is None, findings)
+            samples, words = each.read(keys, wanted is None, findings)
             left_out |= words
             for key, both in samples.items():
                 parts.setdefault(key, []).append(both)
@@ -159,19 +158,9 @@ class TimedText:
             clock = clocks.setdefault(tuple(map(id, times)), np.concatenate(times))
             columns[key] = Column(key, np.concatenate([values for _, values in parts[key]]), clock, self.units[key])
         if not columns:
-            raise RecordingError(f"{path}: no channel has numbers", "see cdtool info")
+            raise RecordingError("no channel has numbers", "see cdtool info")
         unique = tuple(dict.fromkeys(findings))
         return Source(path, name, columns, self.origin, unique, self.details, tuple(self.units))
-
-
-def opened(path: Path, pins: TablePins, most: int = SAMPLE_BYTES) -> tuple[Text, list[bytes]]:
-    """Return a text file, and the lines in its first bytes; raises RecordingError if it is empty."""
-    content = read_small(path)
-    sample = read_sample(path, most) if content is None else content
-    if not sample.strip():
-        raise RecordingError(f"{path}: is empty", "was the recording stopped immediately, or the copy cut off?")
-    text, stream = detect_text(path, sample, pins.encoding, content)
-    return text, stream.split(text.line_end)
 
 
 def dialect_of_rows(
@@ -189,7 +178,7 @@ def dialect_of_rows(
     separator, decimal = marks
     width = max([len(names), *(len(row) for row in rows if not row[-1])])
     if width > _MOST_COLUMNS:
-        raise RecordingError(f"{text.path}: names {width} columns, more than {_MOST_COLUMNS}", "export fewer channels")
+        raise RecordingError(f"names {width} columns, more than {_MOST_COLUMNS}", "export fewer channels")
     padded = [row + [""] * (width - len(row)) for row in rows if len(row) <= width]
     kinds = column_kinds(padded, width)
     words = {

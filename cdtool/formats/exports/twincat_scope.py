@@ -23,13 +23,13 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import counted
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, split_line
-from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
+from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text, open_table
 from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.csv_dialect.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
 from cdtool.formats.exports.timed_text import (
@@ -39,7 +39,6 @@ from cdtool.formats.exports.timed_text import (
     details_of,
     dialect_of_rows,
     number_in_head,
-    opened,
 )
 from cdtool.formats.source import Source
 
@@ -84,11 +83,12 @@ class TwincatScope:
         pins = TablePins() if wanted is None else wanted.pins
         if pins.header is not None or pins.skip_lines > 0:
             return Csv().columns(path, wanted)
-        return _read_export(path, pins).source(path, self.name, wanted)
+        with naming(path):
+            return _read_export(path, pins).source(path, self.name, wanted)
 
 
 @dataclass(frozen=True)
-class _Head:
+class _ScopeHead:
     """The lines above the rows: about the file by their key, and about the channels with their cells.
 
     The first row is line `line` (from 1), at byte `start`; `rows` are the cells of the first rows.
@@ -122,10 +122,10 @@ class _Head:
 
 
 def _read_export(path: Path, pins: TablePins) -> TimedText:
-    text, lines = opened(path, pins, _MOST_HEAD)
-    head, findings = _read_head(path, text, lines), list[Finding]()
+    text, stream = open_table(path, pins.encoding, _MOST_HEAD)
+    head, findings = _read_head(text, stream.split(text.line_end)), list[Finding]()
     if head.separator == " ":
-        _refuse_empty_cells(path, text, head)
+        _refuse_empty_cells(text, head)
         head = _between_blanks(head, findings)
     # A line in which a cell contains the separator is wider than the others: it would be read in the wrong columns.
     usual = Counter(map(len, head.of_channels.values())).most_common(1)[0][0]
@@ -133,7 +133,7 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     clocks, width = head.clocks, len(head.names)
     if not clocks or clocks[0] != 0 or len(head.rows[0]) <= width - len(clocks) or len(clocks) == width:
         raise RecordingError(
-            f"{path}: line {head.line} has {counted(len(head.rows[0]), 'cell')} for {counted(width, 'name')}: "
+            f"line {head.line} has {counted(len(head.rows[0]), 'cell')} for {counted(width, 'name')}: "
             "no columns of times?",
             "export it again with 'Timelines' set to 'For each sampletime' or 'All'",
         )
@@ -164,10 +164,10 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, tuple(findings))
 
 
-def _read_head(path: Path, text: Text, raw: Sequence[bytes]) -> _Head:
+def _read_head(text: Text, raw: Sequence[bytes]) -> _ScopeHead:
     separator = scope_separator([text.decode(line).rstrip("\r") for line in raw[:_MOST_FILE_LINES]])
     if separator is None:
-        raise RecordingError(f"{path}: is not an export of TwinCAT Scope", "see cdtool list formats")
+        raise RecordingError("is not an export of TwinCAT Scope", "see cdtool list formats")
     of_file: dict[str, list[str]] = {}
     of_channels: dict[str, list[str]] = {}
     start = 0
@@ -176,7 +176,7 @@ def _read_head(path: Path, text: Text, raw: Sequence[bytes]) -> _Head:
         if of_channels and _is_row(cells):
             rows = [_cells(text.decode(each), separator) for each in raw[i : i + _SAMPLE_ROWS]]
             wide = [row for row in rows[: max(1, len(raw) - i - 1)] if len(row) > 1]
-            return _Head(separator, of_file, of_channels, i + 1, start, wide)
+            return _ScopeHead(separator, of_file, of_channels, i + 1, start, wide)
         if cells[0] in _FILE_KEYS and i < _MOST_FILE_LINES:
             of_file[cells[0]] = cells
             of_channels.clear()  # a line Name above is that of the file
@@ -184,26 +184,25 @@ def _read_head(path: Path, text: Text, raw: Sequence[bytes]) -> _Head:
             of_channels[cells[0]] = cells
         start += len(line) + 1
     if start >= _MOST_HEAD - 4:
-        raise RecordingError(f"{path}: has no row of numbers in its first {_MOST_HEAD >> 20} MiB", "export it again")
+        raise RecordingError(f"has no row of numbers in its first {_MOST_HEAD >> 20} MiB", "export it again")
     if not of_channels:
         raise RecordingError(
-            f"{path}: has no line with the names of channels",
-            "export it again with a header that has at least the names",
+            "has no line with the names of channels", "export it again with a header that has at least the names"
         )
-    raise RecordingError(f"{path}: has no row of numbers", "was the export stopped, or the copy cut off?")
+    raise RecordingError("has no row of numbers", "was the export stopped, or the copy cut off?")
 
 
-def _refuse_empty_cells(path: Path, text: Text, head: _Head) -> None:
+def _refuse_empty_cells(text: Text, head: _ScopeHead) -> None:
     """Raise RecordingError if a table that is separated by blanks has empty cells, which are blanks too."""
     for block in text.blocks(head.start):
         if block[:1] == b" " or b"  " in block or text.line_end + b" " in block:
             raise RecordingError(
-                f"{path}: is separated by blanks and has empty cells, which are blanks too",
+                "is separated by blanks and has empty cells, which are blanks too",
                 "export it again with tabs or semicolons",
             )
 
 
-def _between_blanks(head: _Head, findings: list[Finding]) -> _Head:
+def _between_blanks(head: _ScopeHead, findings: list[Finding]) -> _ScopeHead:
     """Return the head with the cells of lines that are separated by blanks, which names and units may contain.
 
     Data types have no blanks: their line shows how many channels follow each column of times. Names that cannot be told
@@ -233,7 +232,7 @@ def _between_blanks(head: _Head, findings: list[Finding]) -> _Head:
     return replace(head, of_channels={**whole, NAME: names, **({_UNIT: units} if is_clear else {})})
 
 
-def _keys(head: _Head) -> dict[int, str]:
+def _keys(head: _ScopeHead) -> dict[int, str]:
     """Return the names of the channels by column; equal names are replaced by the symbols' names, or get a number."""
     clocks = {*head.clocks}
     names = {at: name for at, name in enumerate(head.names) if at not in clocks and name}
@@ -246,7 +245,7 @@ def _keys(head: _Head) -> dict[int, str]:
     return {at: unique.get(at, f"{name}#{at}" if counts[name] > 1 else name) for at, name in names.items()}
 
 
-def _start(head: _Head) -> float:
+def _start(head: _ScopeHead) -> float:
     """Return the start of the export since 1970 [s]; 0 if it is not stated."""
     stated = next((head.of_file[key] for key in SCOPE_STARTS if key in head.of_file), [])
     ticks = stated[1] if len(stated) > 1 else ""
@@ -260,7 +259,7 @@ def _is_tick(row: Sequence[str], at: int) -> bool:
     return cell.isascii() and cell.isdigit() and len(cell) <= len(str(_TICKS_1970)) and int(cell) >= _FEWEST_TICKS
 
 
-def _decimal_mark(text: Text, head: _Head) -> str:
+def _decimal_mark(text: Text, head: _ScopeHead) -> str:
     """Return the decimal mark: the first mark in the rows. Scope writes no thousands separators."""
     if head.separator == ",":
         return "."

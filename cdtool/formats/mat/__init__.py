@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
@@ -26,7 +26,7 @@ from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
-from cdtool.formats.mat.layout import Layout, arrange_columns
+from cdtool.formats.mat.layout import MatLayout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables
 from cdtool.formats.source import Source
 
@@ -51,24 +51,24 @@ class Mat:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all columns; raises RecordingError."""
-        with _variables(path) as variables:
+        with naming(path), _variables(path) as variables:
             layout = arrange_columns(variables)
             names = layout.names
-            keys = list(layout.columns) if wanted is None else requested_keys(path, wanted, names)
+            keys = list(layout.columns) if wanted is None else requested_keys(wanted, names)
             reader = _Reader(path, layout)
             # A machine file that names a clock reads it as it is.
             own_clocks = layout.own_clocks and (wanted is None or wanted.time.column == OWN_CLOCK)
             columns = reader.columns(keys, own_clocks)
             if wanted is not None and reader.complex:
-                raise RecordingError(f"{path}: column '{reader.complex[0]}' is complex", "save its real part")
+                raise RecordingError(f"column '{reader.complex[0]}' is complex", "save its real part")
             if not columns:
-                raise RecordingError(f"{path}: has no vector or matrix of numbers", "list its variables with `whos`")
+                raise RecordingError("has no vector or matrix of numbers", "list its variables with `whos`")
             details = _details(layout)
         findings = tuple(dict.fromkeys((*layout.findings, *reader.findings)))
         return Source(path, self.name, columns, reader.origin, findings, details, names)
 
 
-def _details(layout: Layout) -> dict[str, str]:
+def _details(layout: MatLayout) -> dict[str, str]:
     """Return the first single numbers and texts of a file, and how many more there are."""
     shown = list(islice((*layout.numbers, *layout.texts), _MOST_DETAILS))
     numbers = {name: f"{layout.numbers[name].read().ravel()[0]:g}" for name in shown if name in layout.numbers}
@@ -84,20 +84,20 @@ def _variables(path: Path) -> Iterator[Variables]:
         yield version_5.read_variables(path)
         return
     try:
-        h5py = library("h5py", "hdf5", path)
+        h5py = library("h5py", "hdf5")
     except RecordingError as fault:
         raise RecordingError(
-            f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed",
+            "is a MATLAB 7.3 (HDF5) file, and h5py is not installed",
             f"{fault.hint}; or save it in MATLAB with save(name, ..., '-v7')",
         ) from fault
-    with one_line_errors(path, "a MATLAB 7.3 file"), h5py.File(path, "r") as file:
+    with one_line_errors("a MATLAB 7.3 file"), h5py.File(path, "r") as file:
         yield version_73.read_variables(path, h5py, file)
 
 
 class _Reader:
     """Reads columns of a file; `complex` are those that are complex."""
 
-    def __init__(self, path: Path, layout: Layout) -> None:
+    def __init__(self, path: Path, layout: MatLayout) -> None:
         self._path, self._layout = path, layout
         self.findings: list[Finding] = []
         self.complex: list[str] = []

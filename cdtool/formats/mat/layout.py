@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.base.findings import Finding
 from cdtool.formats.containers.clock_beside import is_clock_name
-from cdtool.formats.mat.variables import MatColumn, Numbers, Section, Value, Variables, left_out
+from cdtool.formats.mat.variables import MatColumn, Numbers, Value, Variables, VariableSection, left_out
 
 _DETAIL = 80
 # A matrix in a struct with more columns than this is an image or a model.
@@ -41,14 +41,17 @@ class Leaf:
         """Return whether it has the name and the shape of a clock."""
         return bool(is_clock_name(self.last)) and 1 in self.numbers.shape and not self.numbers.is_complex
 
-    def columns(self) -> Iterator[tuple[str, Section]]:
+    def columns(self) -> Iterator[tuple[str, VariableSection]]:
         """Yield the names and sections of its columns."""
         for i in range(min(self.numbers.shape)):
-            yield self.name if 1 in self.numbers.shape else f"{self.name}[{i}]", Section(self.name, self.numbers, i)
+            yield (
+                self.name if 1 in self.numbers.shape else f"{self.name}[{i}]",
+                VariableSection(self.name, self.numbers, i),
+            )
 
 
 @dataclass
-class Layout:
+class MatLayout:
     """The columns of a file in its order; `hidden` ones are read only where a machine file names them.
 
     `leaves` are the arrays of numbers, `numbers` the single numbers, `texts` the texts by name. `with_runs`: arrays of
@@ -128,7 +131,7 @@ class Layout:
         They are runs if each that has arrays has the same clock and no second one. Elements with equal clocks were
         logged side by side: they are no runs. Structs of single numbers only are the rows of a table.
         """
-        inside = [Layout(with_runs=False) for _ in value]
+        inside = [MatLayout(with_runs=False) for _ in value]
         for number, (layout, element) in enumerate(zip(inside, value, strict=True), 1):
             layout._fields(element, f"{name}({number})", ())
         leaves = [{_inner_name(leaf.name, name): leaf for leaf in layout.leaves} for layout in inside]
@@ -152,10 +155,10 @@ class Layout:
         if clock:
             other = {key: leaf.rows for i in used for key, leaf in leaves[i].items() if leaf.rows != rows[i]}
             self._add_run_findings(name, rows, other)
-            ids = tuple(Section("", _constant(float(i + 1), rows[i])) for i in used)
+            ids = tuple(VariableSection("", _constant(float(i + 1), rows[i])) for i in used)
             self.columns[f"{name}(:)"] = MatColumn(ids, f"{name}(:).{clock}")
         for key in dict.fromkeys(key for some in fields for key in some):
-            missing = (Section("", _constant(np.nan, rows[i])) for i in used)
+            missing = (VariableSection("", _constant(np.nan, rows[i])) for i in used)
             sections = tuple(some.get(key, none) for some, none in zip(fields, missing, strict=True))
             self.columns[f"{name}(:).{key}"] = MatColumn(sections, f"{name}(:).{clock}" if clock else "")
         self.hidden |= {key: column for layout in inside for key, column in layout.columns.items()}
@@ -177,9 +180,9 @@ class Layout:
             self.findings.append(Finding("without_clock", "", {"variable": f"{name}(:).{key}", "rows": count}))
 
 
-def arrange_columns(variables: Variables) -> Layout:
+def arrange_columns(variables: Variables) -> MatLayout:
     """Return the layout of the variables of a file."""
-    layout = Layout()
+    layout = MatLayout()
     for name, value in variables.items():
         layout.add(value, name, name, ())
     clocks = _clocks(layout.leaves)
@@ -235,7 +238,7 @@ def _inner_name(name: str, array: str) -> str:
 
 def _fields_of_run(
     leaves: Mapping[str, Leaf], numbers: Mapping[str, Numbers], array: str, rows: int
-) -> dict[str, Section]:
+) -> dict[str, VariableSection]:
     """Return the columns of a run: arrays as long as its clock, and single numbers in each of its rows."""
     found = {
         _inner_name(key, array): section
@@ -243,7 +246,7 @@ def _fields_of_run(
         if leaf.rows == rows
         for key, section in leaf.columns()
     }
-    return found | {_inner_name(key, array): Section(key, each.repeated(rows)) for key, each in numbers.items()}
+    return found | {_inner_name(key, array): VariableSection(key, each.repeated(rows)) for key, each in numbers.items()}
 
 
 def _constant(number: float, rows: int) -> Numbers:

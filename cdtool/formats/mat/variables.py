@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,7 +55,7 @@ class Numbers:
 
 
 @dataclass(frozen=True)
-class Section:
+class VariableSection:
     """The rows of a column that a variable contains: column `index` of its table."""
 
     variable: str
@@ -72,7 +71,7 @@ class Section:
 class MatColumn:
     """A column: its sections, one after the other, and the name of the column that is its clock; empty if unknown."""
 
-    sections: tuple[Section, ...]
+    sections: tuple[VariableSection, ...]
     clock: str = ""
 
 
@@ -92,15 +91,15 @@ Variables = Mapping[str, Value]
 class ValueCount:
     """Counts the values of a file; raises RecordingError if it has more of them, or deeper nested, than any log."""
 
-    def __init__(self, path: Path) -> None:
-        self._path, self._count = path, 0
+    def __init__(self) -> None:
+        self._count = 0
 
     def add(self, level: int, count: int) -> None:
         """Count values that are inside of `level` others."""
         self._count += count
         if self._count > MOST_VALUES or level > MOST_LEVELS:
             raise RecordingError(
-                f"{self._path}: more than {MOST_VALUES} values or {MOST_LEVELS} levels of structs and cells: refused",
+                f"more than {MOST_VALUES} values or {MOST_LEVELS} levels of structs and cells: refused",
                 "save fewer variables",
             )
 

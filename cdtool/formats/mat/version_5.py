@@ -44,8 +44,8 @@ def read_variables(path: Path) -> Variables:
     """Return the variables of a file; raises RecordingError, with the byte, if it is cut off or damaged."""
     content = path.read_bytes()
     if not content.startswith(MAGIC) or len(content) < _HEADER:
-        raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
-    reader, variables = _Reader(path, ">" if content[126:128] == b"MI" else "<"), dict[str, Value]()
+        raise RecordingError("is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
+    reader, variables = _Version5Reader(path, ">" if content[126:128] == b"MI" else "<"), dict[str, Value]()
     reader.check_unpacked(memoryview(content))
     at = _HEADER
     while at < len(content):
@@ -58,19 +58,17 @@ def read_variables(path: Path) -> Variables:
                 if name:  # the objects of the file are stored in an array without a name
                     variables[_unique(name, variables)] = value
         except (ValueError, struct.error, zlib.error, OverflowError) as fault:
-            raise RecordingError(
-                f"{path}: damaged at byte {at}: {fault}", "copy the file again or save it again"
-            ) from fault
+            raise RecordingError(f"damaged at byte {at}: {fault}", "copy the file again or save it again") from fault
         at = end
     return variables
 
 
-class _Reader:
+class _Version5Reader:
     """Reads the elements of one file, whose byte order is `order`."""
 
     def __init__(self, path: Path, order: str) -> None:
         self._path, self.order = path, order
-        self._count = ValueCount(path)
+        self._count = ValueCount()
 
     def element(self, content: memoryview, at: int) -> tuple[int, memoryview, int]:
         """Return kind, content and end of the element at a byte; raises ValueError if it extends beyond `content`."""
@@ -180,7 +178,7 @@ class _Reader:
 class _Parts:
     """The parts of an array, one after the other."""
 
-    def __init__(self, reader: _Reader, content: memoryview) -> None:
+    def __init__(self, reader: _Version5Reader, content: memoryview) -> None:
         self._reader, self._content, self._at = reader, content, 0
 
     def next(self) -> tuple[int, memoryview]:

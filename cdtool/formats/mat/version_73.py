@@ -33,14 +33,14 @@ def is_version_73(path: Path) -> bool:
 
 def read_variables(path: Path, h5py: Any, file: Any) -> Variables:
     """Return the variables of an open file, whose numbers can be read as long as it is open."""
-    reader = _Reader(path, h5py, file)
+    reader = _Version73Reader(path, h5py, file)
     return {name: reader.member(file, name, 0) for name in file if not name.startswith("#")}  # targets of references
 
 
-class _Reader:
+class _Version73Reader:
     def __init__(self, path: Path, h5py: Any, file: Any) -> None:
         self._path, self._h5py, self._file = path, h5py, file
-        self._count = ValueCount(path)
+        self._count = ValueCount()
 
     def member(self, group: Any, name: str, level: int) -> Value:
         """Return a member of a group; links are not followed, as they may form a cycle or point to another file."""

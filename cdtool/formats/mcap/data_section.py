@@ -3,6 +3,8 @@
 A chunk whose CRC does not match is lost as a whole. After bytes that cannot be a record, reading continues at the next
 chunk, which is located by the summary if its CRC matches, or else by the consistency of its header. If the file's end
 cuts off a chunk, the part that can be decompressed is returned as not covered by a CRC.
+
+Check attachments (op=0x09) in pieces, so that a large attachment does not need memory.
 """
 
 from __future__ import annotations
@@ -17,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.formats.mcap import messages
-from cdtool.formats.mcap.attachments import check_attachment
 from cdtool.formats.mcap.chunks import (
     HEADER_LENGTH,
     Bytes,
@@ -32,8 +33,31 @@ from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss, Losses
 from cdtool.formats.mcap.messages import Positions, Walk
 from cdtool.formats.mcap.records import LARGEST, MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
-from cdtool.formats.mcap.summary import Summary, matches_header
+from cdtool.formats.mcap.summary import McapSummary, matches_header
 from cdtool.formats.messages.batch import Batch
+
+_LONGEST_TEXT = 1 << 16
+
+
+def check_attachment(file: FileBytes, at: int, length: int, *, with_crc: bool = True) -> None:
+    """Check the attachment record of `length` bytes at byte `at`, its content `with_crc`; raises DamageError."""
+    head = file.read(at + PREFIX, min(length - PREFIX, 2 * _LONGEST_TEXT))
+    try:
+        offset = 16  # after two times
+        for _ in range(2):
+            (size,) = struct.unpack_from("<I", head, offset)
+            struct.unpack_from(f"<{size}s", head, offset + 4)[0].decode()
+            offset += 4 + size
+        (size,) = struct.unpack_from("<Q", head, offset)
+    except (struct.error, UnicodeDecodeError) as fault:
+        raise DamageError(f"an attachment of {length} bytes ends within its name, or it is not UTF-8") from fault
+    end = at + PREFIX + offset + 8 + size
+    if end + 4 > at + length:
+        raise DamageError("the declared data size of an attachment exceeds its record")
+    stated = int.from_bytes(file.read(end, 4), "little") if with_crc else 0
+    if stated and stated != file.crc(at + PREFIX, end):
+        raise DamageError("the checksum of an attachment does not match")
+
 
 # Chunks are joined up to this size [bytes]: messages of many small ones are then decoded together.
 JOINED = 1 << 23
@@ -65,7 +89,7 @@ class DataSection:
     the first message with a valid one.
     """
 
-    def __init__(self, file: FileBytes, summary: Summary, definitions: Definitions, unwanted: set[int]) -> None:
+    def __init__(self, file: FileBytes, summary: McapSummary, definitions: Definitions, unwanted: set[int]) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}
         self.extras: dict[tuple[int, int, int], None] = {}
@@ -319,7 +343,7 @@ class Resync:
     back is limited, because a file may consist of such lengths.
     """
 
-    def __init__(self, file: FileBytes, summary: Summary) -> None:
+    def __init__(self, file: FileBytes, summary: McapSummary) -> None:
         self.verified_to = len(MAGIC)
         self._file = file
         self._known = sorted(summary.chunks) if summary.verified else []

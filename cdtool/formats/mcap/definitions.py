@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from mcap.records import Channel, Schema
 
 from cdtool.formats.mcap.records import DamageError, Opcode, parse
-from cdtool.formats.mcap.summary import Summary
+from cdtool.formats.mcap.summary import McapSummary
 from cdtool.formats.messages.batch import Stream
 
 
@@ -23,7 +23,7 @@ class DefinedStream(Stream):
 class Definitions:
     """The schemas and channels by id, as far as the file was read; copies in a summary with a CRC are also used."""
 
-    def __init__(self, summary: Summary) -> None:
+    def __init__(self, summary: McapSummary) -> None:
         self._schemas = dict(summary.schemas) if summary.verified else {}
         self._channels = dict(summary.channels) if summary.verified else {}
         self._covered_schemas = set(self._schemas)

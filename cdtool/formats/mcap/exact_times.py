@@ -7,7 +7,7 @@ from dataclasses import replace
 from cdtool.formats.columns import Piece
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.records import LARGEST, PREFIX, DamageError, Opcode, parse
-from cdtool.formats.mcap.summary import Summary
+from cdtool.formats.mcap.summary import McapSummary
 from cdtool.formats.pieces import PieceRun, Pieces
 
 # The metadata record of such a file, the package of its message types, and the field with a message's time [s].
@@ -16,7 +16,7 @@ PACKAGE = "cdtool_msgs/msg"
 EXACT_TIME = "time_s"
 
 
-def exact_origin(file: FileBytes, summary: Summary, after_header: int) -> float | None:
+def exact_origin(file: FileBytes, summary: McapSummary, after_header: int) -> float | None:
     """Return the time [s] of the zero of the exact times; None for a file that cdtool did not convert."""
     for at in (*(index.offset for index in summary.metadata if index.name == METADATA), after_header):
         head = file.read(at, PREFIX)

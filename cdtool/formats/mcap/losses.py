@@ -8,7 +8,7 @@ from typing import Any
 
 from cdtool.base.findings import Finding
 from cdtool.formats.mcap.chunks import ChunkHeader
-from cdtool.formats.mcap.summary import Summary
+from cdtool.formats.mcap.summary import McapSummary
 
 _LISTED = 10
 
@@ -30,7 +30,7 @@ class Loss:
     refused: bool = False
 
     @classmethod
-    def of_chunk(cls, header: ChunkHeader, summary: Summary, reason: str, refused: bool = False) -> Loss:
+    def of_chunk(cls, header: ChunkHeader, summary: McapSummary, reason: str, refused: bool = False) -> Loss:
         """Return the loss of a whole chunk. Its header may be damaged: a verified summary takes precedence."""
         known = summary.chunks.get(header.at) if summary.verified else None
         times = known or header

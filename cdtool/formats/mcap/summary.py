@@ -30,7 +30,7 @@ _SHORT = 1 << 12
 
 
 @dataclass(frozen=True)
-class Summary:
+class McapSummary:
     """The summary's records; `problem` is why they cannot be read, `verified`: their CRC matches."""
 
     footer: Footer | None = None
@@ -43,13 +43,13 @@ class Summary:
     metadata: tuple[MetadataIndex, ...] = ()
 
 
-def read_summary(file: FileBytes) -> Summary:
+def read_summary(file: FileBytes) -> McapSummary:
     """Return the summary; damage is returned as its `problem`, without an exception."""
     footer = None
     try:
         footer, at = _footer(file)
         if not footer.summary_start:
-            return Summary(footer)
+            return McapSummary(footer)
         start = footer.summary_start
         if not len(MAGIC) <= start <= at or at - start > LARGEST:
             raise DamageError(f"the footer states byte {start} as the summary's start")
@@ -59,9 +59,9 @@ def read_summary(file: FileBytes) -> Summary:
             raise DamageError("the checksum of the summary does not match")
         records = list(parse_all(section))
     except DamageError as fault:
-        return Summary(footer, problem=str(fault))
+        return McapSummary(footer, problem=str(fault))
     counts = [record for record in records if isinstance(record, Statistics)]
-    return Summary(
+    return McapSummary(
         footer,
         verified=bool(footer.summary_crc),
         schemas={record.id: record for record in records if isinstance(record, Schema) and record.id},
@@ -94,7 +94,7 @@ def _footer(file: FileBytes) -> tuple[Footer, int]:
     return parse(Opcode.FOOTER, end[PREFIX : -len(MAGIC)]), at
 
 
-def unwanted_chunks(summary: Summary, wanted: Callable[[str], bool]) -> set[int]:
+def unwanted_chunks(summary: McapSummary, wanted: Callable[[str], bool]) -> set[int]:
     """Return the chunks, by their bytes, that have no wanted topic by a summary whose CRC matches.
 
     The first chunk is never one of them, because it has the log's start. A chunk without message indexes, or with an
@@ -109,7 +109,7 @@ def unwanted_chunks(summary: Summary, wanted: Callable[[str], bool]) -> set[int]
     return {at for at, index in chunks.items() if is_unwanted(index)} - {min(chunks, default=0)}
 
 
-def between_chunks(summary: Summary) -> Iterator[tuple[int, int]]:
+def between_chunks(summary: McapSummary) -> Iterator[tuple[int, int]]:
     """Yield the ranges that show what is between the data of the chunks: their headers, and the message indexes.
 
     Of a long message index only the beginning is needed. The end of the last one is followed by the end of the data.

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.columns import as_float64
 from cdtool.formats.messages.batch import Batch
-from cdtool.formats.messages.decoded_batch import MOST_FIELDS, ByteArray, Decoder, Group, IntArray
+from cdtool.formats.messages.decoded_batch import MOST_FIELDS, ByteArray, Decoder, IntArray, MessageGroup
 from cdtool.formats.messages.fields import Field, FieldMissingError
 from cdtool.formats.messages.layout import Schema
 
@@ -140,7 +140,7 @@ def _numbers(content: ByteArray, run: _Run) -> FloatArray | float:
 
 
 @dataclass(eq=False)
-class _Alike(Group):
+class _Alike(MessageGroup):
     """Messages with the layout of an example."""
 
     example: Example
@@ -169,9 +169,9 @@ class SchemaDecoder(Decoder):
         """Return why no message can have a field."""
         return self.schema.missing(field)
 
-    def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
+    def groups(self, batch: Batch) -> tuple[list[MessageGroup], dict[int, str]]:
         """Return the messages that are alike, and the reasons for those that are damaged by row."""
-        groups: list[Group] = []
+        groups: list[MessageGroup] = []
         reasons: dict[int, str] = {}
         remaining = np.arange(len(batch))
         for example in self._known:
@@ -193,7 +193,7 @@ class SchemaDecoder(Decoder):
         return groups, reasons
 
 
-def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[Group]) -> IntArray:
+def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[MessageGroup]) -> IntArray:
     """Add the messages that are like the example to the groups, and return the others."""
     size = len(example.payload)
     fits: npt.NDArray[np.bool_] = batch.length[remaining] == size

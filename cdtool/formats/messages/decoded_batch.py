@@ -63,7 +63,7 @@ class DecodedBatch:
 
 
 @dataclass(eq=False)
-class Group(ABC):
+class MessageGroup(ABC):
     """Messages `rows` of a batch that one object of the field language describes.
 
     The object has a number, or in place of each number what `read` needs to return those of all messages.
@@ -89,7 +89,7 @@ class Decoder(ABC):
         """Return every numeric field except the header's time stamp, as `wrench.force.z`, `position[:]`."""
 
     @abstractmethod
-    def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
+    def groups(self, batch: Batch) -> tuple[list[MessageGroup], dict[int, str]]:
         """Return the messages that can be decoded, and the reasons why the others cannot, by row."""
 
     def absent(self, field: Field) -> FieldMissingError | None:  # noqa: ARG002  unknown without a schema
@@ -121,7 +121,7 @@ class Decoder(ABC):
         wanted: Sequence[Field],  # noqa: ARG002
         joints: Sequence[str],  # noqa: ARG002
         stamps: bool,  # noqa: ARG002
-    ) -> tuple[list[Group], dict[int, str]]:
+    ) -> tuple[list[MessageGroup], dict[int, str]]:
         """Return the groups of `groups`, or some that hold only what is wanted of the messages."""
         return self.groups(batch)
 
@@ -131,7 +131,7 @@ def absent_field(n: int, fault: FieldMissingError) -> FieldValues:
     return FieldValues(np.full(n, math.nan), None, np.full(n, ABSENT, np.uint8), fault)
 
 
-def field_values(n: int, groups: Sequence[Group], field: Field, joints: Sequence[str]) -> FieldValues:
+def field_values(n: int, groups: Sequence[MessageGroup], field: Field, joints: Sequence[str]) -> FieldValues:
     """Return one field of n messages."""
     state, count = np.zeros(n, np.uint8), np.full(n, -1)
     parts: list[tuple[IntArray, FloatArray]] = []
@@ -167,7 +167,7 @@ def _joined(n: int, width: int, parts: Sequence[tuple[IntArray, FloatArray]]) ->
     return table
 
 
-def _header_times(n: int, groups: Sequence[Group]) -> tuple[IntArray, npt.NDArray[np.bool_]]:
+def _header_times(n: int, groups: Sequence[MessageGroup]) -> tuple[IntArray, npt.NDArray[np.bool_]]:
     """Return the header stamps [ns], and which messages have one; float64 represents all integers below 2^53."""
     times, has_stamp = np.zeros(n, np.int64), np.zeros(n, np.bool_)
     for group in groups:

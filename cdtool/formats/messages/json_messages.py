@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.messages.batch import Batch
-from cdtool.formats.messages.decoded_batch import MOST_FIELDS, Decoder, Group, UndecodableError
+from cdtool.formats.messages.decoded_batch import MOST_FIELDS, Decoder, MessageGroup, UndecodableError
 from cdtool.formats.messages.fields import (
     STAMPS,
     Field,
@@ -46,7 +46,7 @@ class JsonDecoder(Decoder):
                 raise UndecodableError(f"its messages have more than {MOST_FIELDS} different fields")
         return list(self._fields)
 
-    def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
+    def groups(self, batch: Batch) -> tuple[list[MessageGroup], dict[int, str]]:
         """Return the messages of a batch that are objects, and the reasons why the others are not, by row."""
         messages, reasons = _load(batch)
         rows = np.array(list(messages), np.int64)
@@ -54,7 +54,7 @@ class JsonDecoder(Decoder):
 
     def wanted_groups(
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool
-    ) -> tuple[list[Group], dict[int, str]]:
+    ) -> tuple[list[MessageGroup], dict[int, str]]:
         """Return all messages as one group, if none needs the rules of the field language."""
         try:
             return [_alike(batch, wanted, joints, stamps)], {}
@@ -62,7 +62,7 @@ class JsonDecoder(Decoder):
             return self.groups(batch)
 
 
-class _Single(Group):
+class _Single(MessageGroup):
     """One message."""
 
     def find(self, field: Field, joints: Sequence[str]) -> float | list[float] | FieldMissingError | None:
@@ -76,7 +76,7 @@ class _Single(Group):
 
 
 @dataclass(eq=False)
-class _Alike(Group):
+class _AlikeJson(MessageGroup):
     """Messages with the same names and sizes at the wanted fields, whose numbers are in a `table` (rows, k)."""
 
     columns: dict[Field, list[float]]
@@ -157,7 +157,7 @@ class _NumbersOf:
         return table if self.order is None else table[:, self.order]
 
 
-def _alike(batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool) -> _Alike:
+def _alike(batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool) -> _AlikeJson:
     """Read the wanted numbers message by message, so that no more than one message is held as objects.
 
     Raises what a message raises that is not like the first one.
@@ -182,4 +182,4 @@ def _alike(batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps:
     columns: list[list[float]] = [[*range(end - table.shape[1], end)] for end, table in zip(ends, tables, strict=True)]
     times = {name: found[0] for name, found in zip(names, columns[len(wanted) :], strict=True)}
     of_field = dict(zip(wanted, columns, strict=False))
-    return _Alike(np.arange(len(batch)), {"header": {"stamp": times}}, of_field, np.hstack(tables))
+    return _AlikeJson(np.arange(len(batch)), {"header": {"stamp": times}}, of_field, np.hstack(tables))

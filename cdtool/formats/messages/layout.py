@@ -26,7 +26,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Text:
+class TextType:
     """A string."""
 
 
@@ -63,7 +63,7 @@ class Member:
     """One field of a message; `tag` is that of protobuf."""
 
     name: str
-    kind: Number | Text | Message
+    kind: Number | TextType | Message
     array: Array | None = None
     tag: Tag | None = None
 
@@ -103,7 +103,7 @@ class Schema:
                 return FieldMissingError(f"'{name}' is not an array", [name])
             kind = member.kind
             layout = self.layouts[kind.name] if isinstance(kind, Message) else _NO_MEMBERS
-        return FieldMissingError(f"'{field.text}' is a string, not a number") if isinstance(kind, Text) else None
+        return FieldMissingError(f"'{field.text}' is a string, not a number") if isinstance(kind, TextType) else None
 
     def numeric_names(self) -> Iterator[str]:
         """Yield every numeric field except the header's stamp, in schema order; arrays only if they may be short."""

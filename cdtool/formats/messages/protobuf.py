@@ -17,7 +17,7 @@ from cdtool.base.errors import installing
 from cdtool.formats.messages.alike import DamagedMessageError, Example, SchemaDecoder
 from cdtool.formats.messages.decoded_batch import UndecodableError
 from cdtool.formats.messages.fields import NO_MESSAGE
-from cdtool.formats.messages.layout import Array, Layout, Member, Message, Number, Schema, SchemaError, Tag, Text
+from cdtool.formats.messages.layout import Array, Layout, Member, Message, Number, Schema, SchemaError, Tag, TextType
 
 # FieldDescriptor.TYPE_*: the names of the types by number, and numpy's code of those with a fixed size.
 _TYPES = ("double", "float", "int64", "uint64", "int32", "fixed64", "fixed32", "bool", "string", "group", "message")
@@ -70,11 +70,11 @@ def _add_layout(message: Any, layouts: dict[str, Layout]) -> None:
 
 def _member(field: Any) -> Member:
     wire = (*_TYPES, *_MORE_TYPES)[field.type - 1]
-    kind: Number | Text | Message = Number(_FIXED.get(wire, "<i8")[1:])
+    kind: Number | TextType | Message = Number(_FIXED.get(wire, "<i8")[1:])
     if field.message_type is not None:
         kind = Message(field.message_type.full_name)
     elif wire in ("string", "bytes"):
-        kind = Text()
+        kind = TextType()
     oneof = field.containing_oneof
     others = () if oneof is None else tuple(other.name for other in oneof.fields if other.name != field.name)
     array = Array() if field.is_repeated else None
@@ -83,13 +83,13 @@ def _member(field: Any) -> Member:
 
 def walk_protobuf(schema: Schema, payload: bytes) -> Example:
     """Return the layout of a message; raises DamagedMessageError."""
-    walk = _Walk(schema, payload)
+    walk = _FieldWalk(schema, payload)
     walk.example.content = walk.empty(schema.root)
     walk.message(schema.root, walk.example.content, len(payload), 0)
     return walk.example
 
 
-class _Walk:
+class _FieldWalk:
     """A walk over the fields of one message; `at` is the byte that it has reached."""
 
     def __init__(self, schema: Schema, payload: bytes) -> None:

@@ -12,7 +12,7 @@ import re
 from functools import lru_cache
 from typing import Literal
 
-from cdtool.formats.messages.layout import Array, Layout, Member, Message, Number, Schema, SchemaError, Text
+from cdtool.formats.messages.layout import Array, Layout, Member, Message, Number, Schema, SchemaError, TextType
 
 _RULE = re.compile(r"^={3,}\s*$", re.MULTILINE)
 _HEADING = re.compile(r"^MSG:[ \t]+(\S+)\s*$")
@@ -20,7 +20,7 @@ _LINE = re.compile(r"(?P<type>\S+)\s+(?P<name>[A-Za-z]\w*)(?P<constant>\s*=)?(?P
 _TYPE = re.compile(
     r"(?P<base>[A-Za-z]\w*(?:/[A-Za-z]\w*){0,2})(?:<=(?P<text_bound>[1-9]\d*))?(?P<array>\[(?:<=)?(?P<length>[1-9]\d*)?\])?"
 )
-Kind = Number | Text | Message
+Kind = Number | TextType | Message
 _SAME: dict[str, Kind] = {
     "bool": Number("?"),
     **{f"int{8 * size}": Number(f"i{size}") for size in (1, 2, 4, 8)},
@@ -28,7 +28,7 @@ _SAME: dict[str, Kind] = {
     "float32": Number("f4"),
     "float64": Number("f8"),
     "char": Number("u1"),
-    "string": Text(),
+    "string": TextType(),
 }
 # http://wiki.ros.org/msg: `time` and `duration` are two numbers.
 _ROS1: dict[str, Kind] = {"byte": Number("i1"), "time": Message("time"), "duration": Message("duration")}
@@ -118,7 +118,7 @@ def _member(text: str, name: str, title: str, names: set[str], primitives: dict[
     if kind is None:
         why = "has characters whose width depends on the writer" if match["base"] == "wstring" else "is not defined"
         raise SchemaError(f"type '{match['base']}' of {title}.{name} {why}")
-    if match["text_bound"] and not isinstance(kind, Text):
+    if match["text_bound"] and not isinstance(kind, TextType):
         raise SchemaError(f"type '{text[:60]}' of {title}.{name}: only strings can have a length limit")
     if not match["array"]:
         return Member(name, kind)

@@ -13,7 +13,7 @@ from typing import Any
 
 from cdtool.formats.messages.alike import DamagedMessageError, Example
 from cdtool.formats.messages.decoded_batch import UndecodableError
-from cdtool.formats.messages.layout import Layout, Member, Message, Number, Schema, Text
+from cdtool.formats.messages.layout import Layout, Member, Message, Number, Schema, TextType
 
 _HEADER = 4
 PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a multiple of 4
@@ -69,7 +69,7 @@ class _Walk:
         if member.array is None:
             if isinstance(kind, Number):
                 return self._numbers(kind, 1)[0]
-            return self._text(member) if isinstance(kind, Text) else self._message(self._schema.layouts[kind.name])
+            return self._text(member) if isinstance(kind, TextType) else self._message(self._schema.layouts[kind.name])
         count = self._length() if member.array.length is None else member.array.length
         if isinstance(kind, Number):
             return self._numbers(kind, count) if count else range(0)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.tables import Table
 from cdtool.machines.axis import Axis
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
 from cdtool.machines.joint_machine import JointMachine
 
 # What [machine] gives, so that it must not be repeated in [model.drive].
@@ -44,7 +44,7 @@ class ModelTable:
     sections: Mapping[str, Mapping[str, tuple[float, ...]]]
 
     parts: ClassVar[dict[str, type[Any]]] = {
-        "drive": Drive,
+        "drive": ElasticDrive,
         "friction": Friction,
         "controller": Controller,
         "sensors": Sensors,
@@ -115,7 +115,7 @@ def joint_model(machine: JointMachine, table: ModelTable, joint: int, masses: tu
         controller["speed_filter_order"] = int(controller["speed_filter_order"])
     one_mass = isinstance(machine, Axis) and machine.coordinates == "load" and not motor and "stiffness" not in drive
     return AxisModel(
-        drive=Drive(motor_mass=motor, load_mass=load, **{"stated_rigid": one_mass, **drive}),
+        drive=ElasticDrive(motor_mass=motor, load_mass=load, **{"stated_rigid": one_mass, **drive}),
         friction=_friction(machine, table, joint),
         controller=Controller(**controller) if controller else None,
         sensors=Sensors(**table.of_joint("sensors", joint)),
@@ -144,7 +144,7 @@ def _require(machine: str, section: str, given: Mapping[str, float], part: type[
             raise ConfigurationError(f"machine '{machine}': {section}.{item.name} is missing", "give a number")
 
 
-def finite_values(part: Drive | Friction | Controller | Sensors) -> dict[str, float]:
+def finite_values(part: ElasticDrive | Friction | Controller | Sensors) -> dict[str, float]:
     """Return the values of a part of the model that a table can hold: without those that are infinite."""
     values = {item.name: getattr(part, item.name) for item in fields(part)}
     return {name: float(value) for name, value in values.items() if math.isfinite(value) and name not in _NOT_KEYS}

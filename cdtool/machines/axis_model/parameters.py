@@ -9,7 +9,7 @@ from cdtool.base.errors import ConfigurationError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class ElasticDrive:
     """Masses and the elastic drive between them; a rotary axis has kg m2, N m/rad, N m s/rad and rad.
 
     With the wind-up d = x_motor - x_load the drive's force is k1 d + c1 d' up to the take-up travel g, and
@@ -135,13 +135,13 @@ class Sensors:
 class AxisModel:
     """One axis in closed loop. Without a controller its drive force is what the log measured."""
 
-    drive: Drive
+    drive: ElasticDrive
     friction: Friction = field(default_factory=Friction)
     controller: Controller | None = None
     sensors: Sensors = field(default_factory=Sensors)
 
 
-def _check_not_negative(section: str, values: Drive | Controller | Sensors) -> None:
+def _check_not_negative(section: str, values: ElasticDrive | Controller | Sensors) -> None:
     for item in fields(values):
         value = getattr(values, item.name)
         if not value >= 0.0:

@@ -11,7 +11,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError
 from cdtool.machines.axis_model import axis_loop_kernel
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import AxisModel, Drive
+from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive
 
 # The classical Runge-Kutta method is stable up to 2.78 and accurate well below [-].
 _LARGEST_STEP = 0.5
@@ -126,7 +126,7 @@ def substeps(model: AxisModel, period: float, obstacle: Obstacle | None = None) 
     return max(needed, _FEWEST_SUBSTEPS)
 
 
-def wind_up_at(drive: Drive, force: float) -> float:
+def wind_up_at(drive: ElasticDrive, force: float) -> float:
     """Return the wind-up at which the elastic drive has a static force; 0 for a rigid drive."""
     if drive.is_rigid:
         return 0.0
@@ -138,7 +138,7 @@ def wind_up_at(drive: Drive, force: float) -> float:
     return drive.take_up_travel + (force - taken_up) / drive.end_stiffness
 
 
-def _behind_front(drive: Drive, obstacle: Obstacle) -> Obstacle:
+def _behind_front(drive: ElasticDrive, obstacle: Obstacle) -> Obstacle:
     """Return the obstacle as the load meets it: a front without mass is a spring in series with it."""
     if drive.front_mass > 0.0 or math.isinf(drive.front_stiffness):
         return obstacle

@@ -10,7 +10,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import Drive
+from cdtool.machines.axis_model.parameters import ElasticDrive
 from cdtool.machines.robot_model import robot_loop_kernel
 from cdtool.machines.robot_model.parameters import RobotModel, Vector, largest_rate
 
@@ -205,7 +205,7 @@ def _rate_at(
     return max(rates)
 
 
-def wind_up_at(drive: Drive, torque: float) -> float:
+def wind_up_at(drive: ElasticDrive, torque: float) -> float:
     """Return the wind-up of a joint's drive, the same in both directions, at a static torque; 0 if it is rigid."""
     if drive.is_rigid:
         return 0.0

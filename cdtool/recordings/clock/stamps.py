@@ -53,12 +53,7 @@ class CleanTime:
 
 
 def clean_time(
-    time: npt.ArrayLike,
-    first_row: int = 0,
-    row_name: str = "sample",
-    *,
-    counted: npt.ArrayLike | None = None,
-    sampled: bool = True,
+    time: npt.ArrayLike, first_row: int = 0, *, counted: npt.ArrayLike | None = None, sampled: bool = True
 ) -> CleanTime:
     """Drop time stamps [s] that are missing, stray, repeated or run backward; regularise a coarse clock.
 
@@ -66,46 +61,34 @@ def clean_time(
     by a straight line that is fitted recursively to (index, stamp): coarse_clock.fit_line. Dropped rows are reported
     with their share; they are a loss if they are more than single stray rows.
 
-    `first_row` is the number of the first sample in the file, for messages. `counted` (n,) are the time stamps as in
-    the file, in which the wrap of a counter is recognised. `sampled` is False for the times of events, which are not
-    on a line. Raises RecordingError if no time stamp is above the first.
+    `first_row` is the line of the first sample in the file, for messages (0: unknown). `counted` (n,) are the time
+    stamps as in the file, in which the wrap of a counter is recognised. `sampled` is False for the times of events,
+    which are not on a line. Raises RecordingError if no time stamp is above the first.
     """
     stamps = np.asarray(time, dtype=np.float64)
     if _is_clean(stamps):  # the usual case
         return CleanTime(stamps.copy(), np.ones(len(stamps), dtype=bool), ())
-    known = np.isfinite(stamps)
-    dropped = _DroppedStampCounts()
-    index, repeated, backward = dropped.sort_out(stamps, StrayStampMarker().add(stamps[known], final=True))
-    if not len(index):
-        return CleanTime(np.empty(0), np.zeros(len(stamps), dtype=bool), tuple(dropped.findings(first_row, row_name)))
-    kept = stamps[index]
-    rising = kept[~backward]
+    cleaner = ClockCleaner()
+    _, rows = cleaner.sort_out(stamps, stamps if counted is None else np.asarray(counted, dtype=np.float64), final=True)
+    index = rows.index[~rows.backward]
+    rising = stamps[index]
     if sampled and len(rising) > 1 and rising[0] == rising[-1]:
         raise RecordingError(
-            f"none of the {len(kept)} time stamps is above {kept[0]:g} s: the clock stands still",
+            f"none of the {len(rows.index)} time stamps is above {rising[0]:g} s: the clock stands still",
             "name another clock in [channels] time, or the sample rate: time = { rate_hz = ... }",
         )
-    restart = _RestartDetector()
-    raw = kept if counted is None else np.asarray(counted, dtype=np.float64)[index]
-    if backward.any():
-        restart.add(raw, backward)
-    findings = dropped.findings(first_row, row_name, restart.cause(lambda: _median_step(raw)))
-    if sampled and dropped.is_coarse:
-        index = index[~backward]
-        line, on_line = fit_line(rising)
-        step = 1e3 * _median_step(rising)
-        findings.append(Finding("coarse_clock", "time", {"share": float(repeated.mean()), "step_ms": step}))
-        stuck = _RowCount("stuck_stamps")
-        stuck.add(index[~on_line], 0)
-        findings += stuck.findings(len(stamps), first_row, row_name)
-        index, kept = index[on_line], line[on_line]
-    else:
-        findings += dropped.repeated.findings(len(stamps), first_row, row_name)
-        good = ~(repeated | backward)
-        index, kept = index[good], kept[good]
+    if not (sampled and cleaner.is_coarse):
+        keep = rows.kept(len(stamps))
+        return CleanTime(stamps[keep], keep, tuple(cleaner.findings(first_row)))
+    line, on_line = fit_line(rising)
+    share = {"share": float(rows.repeated.mean()), "step_ms": 1e3 * _median_step(rising)}
+    stuck = _RowCount("stuck_stamps")
+    stuck.add(index[~on_line], 0)
+    coarse = [Finding("coarse_clock", "time", share), *stuck.findings(len(stamps), first_row)]
     keep = np.zeros(len(stamps), dtype=bool)
-    keep[index] = True
-    return CleanTime(np.ascontiguousarray(kept), keep, tuple(findings))
+    keep[index[on_line]] = True
+    findings = (*cleaner.findings(first_row, with_repeated=False), *coarse)
+    return CleanTime(np.ascontiguousarray(line[on_line]), keep, findings)
 
 
 def _is_clean(stamps: FloatArray) -> bool:
@@ -117,47 +100,81 @@ def _is_clean(stamps: FloatArray) -> bool:
     return bool(steps.min() > 0.0 and steps.max() <= EPOCH)  # False for a step that is NaN
 
 
+@dataclass(frozen=True)
+class _SortedRows:
+    """The rows of a piece, by their `index`, that are neither missing nor stray, and which repeat or run backward."""
+
+    index: npt.NDArray[np.intp]
+    repeated: BoolArray
+    backward: BoolArray
+
+    def kept(self, count: int) -> BoolArray:
+        """Return which of all rows of the piece are kept."""
+        keep = np.zeros(count, dtype=bool)
+        keep[self.index[~(self.backward | self.repeated)]] = True
+        return keep
+
+
 class ClockCleaner:
     """Cleans time stamps [s] piece by piece; drops those that are missing, stray, repeated or run backward.
 
     The last rows of a piece are returned with the next one, or with `final`, as later rows determine whether they are
-    stray. A coarse clock, whose time stamps repeat, is not regularised as in clean_time.
+    stray. A coarse clock, whose time stamps repeat, is not regularised as in clean_time, which passes a whole clock as
+    one piece.
     """
 
     def __init__(self) -> None:
-        self._dropped, self._restart = _DroppedStampCounts(), _RestartDetector()
-        self._stray_marker = StrayStampMarker()
+        self._rows, self._highest = 0, -np.inf
+        self._unknown, self._stray = _RowCount("unknown_stamps"), _RowCount("stray_stamps")
+        self._repeated, self._backward = _RowCount("repeated_stamps"), _RowCount("backward_stamps")
+        self._restart, self._stray_marker = _RestartDetector(), StrayStampMarker()
         self._steps, self._last = Distribution(), np.empty(0)
         self._waiting = np.empty(0), np.empty(0)
 
     def times(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> FloatArray:
         """Return the times of the rows that are decided and kept; `counted` are the time stamps as in the file."""
+        decided, rows = self.sort_out(stamps, counted, final)
+        return decided[rows.kept(len(decided))]
+
+    def sort_out(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> tuple[FloatArray, _SortedRows]:
+        """Return the time stamps that are decided, and which of them are to be kept."""
         is_stray = self._stray_marker.add(stamps[np.isfinite(stamps)], final)
         stamps, counted = np.concatenate((self._waiting[0], stamps)), np.concatenate((self._waiting[1], counted))
         known = np.flatnonzero(np.isfinite(stamps))
         decided = len(stamps) if len(is_stray) == len(known) else int(known[len(is_stray)])
         # Copies, as a view would keep the whole piece in memory.
         self._waiting = stamps[decided:].copy(), counted[decided:].copy()
-        return stamps[:decided][self._keep(stamps[:decided], counted[:decided], is_stray)]
-
-    def _keep(self, stamps: FloatArray, counted: FloatArray, is_stray: BoolArray) -> BoolArray:
-        """Return which of the decided rows are kept; `is_stray` is for the rows with a finite time stamp."""
-        index, repeated, backward = self._dropped.sort_out(stamps, is_stray)
-        raw = counted[index]
+        stamps, counted, before = stamps[:decided], counted[:decided], self._rows
+        self._rows += decided
+        unknown = ~np.isfinite(stamps)
+        self._unknown.add(np.flatnonzero(unknown), before)
+        index = np.flatnonzero(~unknown)
+        self._stray.add(index[is_stray], before)
+        index = index[~is_stray]
+        kept, raw = stamps[index], counted[index]
+        highest = np.maximum.accumulate(np.concatenate(([self._highest], kept)))
+        self._highest = float(highest[-1])
+        rows = _SortedRows(index, kept == highest[:-1], kept < highest[:-1])
+        self._backward.add(index[rows.backward], before)
+        self._repeated.add(index[rows.repeated], before)
         steps = np.diff(np.concatenate((self._last, raw)))
         self._steps.add(steps[steps > 0.0])
         self._last = raw[-1:] if len(raw) else self._last
-        self._restart.add(raw, backward)
-        keep = np.zeros(len(stamps), dtype=bool)
-        keep[index[~(backward | repeated)]] = True
-        return keep
+        self._restart.add(raw, rows.backward)
+        return stamps, rows
 
-    def findings(self, first_row: int) -> list[Finding]:
+    @property
+    def is_coarse(self) -> bool:
+        """True if so many time stamps repeat that the clock is coarse."""
+        known = self._rows - self._unknown.count - self._stray.count
+        return known > 0 and self._repeated.count / known > COARSE_SHARE
+
+    def findings(self, first_row: int, with_repeated: bool = True) -> list[Finding]:
         """Return the findings on dropped rows; `first_row` is the file's line of the first sample (0: unknown)."""
-        row_name = "line" if first_row else "sample"
         restart = self._restart.cause(lambda: self._steps.median if self._steps.count else 0.0)
-        dropped = self._dropped.findings(first_row, row_name, restart)
-        return dropped + self._dropped.repeated.findings(self._dropped.rows, first_row, row_name)
+        kinds = [(self._unknown, None), (self._stray, None), (self._backward, restart)]
+        kinds += [(self._repeated, None)] if with_repeated else []
+        return [finding for rows, cause in kinds for finding in rows.findings(self._rows, first_row, cause)]
 
 
 def epoch_start(stamps: FloatArray, factor: float) -> float:
@@ -251,62 +268,16 @@ class _RowCount:
         self.count += len(rows)
         self._first += (rows[: _LISTED - len(self._first)] + before).tolist()
 
-    def findings(
-        self, rows: int, first_row: int, row_name: str, restart: dict[str, Any] | None = None
-    ) -> list[Finding]:
+    def findings(self, rows: int, first_row: int, restart: dict[str, Any] | None = None) -> list[Finding]:
         """Return the finding, given the total of `rows`: a loss if there is a cause, or if many rows are dropped."""
         if not self.count:
             return []
         first = tuple(row + first_row for row in self._first)
-        numbers = {"count": self.count, "rows": rows, "first": first, "row_name": row_name}
+        numbers = {"count": self.count, "rows": rows, "first": first, "row_name": "line" if first_row else "sample"}
         if self.kind == "backward_stamps":
             numbers["restart"] = restart
         is_loss = restart or self.kind == "stuck_stamps" or self.count / rows > _LOSS_SHARE
         return [Finding(self.kind, "time", numbers, "loss" if is_loss else "warning")]
-
-
-class _DroppedStampCounts:
-    """The dropped rows of a clock, by reason; `rows` is the total so far."""
-
-    def __init__(self) -> None:
-        self.rows = 0
-        self.repeated = _RowCount("repeated_stamps")
-        self._unknown, self._stray = _RowCount("unknown_stamps"), _RowCount("stray_stamps")
-        self._backward = _RowCount("backward_stamps")
-        self._highest = -np.inf
-
-    def sort_out(self, stamps: FloatArray, is_stray: BoolArray) -> tuple[npt.NDArray[np.intp], BoolArray, BoolArray]:
-        """Return the rows of a piece that are neither missing nor stray, and which of them repeat or run backward.
-
-        `is_stray` is for the rows with a finite time stamp.
-        """
-        known = np.isfinite(stamps)
-        before, self.rows = self.rows, self.rows + len(stamps)
-        self._unknown.add(np.flatnonzero(~known), before)
-        index = np.flatnonzero(known)
-        self._stray.add(index[is_stray], before)
-        index = index[~is_stray]
-        kept = stamps[index]
-        highest = np.maximum.accumulate(np.concatenate(([self._highest], kept)))
-        repeated, backward = kept == highest[:-1], kept < highest[:-1]
-        self._highest = float(highest[-1])
-        self._backward.add(index[backward], before)
-        self.repeated.add(index[repeated], before)
-        return index, repeated, backward
-
-    @property
-    def is_coarse(self) -> bool:
-        """True if so many time stamps repeat that the clock is coarse."""
-        known = self.rows - self._unknown.count - self._stray.count
-        return known > 0 and self.repeated.count / known > COARSE_SHARE
-
-    def findings(self, first_row: int, row_name: str, restart: dict[str, Any] | None = None) -> list[Finding]:
-        """Return the findings, except on repeated time stamps, which a coarse clock keeps.
-
-        `restart` is the cause of time stamps that run backward.
-        """
-        kinds = ((self._unknown, None), (self._stray, None), (self._backward, restart))
-        return [finding for rows, cause in kinds for finding in rows.findings(self.rows, first_row, row_name, cause)]
 
 
 class _RestartDetector:

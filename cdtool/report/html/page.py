@@ -52,7 +52,7 @@ def to_html(report: Report) -> str:
 
     model, results, traces = report.model, report.evaluated.results, report.traces
     style, script = page_part(_STYLE), "\n".join(page_part(name) for name in _SCRIPTS)
-    of_logs, numbers = traces_of(results, traces), {name: i for i, name in enumerate(results.detectors)}
+    of_logs, numbers = traces_of(traces), {name: i for i, name in enumerate(results.detectors)}
     tables = {name: PageTable(model.tables[name], of_logs) if name in model.tables else None for name in _TABLES}
     plots = plot_data(report)
     failed = failed_traces(model.failed, traces, of_logs)

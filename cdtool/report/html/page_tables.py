@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from cdtool.base.plain_text import plain
-from cdtool.report.table import Cell, Column, Log, Table
+from cdtool.report.table import Cell, Heading, Log, Table
 
 # A browser needs long to lay out more rows than this.
 _MOST_ROWS_AT_ONCE = 150
@@ -59,7 +59,7 @@ class PageTable:
         }
 
 
-def classes(cell: Cell, column: Column) -> str:
+def classes(cell: Cell, column: Heading) -> str:
     """Return the classes of the style sheet; long texts may be broken anywhere."""
     number, long = "number" if column.numeric else "", "long" if len(cell.text) > _LONGEST_WORD else ""
     return " ".join(name for name in (number, cell.tone, long) if name)
@@ -78,7 +78,7 @@ def short(value: float | None) -> float | int | None:
     return int(rounded) if rounded.is_integer() and abs(rounded) < 1e15 else rounded
 
 
-def _values(column: Column, cells: Sequence[Cell]) -> dict[str, Any]:
+def _values(column: Heading, cells: Sequence[Cell]) -> dict[str, Any]:
     """Return a column as JSON values; each text is stored once."""
     texts: dict[str, int] = {}
     at = [texts.setdefault("\n".join(map(visible, cell.lines)), len(texts)) for cell in cells]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -20,18 +20,15 @@ from cdtool.report.number_text import number, spoken, with_interval
 from cdtool.report.plots.style import look_of
 from cdtool.report.table import Log
 from cdtool.report.table import shown as named
-from cdtool.report.tables.recordings import log_of, logs_of
 from cdtool.report.tables.results import part_of
 from cdtool.report.writers.base import Report
-from cdtool.results.results import ContactResult, Results, SweepResult
-from cdtool.results.rows import grouped, picked, values_of
+from cdtool.results.results import ContactResult, ForceResult, Results, SweepResult, grouped
 from cdtool.results.summary import Summary, latencies
 from cdtool.results.traces.trace import Trace
 from cdtool.statistics.kaplan_meier import survival
 from cdtool.statistics.rates import poisson_at_most
 from cdtool.statistics.small_sample import FEWEST
 
-Row = TypeVar("Row")
 # Heights [px] of a detector's lane in the latency plot and of the other plots.
 LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT = 66, 44, 300
 HISTOGRAM_HEIGHT = 96
@@ -78,12 +75,11 @@ def css_colour(colour: str) -> str:
     return f"#{round(255.0 * float(colour)):02x}" + 2 * f"{round(255.0 * float(colour)):02x}"
 
 
-def traces_of(results: Results, traces: Sequence[Trace]) -> dict[Log, list[int]]:
+def traces_of(traces: Sequence[Trace]) -> dict[Log, list[int]]:
     """Return the numbers of the traces of each log: one per operation that was kept."""
-    logs = logs_of(results)
     numbers: dict[Log, list[int]] = {}
     for number_of, trace in enumerate(traces):
-        numbers.setdefault(log_of(trace.group, trace.recording, logs), []).append(number_of)
+        numbers.setdefault((trace.group, trace.log), []).append(number_of)
     return numbers
 
 
@@ -129,8 +125,8 @@ def _histograms(results: Results, summaries: Sequence[Summary], contacts: Contac
         items = [item for item in summaries if item.group == group and item.contacts]
         if not items:
             continue
-        values = [values_of(contacts[group, item.detector], "latency_ms") for item in items]
-        latency = [np.array([value for value in column if value is not None], dtype=np.float64) for column in values]
+        columns = [[row.latency_ms for row in contacts[group, item.detector]] for item in items]
+        latency = [np.array([value for value in column if value is not None], dtype=np.float64) for column in columns]
         edges = _edges(np.concatenate(latency))
         rows = [
             {
@@ -230,14 +226,12 @@ def _curve(points: Sequence[SweepResult]) -> dict[str, Any]:
 def _force(report: Report) -> list[dict[str, Any]]:
     """Return for each group with a force profile its limits, and which contacts of which traces have a verdict."""
     results = report.evaluated.results
-    logs = logs_of(results)
-    traced = {log_of(trace.group, trace.recording, logs) for trace in report.traces}
-    contacts, forces = _of_logs(results.contacts, traced), _of_logs(results.forces, traced)
-    numbers = {(item.group, item.recording, item.onset_s): item.contact for item in contacts}
-    verdicts = {(item.group, item.recording, item.contact): item for item in forces}
+    traced = {(trace.group, trace.log) for trace in report.traces}
+    numbers = {(*log, item.onset_s): item.contact for item in results.contacts if (log := _log(item)) in traced}
+    verdicts = {(*log, item.contact): item for item in results.forces if (log := _log(item)) in traced}
     curves: dict[str, list[dict[str, Any]]] = {}
     for i, trace in enumerate(report.traces):
-        log = log_of(trace.group, trace.recording, logs)
+        log = trace.group, trace.log
         for place, contact in enumerate(trace.contacts):
             verdict = verdicts.get((*log, numbers.get((*log, contact.start), 0)))
             if verdict is None or not len(trace.force):
@@ -257,7 +251,7 @@ def _force(report: Report) -> list[dict[str, Any]]:
             steps = [
                 [short(step["from_s"]), short(step["at_most_n"]), plain(step["name"])] for step in profile["steps"]
             ]
-            count = values_of(results.forces, "group").count(group)
+            count = sum(item.group == group for item in results.forces)
             panels.append(
                 {
                     "group": shown(group),
@@ -271,9 +265,8 @@ def _force(report: Report) -> list[dict[str, Any]]:
     return panels
 
 
-def _of_logs(rows: Sequence[Row], logs: Collection[Log]) -> Sequence[Row]:
-    columns = (values_of(rows, name) for name in ("group", "recording"))
-    return picked(rows, [number for number, log in enumerate(zip(*columns, strict=True)) if log in logs])
+def _log(row: ContactResult | ForceResult) -> Log:
+    return row.group, row.recording
 
 
 def _numbers(values: np.ndarray) -> list[float | int | None]:

@@ -14,7 +14,7 @@ from cdtool.base.errors import CdtoolError
 from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.self_contained import content_policy, page_part, page_template
 from cdtool.report.plots.figures import png
-from cdtool.report.table import Cell, Column, Table, name_cell
+from cdtool.report.table import Cell, Heading, Table, name_cell
 from cdtool.results.results import RecordingFinding, Skipped
 
 if TYPE_CHECKING:
@@ -83,5 +83,5 @@ def left_out_sections(skipped: Sequence[Skipped], findings: Sequence[RecordingFi
     for name, title, items in (("skipped", "Left out", skipped), ("findings", "Warnings", findings)):
         if items:
             rows = [[name_cell(visible(item.recording)), Cell(visible(item.reason))] for item in items]
-            tables.append(Table(name, title, (Column("recording"), Column("reason")), rows))
+            tables.append(Table(name, title, (Heading("recording"), Heading("reason")), rows))
     return [PageSection("Left out and warnings", tuple(tables))]

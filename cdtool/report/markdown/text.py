@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 
 from cdtool.base.plain_text import counted, plain, shorten
-from cdtool.report.table import Cell, Column, Table
+from cdtool.report.table import Cell, Heading, Table
 
 # A colon followed by a space is part of a sentence; others begin an emoji or are part of an address.
 _ACTIVE = re.compile(r"([\\`*\[\]<>|&$#~!]|:(?! )|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9]))")
@@ -117,7 +117,7 @@ def _joined(parts: Iterable[str]) -> str:
     return _BLANK.join(part for part in parts if part) + "\n"
 
 
-def _cell(cell: Cell, column: Column) -> str:
+def _cell(cell: Cell, column: Heading) -> str:
     """Return the cell in one line; bold if it is an outcome that is not good."""
     text = escape(cell.line)
     return f"**{text}**" if column.choice and cell.tone in ("bad", "unknown") else text

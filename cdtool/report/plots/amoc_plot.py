@@ -29,7 +29,7 @@ from cdtool.report.plots.figures import (
 )
 from cdtool.report.plots.labels import Labelled, write_labels
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
-from cdtool.report.plots.side_table import Column, SideTable, key_height
+from cdtool.report.plots.side_table import SideColumn, SideTable, key_height
 from cdtool.report.plots.style import BAND, look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.curves.amoc import AmocCurve, AmocPoint, amoc_curves
@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FIGURES = (
-    Column("factor\nin use", 40),
-    Column("median\n[ms]", 62),
-    Column("missed", 46),
-    Column("not\nassessable", 50),
-    Column("false alarms\nin hold-out", 66),
+    SideColumn("factor\nin use", 40),
+    SideColumn("median\n[ms]", 62),
+    SideColumn("missed", 46),
+    SideColumn("not\nassessable", 50),
+    SideColumn("false alarms\nin hold-out", 66),
 )
 _NAME = 24
 _PANEL = 2.5
@@ -78,7 +78,7 @@ def _figure(evaluated: Evaluated) -> Figure:
         return figure
     rows = {group: [item for item in evaluated.summaries if item.group == group] for group in groups}
     name = 72.0 * text_width([label(item.detector, _NAME) for items in rows.values() for item in items], 8) + 20.0
-    table = SideTable((Column("", name, left=True), *_FIGURES))
+    table = SideTable((SideColumn("", name, left=True), *_FIGURES))
     heights = [max(_PANEL, key_height(len(items)) + 0.1) for items in rows.values()]
     margins = Margins(0.75, table.width + 0.1, 0.5, 0.9)
     figure, panels = stacked_panels(margins.left + 5.2 + margins.right, heights, margins, gap=0.36)

@@ -25,7 +25,7 @@ from cdtool.report.plots.figures import (
     write,
 )
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
-from cdtool.report.plots.side_table import Column, SideTable, count_cells
+from cdtool.report.plots.side_table import SideColumn, SideTable, count_cells
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.evaluated import Evaluated
@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLUMNS = (
-    Column("median [ms]\n(95 % interval)", 132),
-    Column("detected", 66),
-    Column("missed", 38),
-    Column("not\nassessable", 52),
-    Column("false\nalarms", 36),
+    SideColumn("median [ms]\n(95 % interval)", 132),
+    SideColumn("detected", 66),
+    SideColumn("missed", 38),
+    SideColumn("not\nassessable", 52),
+    SideColumn("false\nalarms", 36),
 )
 _IMPACT_FREE = 70.0
 _ROW, _PANEL = 0.36, 0.2
@@ -114,7 +114,7 @@ def _figure(evaluated: Evaluated) -> Figure:
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
     impact_free = list(dict.fromkeys(item.group for item in evaluated.summaries if not item.contacts))
-    more = [Column(f"false alarms\nin {label(group, 11)}", _IMPACT_FREE) for group in impact_free]
+    more = [SideColumn(f"false alarms\nin {label(group, 11)}", _IMPACT_FREE) for group in impact_free]
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]

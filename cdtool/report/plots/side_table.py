@@ -20,7 +20,7 @@ _INDENT = 12.0
 
 
 @dataclass(frozen=True)
-class Column:
+class SideColumn:
     """A heading of one or two lines, and the width of the column [points]; `left`: its texts are left-aligned."""
 
     heading: str
@@ -29,7 +29,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class _Line:
+class _CellLine:
     """The position of a line of cells: `y` in `coordinates`, lifted by `lift` [points]; `size` of its letters."""
 
     coordinates: object
@@ -43,7 +43,7 @@ class _Line:
 class SideTable:
     """Columns right of the panels of a figure, the first one `gap` [points] from their edge."""
 
-    columns: Sequence[Column]
+    columns: Sequence[SideColumn]
     gap: float = 10.0
 
     @property
@@ -54,12 +54,12 @@ class SideTable:
     def write_headings(self, axes: Axes) -> None:
         """Write the headings above the panel's upper edge."""
         for i, column in enumerate(self.columns):
-            self._write(axes, i, column.heading, _Line("axes fraction", 1.0, 4.0, "bottom", _HEADING_SIZE))
+            self._write(axes, i, column.heading, _CellLine("axes fraction", 1.0, 4.0, "bottom", _HEADING_SIZE))
 
     def write_row(self, axes: Axes, y: float, cells: Sequence[str], loud: Sequence[bool]) -> None:
         """Write a row at height `y` in the panel's scale; `loud` cells are bold."""
         for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
-            self._write(axes, i, cell, _Line(axes.get_yaxis_transform(), y), bold)
+            self._write(axes, i, cell, _CellLine(axes.get_yaxis_transform(), y), bold)
 
     def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
         """Write a row counted from the panel's upper edge, after the detector's mark."""
@@ -81,9 +81,11 @@ class SideTable:
         )
         axes.add_line(mark)
         for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
-            self._write(axes, i, cell, _Line("axes fraction", 1.0, lift), bold, _INDENT if i == 0 else 0.0)
+            self._write(axes, i, cell, _CellLine("axes fraction", 1.0, lift), bold, _INDENT if i == 0 else 0.0)
 
-    def _write(self, axes: Axes, number: int, text: str, line: _Line, bold: bool = False, indent: float = 0.0) -> None:
+    def _write(
+        self, axes: Axes, number: int, text: str, line: _CellLine, bold: bool = False, indent: float = 0.0
+    ) -> None:
         column = self.columns[number]
         before = self.gap + sum(item.width for item in self.columns[:number])
         offset = before + (indent if column.left else 0.5 * column.width)

@@ -12,7 +12,7 @@ from cdtool.report.model import AXES
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
 from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
-from cdtool.report.plots.side_table import Column, SideTable, count_cells, key_height
+from cdtool.report.plots.side_table import SideColumn, SideTable, count_cells, key_height
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.curves.survival_curves import SurvivalCurve, survival_curves
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FIGURES = (
-    Column("median\n[ms]", 62),
-    Column("detected", 66),
-    Column("missed", 38),
-    Column("not\nassessable", 50),
-    Column("false\nalarms", 34),
+    SideColumn("median\n[ms]", 62),
+    SideColumn("detected", 66),
+    SideColumn("missed", 38),
+    SideColumn("not\nassessable", 50),
+    SideColumn("false\nalarms", 34),
 )
 _NAME = 24
 _PANEL = 1.75
@@ -62,7 +62,7 @@ def _figure(evaluated: Evaluated) -> Figure:
         return figure
     summaries = {(item.detector, item.group): item for item in evaluated.summaries}
     name = 72.0 * text_width([label(item.detector, _NAME) for item in curves], 8) + 20.0
-    table = SideTable((Column("", name, left=True), *_FIGURES))
+    table = SideTable((SideColumn("", name, left=True), *_FIGURES))
     panels_of = {group: [item for item in curves if item.group == group] for group in groups}
     heights = [max(_PANEL, key_height(len(items)) + 0.1) for items in panels_of.values()]
     margins = Margins(0.75, table.width + 0.1, 0.5, 0.7)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from cdtool.base.plain_text import counted
 from cdtool.report.number_text import NOTHING, number
-from cdtool.report.table import Cell, Column, Fields, Log, Table, empty_cell, name_cell, shown, tabulate
+from cdtool.report.table import Cell, Fields, Heading, Log, Table, empty_cell, name_cell, shown, tabulate
 from cdtool.report.tables.results import part_of
 from cdtool.results.recording_outcomes import RecordingOutcome, recording_outcomes
 from cdtool.results.results import ForceResult, Results
@@ -96,12 +96,12 @@ def attention_table(results: Results, failed: Sequence[FailedRecording]) -> Tabl
     """Return a row per failed recording, the worst first; columns that no row fills are left out."""
     names = part_of(results.provenance, "short_names")
     every: Fields[FailedRecording] = (
-        (Column("recording"), lambda item: name_cell(item.log[1])),
-        (Column("group", choice=True), lambda item: name_cell(item.log[0])),
-        (Column("missed by"), lambda item: _missed_by(item, results, names)),
-        (Column("force limit exceeded"), _force),
-        (Column("false alarms"), lambda item: _false_alarms(item, names)),
-        (Column("violates limits"), lambda item: _violated(item, names)),
+        (Heading("recording"), lambda item: name_cell(item.log[1])),
+        (Heading("group", choice=True), lambda item: name_cell(item.log[0])),
+        (Heading("missed by"), lambda item: _missed_by(item, results, names)),
+        (Heading("force limit exceeded"), _force),
+        (Heading("false alarms"), lambda item: _false_alarms(item, names)),
+        (Heading("violates limits"), lambda item: _violated(item, names)),
     )
     table = tabulate("attention", "Failed recordings, the worst first", every, failed, "contacts")
     used = [i for i in range(len(every)) if any(row[i].text != NOTHING for row in table.rows)]

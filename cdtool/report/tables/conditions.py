@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from cdtool.base.plain_text import plain
 from cdtool.report.number_text import NOTHING, number, percent, value_and_interval
-from cdtool.report.table import Cell, Column, Table, empty_cell, key_of, name_cell, shown, tabulate
+from cdtool.report.table import Cell, Heading, Table, empty_cell, key_of, name_cell, shown, tabulate
 from cdtool.report.tables.results import detector_cell
 from cdtool.results.changed_conditions import ConditionRow, condition_rows
 from cdtool.results.evaluated import Evaluated
@@ -20,19 +20,19 @@ def conditions_table(evaluated: Evaluated) -> Table:
     def latency_of(group: str) -> Callable[[ConditionRow], Cell]:
         return lambda item: latency_cell(item, group)
 
-    fields: list[tuple[Column, Callable[[ConditionRow], Cell]]] = [
-        (Column("detector", choice=True), lambda item: detector_cell(evaluated.results, item.detector)),
-        (Column("condition", choice=True), lambda item: name_cell(item.condition)),
+    fields: list[tuple[Heading, Callable[[ConditionRow], Cell]]] = [
+        (Heading("detector", choice=True), lambda item: detector_cell(evaluated.results, item.detector)),
+        (Heading("condition", choice=True), lambda item: name_cell(item.condition)),
     ]
     if any(item.changed.free for item in rows):
-        fields.append((Column("alarming impact-free runs", numeric=True), alarming_cell))
-    fields += [(Column(f"{shown(group)} [ms]", numeric=True), latency_of(group)) for group in groups]
+        fields.append((Heading("alarming impact-free runs", numeric=True), alarming_cell))
+    fields += [(Heading(f"{shown(group)} [ms]", numeric=True), latency_of(group)) for group in groups]
     if groups:
         fields += [
-            (Column("missed", numeric=True), missed_cell),
-            (Column("contacts not assessable", numeric=True), not_assessable_cell),
+            (Heading("missed", numeric=True), missed_cell),
+            (Heading("contacts not assessable", numeric=True), not_assessable_cell),
         ]
-    fields.append((Column("samples not assessable", numeric=True), samples_cell))
+    fields.append((Heading("samples not assessable", numeric=True), samples_cell))
     return tabulate("conditions", "Changed conditions", fields, rows, "conditions")
 
 

@@ -10,8 +10,8 @@ from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOTHING, number, spoken
 from cdtool.report.table import (
     Cell,
-    Column,
     Fields,
+    Heading,
     Row,
     Table,
     count_cell,
@@ -22,16 +22,15 @@ from cdtool.report.table import (
     tabulate,
     tone_of,
 )
-from cdtool.results.results import ForceResult, ForceStepResult, PointResult, Results
-from cdtool.results.rows import grouped, picked, values_of
+from cdtool.results.results import ForceResult, ForceStepResult, PointResult, Results, grouped
 
 _VERDICTS = ("pass", "fail", "not_assessable")
 
 
 def groups_table(results: Results) -> Table:
     """Return how many contacts of each group meet their force profile."""
-    columns = [Column("group"), Column("profile"), *(Column(spoken(verdict), numeric=True) for verdict in _VERDICTS)]
-    columns += [Column("largest peak [N]", numeric=True), Column("earliest exceeded after [ms]", numeric=True)]
+    columns = [Heading("group"), Heading("profile"), *(Heading(spoken(verdict), numeric=True) for verdict in _VERDICTS)]
+    columns += [Heading("largest peak [N]", numeric=True), Heading("earliest exceeded after [ms]", numeric=True)]
     parts = grouped(results.forces, "group", "profile")
     return Table("force", "Force", columns, [_group_row(*part) for part in parts.items()], "forces")
 
@@ -39,13 +38,13 @@ def groups_table(results: Results) -> Table:
 def points_table(results: Results) -> Table:
     """Return the test points, averaged as their profile requires."""
     fields: Fields[PointResult] = (
-        (Column("test point"), lambda item: name_cell(item.point)),
-        (Column("group"), lambda item: name_cell(item.group)),
-        (Column("profile"), lambda item: name_cell(item.profile)),
-        (Column("verdict", choice=True), lambda item: outcome_cell(item.verdict)),
-        (Column("tests"), lambda item: Cell(item.note)),
-        (Column("steps"), lambda item: _steps(item.steps)),
-        (Column("why"), lambda item: Cell(item.reason or "")),
+        (Heading("test point"), lambda item: name_cell(item.point)),
+        (Heading("group"), lambda item: name_cell(item.group)),
+        (Heading("profile"), lambda item: name_cell(item.profile)),
+        (Heading("verdict", choice=True), lambda item: outcome_cell(item.verdict)),
+        (Heading("tests"), lambda item: Cell(item.note)),
+        (Heading("steps"), lambda item: _steps(item.steps)),
+        (Heading("why"), lambda item: Cell(item.reason or "")),
     )
     return tabulate("points", "Force by test point", fields, results.points, "points", (), most_rows(results))
 
@@ -53,29 +52,27 @@ def points_table(results: Results) -> Table:
 def contacts_table(results: Results, *, only_exceptions: bool = False) -> Table:
     """Return every contact against its force profile, or only those that do not pass."""
     fields: Fields[ForceResult] = (
-        (Column("recording"), lambda item: name_cell(item.recording)),
-        (Column("group", choice=True), lambda item: name_cell(item.group)),
-        (Column("contact", numeric=True), lambda item: count_cell(item.contact)),
-        (Column("profile", choice=True), lambda item: name_cell(item.profile)),
-        (Column("verdict", choice=True), lambda item: outcome_cell(item.verdict)),
-        (Column("peak [N]", numeric=True), lambda item: number_cell(item.peak_n)),
-        (Column("first exceeded after [ms]", numeric=True), lambda item: _budget(item.time_budget_ms)),
-        (Column("steps"), lambda item: _steps(item.steps)),
-        (Column("test point", choice=True), lambda item: Cell(item.point or NOTHING)),
-        (Column("why"), lambda item: Cell(item.reason or "")),
+        (Heading("recording"), lambda item: name_cell(item.recording)),
+        (Heading("group", choice=True), lambda item: name_cell(item.group)),
+        (Heading("contact", numeric=True), lambda item: count_cell(item.contact)),
+        (Heading("profile", choice=True), lambda item: name_cell(item.profile)),
+        (Heading("verdict", choice=True), lambda item: outcome_cell(item.verdict)),
+        (Heading("peak [N]", numeric=True), lambda item: number_cell(item.peak_n)),
+        (Heading("first exceeded after [ms]", numeric=True), lambda item: _budget(item.time_budget_ms)),
+        (Heading("steps"), lambda item: _steps(item.steps)),
+        (Heading("test point", choice=True), lambda item: Cell(item.point or NOTHING)),
+        (Heading("why"), lambda item: Cell(item.reason or "")),
     )
     name, title = ("force_exceptions", "Force limits not met") if only_exceptions else ("forces", "Force by contact")
-    verdicts = values_of(results.forces, "verdict")
-    numbers = [i for i, verdict in enumerate(verdicts) if not only_exceptions or verdict != "pass"]
-    items = picked(results.forces, numbers)
-    logs = list(zip(values_of(items, "group"), values_of(items, "recording"), strict=True))
+    items = [item for item in results.forces if not only_exceptions or item.verdict != "pass"]
+    logs = [(item.group, item.recording) for item in items]
     return tabulate(name, title, fields, items, "forces", logs, most_rows(results))
 
 
 def _group_row(key: tuple[str, ...], forces: Sequence[ForceResult]) -> Row:
-    counts = Counter(values_of(forces, "verdict"))
-    peaks = [value for value in values_of(forces, "peak_n") if value is not None]
-    budgets = [value for value in values_of(forces, "time_budget_ms") if value is not None]
+    counts = Counter[str](item.verdict for item in forces)
+    peaks = [item.peak_n for item in forces if item.peak_n is not None]
+    budgets = [item.time_budget_ms for item in forces if item.time_budget_ms is not None]
     return (
         *map(name_cell, key),
         *(count_cell(counts[verdict], tone_of(verdict)) for verdict in _VERDICTS),

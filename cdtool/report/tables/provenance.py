@@ -8,7 +8,7 @@ from typing import Any
 
 from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOTHING
-from cdtool.report.table import Cell, Column, Row, Table, name_cell, shown
+from cdtool.report.table import Cell, Heading, Row, Table, name_cell, shown
 from cdtool.report.tables.results import detector_cell, part_of
 from cdtool.results.results import Results
 
@@ -78,7 +78,7 @@ def provenance_tables(results: Results) -> list[Table]:
 
 
 def _table(name: str, title: str, headings: Sequence[str], rows: Sequence[Row]) -> Table:
-    return Table(name, title, [Column(heading) for heading in headings], rows, "provenance")
+    return Table(name, title, [Heading(heading) for heading in headings], rows, "provenance")
 
 
 def _gains(results: Results) -> list[Row]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from cdtool.base.plain_text import counted
-from cdtool.report.alike import Reason, alike
+from cdtool.report.alike import RecordingReason, alike
 from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number, percent
 from cdtool.report.table import (
     Cell,
-    Column,
     Fields,
+    Heading,
     Log,
     Table,
     count_cell,
@@ -25,11 +24,9 @@ from cdtool.report.table import (
     tabulate,
 )
 from cdtool.report.tables.results import detector_cell, part_of
-from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results
-from cdtool.results.rows import grouped
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results, grouped
 from cdtool.results.summary import later_ms
 
-_OPERATION = re.compile(r"#\d+\Z")
 _MOST_LISTED = 3
 _DIGEST = 12
 _FORCE_ORDER = ("fail", "not_assessable", "pass")
@@ -68,19 +65,19 @@ def recordings_table(results: Results) -> Table:
     def verdict_of(item: RecordingResult) -> str:
         return forces.get((item.group, item.recording), NOTHING)
 
-    fields: list[tuple[Column, Callable[[RecordingResult], Cell]]] = [
-        (Column("recording"), lambda item: name_cell(item.recording)),
-        (Column("group", choice=True), lambda item: name_cell(item.group)),
-        (Column("contacts", numeric=True), lambda item: count_cell(item.contacts)),
+    fields: list[tuple[Heading, Callable[[RecordingResult], Cell]]] = [
+        (Heading("recording"), lambda item: name_cell(item.recording)),
+        (Heading("group", choice=True), lambda item: name_cell(item.group)),
+        (Heading("contacts", numeric=True), lambda item: count_cell(item.contacts)),
     ]
-    fields += [(Column(f"{shown(name)} [ms]", numeric=True), column_of(name)) for name in results.detectors]
-    fields.append((Column("peak [N]", numeric=True), lambda item: number_cell(_peak(parts_of(item)))))
+    fields += [(Heading(f"{shown(name)} [ms]", numeric=True), column_of(name)) for name in results.detectors]
+    fields.append((Heading("peak [N]", numeric=True), lambda item: number_cell(_peak(parts_of(item)))))
     if forces:
-        fields.append((Column("force limits", choice=True), lambda item: outcome_cell(verdict_of(item))))
-    fields.append((Column("length [s]", numeric=True), lambda item: number_cell(item.seconds)))
+        fields.append((Heading("force limits", choice=True), lambda item: outcome_cell(verdict_of(item))))
+    fields.append((Heading("length [s]", numeric=True), lambda item: number_cell(item.seconds)))
     if any(item.campaign for item in results.recordings):
-        fields.append((Column("campaign", choice=True), lambda item: Cell(item.campaign or NOTHING)))
-    fields.append((Column(f"SHA-256, first {_DIGEST} digits"), lambda item: Cell(item.sha256[:_DIGEST] or NOTHING)))
+        fields.append((Heading("campaign", choice=True), lambda item: Cell(item.campaign or NOTHING)))
+    fields.append((Heading(f"SHA-256, first {_DIGEST} digits"), lambda item: Cell(item.sha256[:_DIGEST] or NOTHING)))
     logs = [(item.group, item.recording) for item in results.recordings]
     table = tabulate("recordings", "Recordings", fields, results.recordings, "recordings", logs)
     marks = [_marks(parts_of(item), verdict_of(item)) for item in results.recordings]
@@ -90,14 +87,14 @@ def recordings_table(results: Results) -> Table:
 def scored_table(results: Results) -> Table:
     """Return the logs that were scored, with their hashes."""
     fields: Fields[RecordingResult] = (
-        (Column("recording"), lambda item: name_cell(item.recording)),
-        (Column("group"), lambda item: name_cell(item.group)),
-        (Column("contacts", numeric=True), lambda item: count_cell(item.contacts)),
-        (Column("operations", numeric=True), lambda item: count_cell(item.operations)),
-        (Column("length [s]", numeric=True), lambda item: number_cell(item.seconds)),
-        (Column("campaign"), lambda item: Cell(item.campaign or "")),
-        (Column("test point"), lambda item: Cell(item.point or "")),
-        (Column("SHA-256"), lambda item: Cell(item.sha256)),
+        (Heading("recording"), lambda item: name_cell(item.recording)),
+        (Heading("group"), lambda item: name_cell(item.group)),
+        (Heading("contacts", numeric=True), lambda item: count_cell(item.contacts)),
+        (Heading("operations", numeric=True), lambda item: count_cell(item.operations)),
+        (Heading("length [s]", numeric=True), lambda item: number_cell(item.seconds)),
+        (Heading("campaign"), lambda item: Cell(item.campaign or "")),
+        (Heading("test point"), lambda item: Cell(item.point or "")),
+        (Heading("SHA-256"), lambda item: Cell(item.sha256)),
     )
     return tabulate("scored", "Recordings scored", fields, results.recordings, "recordings", (), most_rows(results))
 
@@ -105,14 +102,14 @@ def scored_table(results: Results) -> Table:
 def contact_tables(results: Results) -> list[Table]:
     """Return the contacts that were missed, not assessable, or in progress at the start of their recording."""
     fields: Fields[ContactResult] = (
-        (Column("recording"), lambda item: name_cell(item.recording)),
-        (Column("group"), lambda item: name_cell(item.group)),
-        (Column("contact", numeric=True), lambda item: count_cell(item.contact)),
-        (Column("onset [s]", numeric=True), lambda item: Cell(f"{item.onset_s:.3f}", key=item.onset_s)),
-        (Column("detector"), lambda item: detector_cell(results, item.detector)),
-        (Column("alarm possible for [ms]", numeric=True), lambda item: number_cell(item.watched_ms)),
-        (Column("peak force [N]", numeric=True), lambda item: number_cell(item.peak_force_n)),
-        (Column("why"), lambda item: Cell(item.reason or ("no alarm in its window" * (item.outcome == "missed")))),
+        (Heading("recording"), lambda item: name_cell(item.recording)),
+        (Heading("group"), lambda item: name_cell(item.group)),
+        (Heading("contact", numeric=True), lambda item: count_cell(item.contact)),
+        (Heading("onset [s]", numeric=True), lambda item: Cell(f"{item.onset_s:.3f}", key=item.onset_s)),
+        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
+        (Heading("alarm possible for [ms]", numeric=True), lambda item: number_cell(item.watched_ms)),
+        (Heading("peak force [N]", numeric=True), lambda item: number_cell(item.peak_force_n)),
+        (Heading("why"), lambda item: Cell(item.reason or ("no alarm in its window" * (item.outcome == "missed")))),
     )
     tables = {
         "missed": ("missed", "Contacts missed"),
@@ -121,7 +118,7 @@ def contact_tables(results: Results) -> list[Table]:
     }
     rows = grouped(results.contacts, "outcome")
     return [
-        tabulate(name, title, fields, rows.get((outcome,), ()), "contacts", (), most_rows(results))
+        tabulate(name, title, fields, rows.get(outcome, ()), "contacts", (), most_rows(results))
         for outcome, (name, title) in tables.items()
     ]
 
@@ -130,14 +127,14 @@ def false_alarms_table(results: Results) -> Table:
     """Return every alarm without a contact."""
     units = part_of(results.provenance, "units")
     fields: Fields[FalseAlarmResult] = (
-        (Column("recording"), lambda item: name_cell(item.recording)),
-        (Column("group"), lambda item: name_cell(item.group)),
-        (Column("detector"), lambda item: detector_cell(results, item.detector)),
-        (Column("joint"), lambda item: name_cell(item.joint)),
-        (Column("at [s]", numeric=True), lambda item: Cell(f"{item.time_s:.3f}", key=item.time_s)),
-        (Column("crossed"), lambda item: Cell(item.side or NOTHING)),
-        (Column("value", numeric=True), lambda item: _with_unit(item.statistic, units.get(item.detector, ""))),
-        (Column("limit", numeric=True), lambda item: _with_unit(item.limit, units.get(item.detector, ""))),
+        (Heading("recording"), lambda item: name_cell(item.recording)),
+        (Heading("group"), lambda item: name_cell(item.group)),
+        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
+        (Heading("joint"), lambda item: name_cell(item.joint)),
+        (Heading("at [s]", numeric=True), lambda item: Cell(f"{item.time_s:.3f}", key=item.time_s)),
+        (Heading("crossed"), lambda item: Cell(item.side or NOTHING)),
+        (Heading("value", numeric=True), lambda item: _with_unit(item.statistic, units.get(item.detector, ""))),
+        (Heading("limit", numeric=True), lambda item: _with_unit(item.limit, units.get(item.detector, ""))),
     )
     rows = results.false_alarms
     return tabulate("false_alarms", "False alarms", fields, rows, "false_alarms", (), most_rows(results))
@@ -146,11 +143,11 @@ def false_alarms_table(results: Results) -> Table:
 def not_assessable_table(results: Results) -> Table:
     """Return the share of the samples that each detector could not assess, and why."""
     fields: Fields[ExposureResult] = (
-        (Column("group"), lambda item: name_cell(item.group)),
-        (Column("detector"), lambda item: detector_cell(results, item.detector)),
-        (Column("operations assessable nowhere", numeric=True), _operations),
-        (Column("share of its samples", numeric=True), _share),
-        (Column("why"), lambda item: Cell(", ".join(f"{why} {percent(share)}" for why, share in _reasons(item)))),
+        (Heading("group"), lambda item: name_cell(item.group)),
+        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
+        (Heading("operations assessable nowhere", numeric=True), _operations),
+        (Heading("share of its samples", numeric=True), _share),
+        (Heading("why"), lambda item: Cell(", ".join(f"{why} {percent(share)}" for why, share in _reasons(item)))),
     )
     items = [item for item in results.exposure if _reasons(item) or item.not_assessable]
     return tabulate("not_assessable", "Samples not assessable", fields, items, "exposure")
@@ -158,9 +155,9 @@ def not_assessable_table(results: Results) -> Table:
 
 def reasons_tables(results: Results) -> list[Table]:
     """Return what was left out, what is lost of recordings that were used, and the warnings about these."""
-    fields: Fields[Reason] = (
-        (Column("recording"), lambda item: name_cell(item.recording)),
-        (Column("reason"), lambda item: Cell(item.reason.removeprefix(f"{item.recording}: ") or NOTHING)),
+    fields: Fields[RecordingReason] = (
+        (Heading("recording"), lambda item: name_cell(item.recording)),
+        (Heading("reason"), lambda item: Cell(item.reason.removeprefix(f"{item.recording}: ") or NOTHING)),
     )
     return [
         tabulate("skipped", "Left out", fields, alike(results.skipped), "skipped", (), most_rows(results)),
@@ -169,26 +166,12 @@ def reasons_tables(results: Results) -> list[Table]:
     ]
 
 
-def log_of(group: str, operation: str, logs: frozenset[Log]) -> Log:
-    """Return the log that an operation belongs to: its name, without the "#2" where it was cut into several."""
-    if (group, operation) in logs:
-        return group, operation
-    return group, _OPERATION.sub("", operation)
-
-
-def logs_of(results: Results) -> frozenset[Log]:
-    """Return every log that was scored."""
-    return frozenset((item.group, item.recording) for item in results.recordings)
-
-
 def _outcomes(results: Results) -> dict[tuple[str, str, str], _Outcome]:
-    logs = logs_of(results)
     outcomes: dict[tuple[str, str, str], _Outcome] = {}
     for item in results.contacts:
         outcomes.setdefault((item.group, item.recording, item.detector), _Outcome()).contacts.append(item)
     for alarm in results.false_alarms:
-        log = log_of(alarm.group, alarm.recording, logs)
-        outcomes.setdefault((*log, alarm.detector), _Outcome()).false_alarms += 1
+        outcomes.setdefault((alarm.group, alarm.recording, alarm.detector), _Outcome()).false_alarms += 1
     return outcomes
 
 

@@ -12,8 +12,8 @@ from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_i
 from cdtool.report.number_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING, missed, number, rate, with_interval
 from cdtool.report.table import (
     Cell,
-    Column,
     Fields,
+    Heading,
     Row,
     Table,
     count_cell,
@@ -53,14 +53,14 @@ def detector_cell(results: Results, detector: str) -> Cell:
 def limits_table(results: Results, *, met: bool) -> Table:
     """Return the limits that are met, or the others, violated ones first."""
     fields: Fields[LimitResult] = (
-        (Column("outcome", choice=True, names_row=False), lambda item: outcome_cell(item.outcome)),
-        (Column("detector"), lambda item: detector_cell(results, item.detector)),
-        (Column("group"), lambda item: name_cell(item.group)),
-        (Column("result"), lambda item: Cell(item.figure)),
-        (Column("value", numeric=True), lambda item: Cell(value_of(item), key=key_of(item.value))),
-        (Column("required"), lambda item: Cell(required(item))),
-        (Column("why"), lambda item: Cell(item.reason or "")),
-        (Column("limit"), lambda item: Cell(item.limit)),
+        (Heading("outcome", choice=True, names_row=False), lambda item: outcome_cell(item.outcome)),
+        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
+        (Heading("group"), lambda item: name_cell(item.group)),
+        (Heading("result"), lambda item: Cell(item.figure)),
+        (Heading("value", numeric=True), lambda item: Cell(value_of(item), key=key_of(item.value))),
+        (Heading("required"), lambda item: Cell(required(item))),
+        (Heading("why"), lambda item: Cell(item.reason or "")),
+        (Heading("limit"), lambda item: Cell(item.limit)),
     )
     items = [item for item in results.limits if (item.outcome == "met") == met]
     items.sort(key=lambda item: _WORST_FIRST.index(item.outcome))
@@ -90,16 +90,16 @@ def results_table(results: Results, items: Sequence[Summary], group: str | None 
 
     Columns that no row fills are left out.
     """
-    fields: list[tuple[Column, Callable[[Summary], Cell]]] = [
-        (Column("detector"), lambda item: detector_cell(results, item.detector))
+    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
+        (Heading("detector"), lambda item: detector_cell(results, item.detector))
     ]
     if group is None:
-        fields.append((Column("group", choice=True), lambda item: name_cell(item.group)))
+        fields.append((Heading("group", choice=True), lambda item: name_cell(item.group)))
     fields += _of_contacts(items)
     fields += [
-        (Column("false alarms", numeric=True), _false_alarms),
-        (Column("false alarms per operation", numeric=True), _per_operation),
-        (Column("per hour", numeric=True, below=True), _per_hour),
+        (Heading("false alarms", numeric=True), _false_alarms),
+        (Heading("false alarms per operation", numeric=True), _per_operation),
+        (Heading("per hour", numeric=True, below=True), _per_hour),
     ]
     fields += _of_force(items)
     title = "Latency, misses and false alarms by detector and group"
@@ -110,53 +110,53 @@ def results_table(results: Results, items: Sequence[Summary], group: str | None 
 
 def short_results_table(items: Sequence[Summary]) -> Table:
     """Return the results in at most seven columns, which fit a pull request; those of the force only if filled."""
-    fields: list[tuple[Column, Callable[[Summary], Cell]]] = [
-        (Column("group"), lambda item: name_cell(item.group)),
-        (Column("detector"), lambda item: name_cell(item.detector)),
-        (Column("median [ms]", numeric=True), _short_median),
-        (Column("missed", numeric=True, choice=True), _short_missed),
-        (Column("false alarms", numeric=True, choice=True), _short_false_alarms),
+    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
+        (Heading("group"), lambda item: name_cell(item.group)),
+        (Heading("detector"), lambda item: name_cell(item.detector)),
+        (Heading("median [ms]", numeric=True), _short_median),
+        (Heading("missed", numeric=True, choice=True), _short_missed),
+        (Heading("false alarms", numeric=True, choice=True), _short_false_alarms),
     ]
     if any(not math.isnan(item.force_at_alarm) for item in items):
-        fields.append((Column("force at alarm [N]", numeric=True), lambda item: number_cell(item.force_at_alarm)))
+        fields.append((Heading("force at alarm [N]", numeric=True), lambda item: number_cell(item.force_at_alarm)))
     if any(not math.isnan(item.force_failed) for item in items):
-        fields.append((Column("force limit exceeded", numeric=True, choice=True), _force_failed))
+        fields.append((Heading("force limit exceeded", numeric=True, choice=True), _force_failed))
     return tabulate("short_results", "Results", fields, items, "contacts")
 
 
 def kinds_table(results: Results, items: Sequence[Summary]) -> Table:
     """Return the latencies of each kind of contact, a row per summary; without rows if no contact has a kind."""
-    fields: list[tuple[Column, Callable[[Summary], Cell]]] = [
-        (Column("detector"), lambda item: detector_cell(results, item.detector)),
-        (Column("group/kind", choice=True), lambda item: name_cell(item.group)),
+    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
+        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
+        (Heading("group/kind", choice=True), lambda item: name_cell(item.group)),
         *_of_contacts(items),
         *_of_force(items),
     ]
     return tabulate("kinds", "Latency and misses by kind of contact", fields, items, "contacts")
 
 
-def _of_contacts(items: Sequence[Summary]) -> list[tuple[Column, Callable[[Summary], Cell]]]:
+def _of_contacts(items: Sequence[Summary]) -> list[tuple[Heading, Callable[[Summary], Cell]]]:
     """Return the columns of latencies and outcomes; empty without a contact."""
-    fields: list[tuple[Column, Callable[[Summary], Cell]]] = []
+    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = []
     if any(item.contacts for item in items):
         fields += [
-            *((Column(f"{name} [ms]", numeric=True), partial(_latency, name)) for name in latency_columns(items)),
-            (Column("contacts detected", numeric=True), _detected),
-            (Column("missed", numeric=True), _missed),
-            (Column("not assessable", numeric=True), _not_assessable),
+            *((Heading(f"{name} [ms]", numeric=True), partial(_latency, name)) for name in latency_columns(items)),
+            (Heading("contacts detected", numeric=True), _detected),
+            (Heading("missed", numeric=True), _missed),
+            (Heading("not assessable", numeric=True), _not_assessable),
         ]
     return fields
 
 
-def _of_force(items: Sequence[Summary]) -> list[tuple[Column, Callable[[Summary], Cell]]]:
+def _of_force(items: Sequence[Summary]) -> list[tuple[Heading, Callable[[Summary], Cell]]]:
     """Return the columns of the force that a row fills."""
-    fields: list[tuple[Column, Callable[[Summary], Cell]]] = []
+    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = []
     if any(not math.isnan(item.force_at_alarm) for item in items):
-        fields.append((Column("force at alarm [N]", numeric=True), _force_at_alarm))
+        fields.append((Heading("force at alarm [N]", numeric=True), _force_at_alarm))
     if any(not math.isnan(item.peak_force) for item in items):
-        fields.append((Column("peak force [N]", numeric=True), lambda item: number_cell(item.peak_force)))
+        fields.append((Heading("peak force [N]", numeric=True), lambda item: number_cell(item.peak_force)))
     if any(not math.isnan(item.force_failed) for item in items):
-        fields.append((Column("force limit exceeded", numeric=True), _force_failed))
+        fields.append((Heading("force limit exceeded", numeric=True), _force_failed))
     return fields
 
 
@@ -164,16 +164,16 @@ def comparisons_table(evaluated: Evaluated) -> Table:
     """Return the pairs of detectors on the contacts that both could assess, as far as a difference could be shown."""
     results, without = evaluated.results, _without_difference(evaluated.comparisons)
     fields: Fields[tuple[Comparison, str]] = (
-        (Column("group", choice=True), lambda pair: name_cell(pair[0].group)),
-        (Column("first"), lambda pair: detector_cell(results, pair[0].first)),
-        (Column("second"), lambda pair: detector_cell(results, pair[0].second)),
-        (Column("difference", choice=True), lambda pair: _difference_cell(*pair)),
-        (Column("contacts", numeric=True), lambda pair: count_cell(pair[0].contacts)),
-        (Column("latency, first minus second [ms]", numeric=True), lambda pair: interval_cell(pair[0].latency.mean)),
-        (Column("p", numeric=True), lambda pair: _p(pair[0].latency_p)),
-        (Column("missed only by first", numeric=True), lambda pair: count_cell(pair[0].only_first_missed)),
-        (Column("missed only by second", numeric=True), lambda pair: count_cell(pair[0].only_second_missed)),
-        (Column("p of misses", numeric=True), lambda pair: _p(pair[0].missed_p)),
+        (Heading("group", choice=True), lambda pair: name_cell(pair[0].group)),
+        (Heading("first"), lambda pair: detector_cell(results, pair[0].first)),
+        (Heading("second"), lambda pair: detector_cell(results, pair[0].second)),
+        (Heading("difference", choice=True), lambda pair: _difference_cell(*pair)),
+        (Heading("contacts", numeric=True), lambda pair: count_cell(pair[0].contacts)),
+        (Heading("latency, first minus second [ms]", numeric=True), lambda pair: interval_cell(pair[0].latency.mean)),
+        (Heading("p", numeric=True), lambda pair: _p(pair[0].latency_p)),
+        (Heading("missed only by first", numeric=True), lambda pair: count_cell(pair[0].only_first_missed)),
+        (Heading("missed only by second", numeric=True), lambda pair: count_cell(pair[0].only_second_missed)),
+        (Heading("p of misses", numeric=True), lambda pair: _p(pair[0].missed_p)),
     )
     pairs = [pair for pair in zip(evaluated.comparisons, without, strict=True) if pair[1] != _TOO_FEW]
     return tabulate("comparisons", "Pairs of detectors on the same contacts", fields, pairs, "contacts")
@@ -181,8 +181,8 @@ def comparisons_table(evaluated: Evaluated) -> Table:
 
 def differences_table(evaluated: Evaluated) -> Table:
     """Return the differences between detectors that are shown, a sentence each."""
-    columns = [Column(name) for name in ("group", "shown", "by")]
-    columns += [Column("contacts", numeric=True), Column("p", numeric=True)]
+    columns = [Heading(name) for name in ("group", "shown", "by")]
+    columns += [Heading("contacts", numeric=True), Heading("p", numeric=True)]
     rows = [row for item in evaluated.comparisons for row in _differences(evaluated.results, item)]
     return Table("differences", "Comparisons", columns, rows, "contacts")
 
@@ -220,12 +220,12 @@ def too_few_note(evaluated: Evaluated) -> str:
 def calibration_table(results: Results) -> Table:
     """Return how safety factors were set for a false-alarm budget."""
     fields: Fields[CalibrationResult] = (
-        (Column("detector"), lambda item: detector_cell(results, item.detector)),
-        (Column("false alarms allowed"), lambda item: Cell(item.budget)),
-        (Column("safety factor set", numeric=True), lambda item: number_cell(item.safety_factor)),
-        (Column("alarms with it", numeric=True), lambda item: count_cell(item.alarms)),
-        (Column("operations", numeric=True), lambda item: count_cell(item.operations)),
-        (Column("hours", numeric=True), lambda item: number_cell(item.hours)),
+        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
+        (Heading("false alarms allowed"), lambda item: Cell(item.budget)),
+        (Heading("safety factor set", numeric=True), lambda item: number_cell(item.safety_factor)),
+        (Heading("alarms with it", numeric=True), lambda item: count_cell(item.alarms)),
+        (Heading("operations", numeric=True), lambda item: count_cell(item.operations)),
+        (Heading("hours", numeric=True), lambda item: number_cell(item.hours)),
     )
     return tabulate("calibration", "False-alarm budget", fields, results.calibration, "calibration")
 

@@ -12,14 +12,12 @@ import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING
-from cdtool.report.table import Cell, Column, Fields, Log, Table, empty_cell, name_cell, number_cell, shown, tabulate
-from cdtool.report.tables.recordings import log_of, logs_of
+from cdtool.report.table import Cell, Fields, Heading, Log, Table, empty_cell, name_cell, number_cell, shown, tabulate
 from cdtool.report.tables.results import detector_cell
-from cdtool.results.results import ContactResult, FalseAlarmResult, ForceResult, Results
-from cdtool.results.rows import grouped, picked, values_of
+from cdtool.results.results import ContactResult, FalseAlarmResult, ForceResult, Results, grouped
 
 Row = TypeVar("Row")
 # Cases of one kind, and at least so many of each detector and group.
@@ -57,7 +55,7 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
     results : Results
         The results of a benchmark.
     traced : collection of (str, str)
-        Group and name of the recordings, and of their operations, with a trace.
+        Group and name of the recordings with a trace.
 
     Returns
     -------
@@ -70,46 +68,42 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
     --------
     `cdtool.benchmark` returns the results.
     """
-    logs = logs_of(results)
-    wanted = dict.fromkeys(log_of(*log, logs) for log in traced)
     cases: list[_Case] = []
     counts = []
-    for words, made, total in _kinds(results, {**wanted, **dict.fromkeys(traced)}, logs):
+    for words, made, total in _kinds(results, traced):
         cases += made
         counts += [f"{len(made)} of {total} {words}"] if total else []
     listed = {case.log for case in cases}
-    cases += _examples(results, [log for log in wanted if log not in listed])
+    cases += _examples(results, [log for log in traced if log not in listed])
     fields: Fields[_Case] = (
-        (Column("recording"), lambda item: name_cell(item.log[1])),
-        (Column("group", choice=True), lambda item: name_cell(item.log[0])),
-        (Column("detector", choice=True), lambda item: _detector_cell(results, item)),
-        (Column("outcome", choice=True), lambda item: Cell(item.outcome, tone=item.tone)),
-        (Column("contact", numeric=True), _number_of),
-        (Column("at [s]", numeric=True), _time_of),
-        (Column("latency [ms]", numeric=True), lambda item: number_cell(item.latency_ms)),
-        (Column("peak force [N]", numeric=True), lambda item: number_cell(item.peak_n)),
-        (Column("why"), lambda item: Cell(item.why or NOTHING)),
+        (Heading("recording"), lambda item: name_cell(item.log[1])),
+        (Heading("group", choice=True), lambda item: name_cell(item.log[0])),
+        (Heading("detector", choice=True), lambda item: _detector_cell(results, item)),
+        (Heading("outcome", choice=True), lambda item: Cell(item.outcome, tone=item.tone)),
+        (Heading("contact", numeric=True), _number_of),
+        (Heading("at [s]", numeric=True), _time_of),
+        (Heading("latency [ms]", numeric=True), lambda item: number_cell(item.latency_ms)),
+        (Heading("peak force [N]", numeric=True), lambda item: number_cell(item.peak_n)),
+        (Heading("why"), lambda item: Cell(item.why or NOTHING)),
     )
     table = tabulate("cases", "Worst and failed cases", fields, cases, "contacts", [case.log for case in cases])
     marks = {"missed by every detector": [case.missed_by_all for case in cases]}
     return replace(table, marks=marks), f"Listed: {'; '.join(counts)}." if counts else ""
 
 
-def _kinds(
-    results: Results, traced: Collection[Log], logs: frozenset[Log]
-) -> Iterator[tuple[str, Sequence[_Case], int]]:
+def _kinds(results: Results, traced: Collection[Log]) -> Iterator[tuple[str, Sequence[_Case], int]]:
     """Yield each kind of case in words, its listed cases, and how many there are."""
     pairs = max(len(results.every_group) * len(results.detectors), 1)
     most = max(_MOST_OF_KIND // pairs, _FEWEST_OF_PAIR)
-    failed = grouped(results.forces, "verdict").get(("fail",), ())
+    failed = grouped(results.forces, "verdict").get("fail", ())
     worst = _worst(failed, ("group",), "peak_n", most * max(len(results.detectors), 1), traced)
     yield "contacts above their force limits", [_of_force(item) for item in worst], len(failed)
     alarms = _worst(results.false_alarms, ("group", "detector"), "statistic", most, traced)
-    yield "false alarms", [_of_alarm(item, logs) for item in alarms], len(results.false_alarms)
+    yield "false alarms", [_of_alarm(item) for item in alarms], len(results.false_alarms)
     of_outcome = grouped(results.contacts, "outcome")
-    missed = Counter(_contact_numbers(of_outcome.get(("missed",), ())))
+    missed = Counter((item.group, item.recording, item.contact) for item in of_outcome.get("missed", ()))
     for outcome, (_, _, words, by) in _OUTCOMES.items():
-        rows = of_outcome.get((outcome,), ())
+        rows = of_outcome.get(outcome, ())
         # A trace does not make a latency longer.
         listed = _worst(rows, ("group", "detector"), by, most, () if outcome == "detected" else traced)
         by_all = [missed[item.group, item.recording, item.contact] == len(results.detectors) for item in listed]
@@ -118,31 +112,23 @@ def _kinds(
 
 def _worst(rows: Sequence[Row], names: Sequence[str], by: str, most: int, traced: Collection[Log]) -> list[Row]:
     """Return the worst rows by a field, `most` of each with equal values of `names`."""
-    found: list[Row] = []
-    for items in grouped(rows, *names).values():
-        columns = (values_of(items, name) for name in ("group", "recording", by))
-        keys = [
-            ((group, name) in traced, -math.inf if value is None else value)
-            for group, name, value in zip(*columns, strict=True)
-        ]
-        found += picked(items, heapq.nlargest(most, range(len(keys)), key=keys.__getitem__))
-    return found
+
+    def badness(row: Any) -> tuple[bool, float]:
+        value = getattr(row, by)
+        return (row.group, row.recording) in traced, -math.inf if value is None else value
+
+    return [row for items in grouped(rows, *names).values() for row in heapq.nlargest(most, items, key=badness)]
 
 
 def _examples(results: Results, logs: Collection[Log]) -> Iterator[_Case]:
     """Yield the contacts of recordings that have a trace and are no case, and those of them without a contact."""
     wanted, seen = set(logs), set()
-    columns = (values_of(results.contacts, name) for name in ("group", "recording"))
-    numbers = [number for number, log in enumerate(zip(*columns, strict=True)) if log in wanted]
-    for item in picked(results.contacts, numbers):
-        seen.add((item.group, item.recording))
-        case = _of_contact(item, missed_by_all=False)
-        yield replace(case, outcome="detected") if item.outcome == "detected" else case
+    for item in results.contacts:
+        if (item.group, item.recording) in wanted:
+            seen.add((item.group, item.recording))
+            case = _of_contact(item, missed_by_all=False)
+            yield replace(case, outcome="detected") if item.outcome == "detected" else case
     yield from (_Case(log, "no contact, no alarm") for log in logs if log not in seen)
-
-
-def _contact_numbers(rows: Sequence[ContactResult]) -> Iterator[tuple[str, str, int]]:
-    return zip(*(values_of(rows, name) for name in ("group", "recording", "contact")), strict=True)
 
 
 def _of_contact(item: ContactResult, missed_by_all: bool) -> _Case:
@@ -162,8 +148,8 @@ def _of_contact(item: ContactResult, missed_by_all: bool) -> _Case:
     )
 
 
-def _of_alarm(item: FalseAlarmResult, logs: frozenset[Log]) -> _Case:
-    log = log_of(item.group, item.recording, logs)
+def _of_alarm(item: FalseAlarmResult) -> _Case:
+    log = item.group, item.recording
     return _Case(log, "false alarm", "bad", item.detector, at_s=item.time_s, why=f"joint {shown(item.joint)}")
 
 

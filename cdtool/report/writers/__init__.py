@@ -15,7 +15,7 @@ WRITERS = Registry(
         "html": "cdtool.report.writers.html:Html",
         "markdown": "cdtool.report.writers.markdown:Markdown",
         "junit": "cdtool.report.writers.junit:Junit",
-        "parquet": "cdtool.report.writers.parquet:Parquet",
+        "parquet": "cdtool.report.writers.parquet:ParquetFolder",
         "contacts": "cdtool.report.writers.contacts:Contacts",
         "forces": "cdtool.report.writers.forces:Forces",
         "figure": "cdtool.report.writers.figure:Figure",

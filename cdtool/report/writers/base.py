@@ -38,7 +38,7 @@ class Report:
     @cached_property
     def model(self) -> Model:
         """The tables and texts that all renderers show."""
-        return report_model(self.evaluated, dict.fromkeys((trace.group, trace.recording) for trace in self.traces))
+        return report_model(self.evaluated, dict.fromkeys((trace.group, trace.log) for trace in self.traces))
 
 
 class Writer(Generic[Content]):

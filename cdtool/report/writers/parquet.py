@@ -15,7 +15,7 @@ from cdtool.results.files.results_folder import KIND, PROVENANCE, holds_only_tab
 from cdtool.results.traces.file import TRACES_IN_FOLDER, encode_traces
 
 
-class Parquet(Writer[Report]):
+class ParquetFolder(Writer[Report]):
     """Parquet: a folder with a table for each kind of rows, for DuckDB, pandas and `cdtool report`."""
 
     name: ClassVar[str] = "parquet"
@@ -43,7 +43,8 @@ def _may_replace(target: Path) -> bool:
         raise UsageError(f"{plain(target)}: already exists and is not a folder", "choose another name, or remove it")
     if target.is_dir() and not holds_only_tables(target, (TRACES_IN_FOLDER,)):
         raise UsageError(
-            f"{plain(target)}: already exists and contains no {Parquet.kinds['.parquet'].words}, or other files too",
+            f"{plain(target)}: already exists and contains no {ParquetFolder.kinds['.parquet'].words}, "
+            "or other files too",
             "choose another name, or remove it",
         )
     return True

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.results.results import ContactResult, Results
-from cdtool.results.rows import grouped
+from cdtool.results.results import ContactResult, Results, grouped
 from cdtool.results.summary import latencies
 from cdtool.statistics.kaplan_meier import Survival, survival
 

@@ -25,7 +25,7 @@ import numpy as np
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.recording import Recording
 from cdtool.results.explanation.departure import Track
-from cdtool.results.explanation.transient import Loss, Transient, losses, shown_by_position, transients
+from cdtool.results.explanation.transient import MissingSamples, Transient, losses, shown_by_position, transients
 
 # Transients and lost samples this long before the signal's last exit from its band may be the cause [s].
 _SHORTLY = 0.3
@@ -74,7 +74,7 @@ class Cause:
     kind: CauseKind
     shifts: tuple[Shift, ...] = ()
     transient: Transient | None = None
-    loss: Loss | None = None
+    loss: MissingSamples | None = None
 
     @property
     def channel(self) -> str:

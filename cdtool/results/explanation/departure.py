@@ -20,7 +20,7 @@ from cdtool.base.kernels import READ_ONLY, fields_of, kernel
 from cdtool.recordings.recording import Recording, Series
 from cdtool.results.explanation.movement import Movement
 from cdtool.results.explanation.transient import Transient
-from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels_of
+from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, MotionComparison, NormalMotion, levels_of
 
 # Two columns of a fit are the same straight line if the determinant is at most this share of its largest value.
 _SINGULAR = 1e-13
@@ -88,7 +88,7 @@ class ComparedChannel:
     limits: Limits
 
     @classmethod
-    def of(cls, channel: str, joint: str, compared: Comparison, j: int) -> Self:
+    def of(cls, channel: str, joint: str, compared: MotionComparison, j: int) -> Self:
         """Return one column of a comparison."""
         reach = (*compared.reach[:, j].tolist(), *compared.level_reach[:, j].tolist())
         return cls(
@@ -249,7 +249,7 @@ def tracks_of(recording: Recording, normal: NormalMotion | None, leading: str, b
     return tracks
 
 
-def _track(channel: str, joint: str, j: int, compared: Comparison, first: int, begin: int, after: int) -> Track:
+def _track(channel: str, joint: str, j: int, compared: MotionComparison, first: int, begin: int, after: int) -> Track:
     """Return the samples of a channel from `first` until `after`; those before `begin` show its own distance."""
     column = compared.derived(("column", j), lambda: ComparedChannel.of(channel, joint, compared, j))
     # The assumed start of the motion shifts a whole position: only a change of its distance counts.
@@ -259,7 +259,7 @@ def _track(channel: str, joint: str, j: int, compared: Comparison, first: int, b
     return Track(column, first, after, own if channel in POSITIONS else 0.0, own, own_level)
 
 
-def _own_past(series: Series, start: float, begin: float, end: float) -> Comparison:
+def _own_past(series: Series, start: float, begin: float, end: float) -> MotionComparison:
     """Compare the channel up to `end` with its past from `start` until `begin` [s]: constant mean and spread."""
     cut = slice(int(series.time.searchsorted(start)), int(series.time.searchsorted(end)))
     time, values, level = series.time[cut], series.values[cut], levels_of(series)[cut]
@@ -267,7 +267,7 @@ def _own_past(series: Series, start: float, begin: float, end: float) -> Compari
     reach = np.full((2, values.shape[1]), _OWN_REACH)
     samples, means = (_own_normal(part, quiet) for part in (values, level))
     running = np.zeros(len(time), dtype=np.bool_)
-    return Comparison(series.unit, time, values, *samples, level, *means, running, reach, reach)
+    return MotionComparison(series.unit, time, values, *samples, level, *means, running, reach, reach)
 
 
 def _own_normal(values: FloatArray, quiet: int) -> tuple[FloatArray, FloatArray]:

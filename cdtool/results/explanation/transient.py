@@ -46,7 +46,7 @@ class Transient:
 
 
 @dataclass(frozen=True)
-class Loss:
+class MissingSamples:
     """Missing samples of a channel from `start` to `end` [s]; `samples`: about how many."""
 
     channel: str
@@ -128,7 +128,7 @@ def shown_by_position(pulse: Transient, position: Series, column: int) -> bool:
     return bool(abs((ends[1] - ends[0]) - pulse.area) < _SHARE * abs(pulse.area))
 
 
-def losses(recording: Recording, channels: tuple[str, ...], begin: float, end: float) -> list[Loss]:
+def losses(recording: Recording, channels: tuple[str, ...], begin: float, end: float) -> list[MissingSamples]:
     """Return samples missing from `begin` to `end` [s], the longest first: a gap in the clock, or no value."""
     found = []
     for channel in channels:
@@ -146,7 +146,7 @@ def losses(recording: Recording, channels: tuple[str, ...], begin: float, end: f
         for k in np.flatnonzero(steps > usual):
             if begin <= time[k + 1] and time[k] <= end:
                 missing = max(round(float(steps[k]) / series.period) - 1, 1)
-                found.append(Loss(channel, float(time[k]), float(time[k + 1]), missing))
+                found.append(MissingSamples(channel, float(time[k]), float(time[k + 1]), missing))
     return sorted(found, key=lambda item: item.start - item.end)
 
 

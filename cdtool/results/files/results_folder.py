@@ -13,19 +13,20 @@ false alarms the campaign and the test point. A table without rows has a file wi
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from cdtool.base.errors import RecordingError, UsageError, installing
 from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.base.files.strict_json import strict_json
-from cdtool.results.files.typed_rows import build
-from cdtool.results.results import SCHEMA_VERSION, Results
-from cdtool.results.rows import Rows, picked, values_of
+from cdtool.base.files.typed_json import plain, typed
+from cdtool.results.results import SCHEMA_VERSION, Results, scalar_of, tables
 
+# A row, and its position in results.json.
+_Numbered = tuple[int, Any]
 PROVENANCE = "provenance.json"
 KIND = "cdtool results.parquet"
 # Rows of a row group, which are in memory at once.
@@ -39,25 +40,9 @@ _PARTS: Mapping[str, tuple[str, ...]] = {
 }
 # Tables that also have columns of the recording.
 _OF_RECORDING = ("contacts", "false_alarms", "recordings")
-# Tables that a results.parquet of an earlier version does not have.
-_LATER = ("conditions",)
-# Tables of which there may be many rows, held as columns.
-_MANY = (*_PARTS, "skipped", "findings")
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST_NAME = 40
-_OPERATION = re.compile(r"#\d+\Z")
 _NEXT_STEP = "write one with cdtool benchmark -o results.parquet"
-
-
-@dataclass(frozen=True)
-class _Column:
-    """A field of rows: its Arrow type and meaning, and what a value is stored and read as where that differs."""
-
-    name: str
-    arrow: Any
-    meaning: str
-    store: Callable[[Any], Any] | None = None
-    load: Callable[[Any], Any] | None = None
 
 
 def require_pyarrow(folder: Path) -> None:
@@ -81,25 +66,6 @@ def require_pyarrow(folder: Path) -> None:
         import pyarrow.parquet  # noqa: F401
     except ImportError as fault:
         raise UsageError(f"{folder.name}: Parquet needs pyarrow", f"install it: {installing('store')}") from fault
-
-
-@cache
-def tables() -> Mapping[str, Any]:
-    """Return the class of the rows of each table; the tables are the fields of `Results` with rows.
-
-    Returns
-    -------
-    mapping of str to type
-        The class by the name of the field.
-
-    Examples
-    --------
-    >>> list(tables())[:3]
-    ['contacts', 'false_alarms', 'exposure']
-    """
-    hints = get_type_hints(Results)
-    found = {item.name: get_args(hints[item.name]) for item in fields(Results)}
-    return {name: inner[0] for name, inner in found.items() if inner and is_dataclass(inner[0])}
 
 
 def write_tables(results: Results, folder: Path) -> str:
@@ -130,11 +96,11 @@ def write_tables(results: Results, folder: Path) -> str:
     for table, kind in tables().items():
         rows = getattr(results, table)
         (folder / table).mkdir()
-        for name, numbers in _parts(table, rows):
+        for name, numbered in _parts(table, rows):
             joined = of_recordings if table in _OF_RECORDING else None
-            _write(folder / table / f"{name}.parquet", _columns(kind), rows, numbers, joined)
+            _write(folder / table / f"{name}.parquet", kind, numbered, joined)
     rest = {item.name: getattr(results, item.name) for item in fields(results) if item.name not in tables()}
-    return strict_json({"kind": KIND, **rest, "conclusion": vars(results.conclusion)}) + "\n"
+    return strict_json({"kind": KIND, **rest, "conclusion": plain(results.conclusion)}) + "\n"
 
 
 def holds_only_tables(folder: Path, others: Sequence[str] = ()) -> bool:
@@ -200,17 +166,12 @@ def read_tables(folder: Path) -> Results:
         head = parse_json(read_bytes(folder / PROVENANCE, RecordingError, most=MOST_JSON))
         if head.pop("kind") != KIND or head["schema_version"] != SCHEMA_VERSION:
             raise ValueError(f"this version of cdtool reads schema_version {SCHEMA_VERSION}")
-        known = build(Results, {**head, **{name: [] for name in tables()}}, "results")
-        # A table that earlier versions did not write is empty.
-        rows = {
-            name: _read(folder / name, kind) if (folder / name).exists() or name not in _LATER else Rows(kind)
-            for name, kind in tables().items()
-        }
+        known = typed(Results, {**head, **{name: [] for name in tables()}}, "results")
+        rows: dict[str, Any] = {name: _read(folder / name, kind) for name, kind in tables().items()}
+        return replace(known, **rows)
     except (ContentError, ValueError, KeyError, TypeError, AttributeError, OSError, ArrowException) as fault:
         reason = " ".join(str(fault).split())[:200]
         raise RecordingError(f"{folder}: damaged, or not a results.parquet: {reason}", _NEXT_STEP) from fault
-    rest = {item.name: getattr(known, item.name) for item in fields(known)}
-    return Results(**{**rest, **{name: held if name in _MANY else tuple(held) for name, held in rows.items()}})
 
 
 def _has_mark(folder: Path) -> bool:
@@ -225,83 +186,68 @@ class _OfRecordings:
     """When the recording of a row began, and its campaign, test point and machine."""
 
     def __init__(self, results: Results) -> None:
-        rows = results.recordings
-        names = zip(values_of(rows, "group"), values_of(rows, "recording"), strict=True)
-        self.numbers = {key: number for number, key in enumerate(names)}
-        self.columns = {name: values_of(rows, name) for name in ("began_s", "campaign", "point")}
+        self.rows = {(row.group, row.recording): row for row in results.recordings}
         self.machine = str(results.provenance.get("machine") or "") or None
 
-    def of(self, groups: Sequence[str], names: Sequence[str]) -> dict[str, Sequence[Any]]:
-        """Return columns for the recordings, or their operations, with these groups and names."""
-        numbers = [
-            self.numbers.get((group, name), self.numbers.get((group, _OPERATION.sub("", name))))
-            for group, name in zip(groups, names, strict=True)
-        ]
-        found = {name: [None if n is None else column[n] for n in numbers] for name, column in self.columns.items()}
-        began = [None if at is None else round(1e6 * at) for at in found.pop("began_s")]
-        return {**found, "began": began, "machine": [self.machine] * len(numbers)}
+    def of(self, row: Any) -> dict[str, Any]:
+        """Return columns for the recording that a row names."""
+        known = self.rows.get((row.group, row.recording))
+        if known is None:
+            return {"machine": self.machine}
+        began = None if known.began_s is None else round(1e6 * known.began_s)
+        return {"campaign": known.campaign, "point": known.point, "began": began, "machine": self.machine}
 
 
-def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[int]]]:
-    """Yield the name of each file of a table, and the numbers of its rows."""
-    names = _PARTS.get(table)
-    if not names or not len(rows):
-        yield table, range(len(rows))
+def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[_Numbered]]]:
+    """Yield the name of each file of a table, and its rows."""
+    if table not in _PARTS or not rows:
+        yield table, list(enumerate(rows))
         return
-    numbers = range(len(rows))
-    keys = list(zip(*(values_of(rows, name) for name in names), strict=True))
-    for place, (key, part) in enumerate(_by_key(keys, numbers).items()):
-        yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:_LONGEST_NAME] for name in key)}", part
+    parts: dict[tuple[str, ...], list[_Numbered]] = {}
+    keys = zip(*(map(attrgetter(name), rows) for name in _PARTS[table]), strict=True)
+    for names, numbered in zip(keys, enumerate(rows), strict=True):
+        parts.setdefault(names, []).append(numbered)
+    for place, (names, part) in enumerate(parts.items()):
+        yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:_LONGEST_NAME] for name in names)}", part
 
 
-def _by_key(keys: Sequence[tuple[str, ...]], numbers: Sequence[int]) -> dict[tuple[str, ...], list[int]]:
-    found: dict[tuple[str, ...], list[int]] = {}
-    for key, number in zip(keys, numbers, strict=True):
-        found.setdefault(key, []).append(number)
-    return found
-
-
-def _write(
-    path: Path,
-    columns: Sequence[_Column],
-    rows: Sequence[Any],
-    places: Sequence[int],
-    of_recordings: _OfRecordings | None,
-) -> None:
-    """Write the rows with these numbers as one file, a row group at a time."""
+def _write(path: Path, kind: Any, rows: Sequence[_Numbered], of_recordings: _OfRecordings | None) -> None:
+    """Write numbered rows as one file, a row group at a time."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    listed = [pa.field("row", pa.int64(), metadata={"meaning": "position in results.json"})]
-    listed += [pa.field(item.name, item.arrow, metadata={"meaning": item.meaning}) for item in columns]
+    listed = [pa.field("row", pa.int64(), metadata={"meaning": "position in results.json"}), *_columns(kind)]
     if of_recordings:
-        known = {item.name for item in columns}
+        known = {item.name for item in listed}
         listed += [pa.field(name, pa.string()) for name in ("campaign", "point", "machine") if name not in known]
         listed.append(pa.field("began", pa.timestamp("us"), metadata={"meaning": "when the recording began, UTC"}))
     schema = pa.schema(listed)
+    hints = _hints(kind)
     with pq.ParquetWriter(path, schema, compression="zstd") as writer:
-        for first in range(0, max(len(places), 1), _AT_ONCE):
-            numbers = list(places[first : first + _AT_ONCE])
-            some = picked(rows, numbers)
-            values: dict[str, Sequence[Any]] = {item.name: _stored(item, some) for item in columns}
-            if of_recordings:
-                values = {**of_recordings.of(values["group"], values["recording"]), **values}
-            arrays = [_array(values[item.name] if item.name != "row" else numbers, item.type) for item in schema]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+        for first in range(0, max(len(rows), 1), _AT_ONCE):
+            some = [row for _, row in rows[first : first + _AT_ONCE]]
+            joined = [of_recordings.of(row) for row in some] if of_recordings else []
+            columns = {name: [of_row.get(name) for of_row in joined] for name in schema.names if name not in hints}
+            columns |= {name: _stored(hint, list(map(attrgetter(name), some))) for name, hint in hints.items()}
+            columns["row"] = [number for number, _ in rows[first : first + _AT_ONCE]]
+            try:
+                table = pa.Table.from_pydict(columns, schema)
+            except UnicodeEncodeError:  # half a surrogate pair, from a file name that is not UTF-8
+                table = pa.Table.from_pydict(_encodable(columns), schema)
+            writer.write_table(table)
 
 
-def _stored(column: _Column, rows: Sequence[Any]) -> Sequence[Any]:
-    values = values_of(rows, column.name)
-    return [column.store(value) for value in values] if column.store else values
+def _stored(hint: Any, values: list[Any]) -> list[Any]:
+    """Return the values of a field as Arrow takes them."""
+    if scalar_of(hint):
+        return values
+    made = [plain(value, hint) for value in values]
+    return [list(value.items()) for value in made] if get_origin(hint) is Mapping else made
 
 
-def _array(values: Sequence[Any], kind: Any) -> Any:
-    import pyarrow as pa
-
-    try:
-        return pa.array(values, kind)
-    except UnicodeEncodeError:  # half a surrogate pair, from a file name that is not UTF-8
-        return pa.array(_encodable(values), kind)
+def _hints(kind: Any) -> dict[str, Any]:
+    hints = get_type_hints(kind)
+    return {item.name: hints[item.name] for item in fields(kind)}
 
 
 def _encodable(value: Any) -> Any:
@@ -314,45 +260,42 @@ def _encodable(value: Any) -> Any:
     return value
 
 
-def _read(folder: Path, kind: Any) -> Rows[Any]:
+def _read(folder: Path, kind: Any) -> tuple[Any, ...]:
     """Return the rows of a table in their order in results.json."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = _columns(kind)
-    names = ["row", *(item.name for item in columns)]
-    table = pa.concat_tables(pq.read_table(path, columns=names) for path in sorted(folder.glob("*.parquet")))
-    table = table.sort_by("row")
-    rows = Rows(kind)
-    for batch in table.to_batches(max_chunksize=_AT_ONCE):
-        values = [batch.column(item.name).to_pylist() for item in columns]
-        loaded = zip(columns, values, strict=True)
-        rows.extend_columns([list(map(item.load, held)) if item.load else held for item, held in loaded])
-    return rows
+    hints = _hints(kind)
+    parts = (pq.read_table(path, columns=["row", *hints]) for path in sorted(folder.glob("*.parquet")))
+    table = pa.concat_tables(parts).sort_by("row")
+    texts: dict[str, str] = {}
+    columns = []
+    for name, hint in hints.items():
+        if scalar := scalar_of(hint):
+            values = table[name].to_pylist()
+            columns.append([texts.setdefault(value, value) for value in values] if scalar is str else values)
+        else:
+            values = table[name].to_pylist(maps_as_pydicts="strict")
+            columns.append([typed(hint, value, name) for value in values])
+    return tuple(map(kind, *columns))
 
 
-def _columns(kind: Any) -> list[_Column]:
-    """Return the columns of a class of rows."""
-    hints = get_type_hints(kind)
-    return [_column(item.name, hints[item.name], item.metadata["meaning"]) for item in fields(kind)]
-
-
-def _column(name: str, kind: Any, meaning: str) -> _Column:
+def _columns(kind: Any) -> list[Any]:
+    """Return the Arrow fields of a class of rows, with their meanings."""
     import pyarrow as pa
 
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin is tuple and is_dataclass(inner[0]):
-        parts = _columns(inner[0])
-        row: Any = inner[0]
-        return _Column(
-            name,
-            pa.list_(pa.struct([(item.name, item.arrow) for item in parts])),
-            meaning,
-            store=lambda rows: [vars(one) for one in rows],
-            load=lambda rows: tuple(row(**values) for values in rows),
-        )
-    if origin is Mapping:
-        return _Column(name, pa.map_(pa.string(), pa.float64()), meaning, lambda values: list(values.items()), dict)
-    known = next(item for item in (*inner, kind) if item is not type(None))
-    plain = {str: pa.string(), float: pa.float64(), int: pa.int64(), bool: pa.bool_()}
-    return _Column(name, plain[known], meaning)
+    hints = _hints(kind)
+    return [
+        pa.field(item.name, _arrow_type(hints[item.name]), metadata={"meaning": item.metadata["meaning"]})
+        for item in fields(kind)
+    ]
+
+
+def _arrow_type(hint: Any) -> Any:
+    import pyarrow as pa
+
+    if scalar := scalar_of(hint):
+        return {str: pa.string(), float: pa.float64(), int: pa.int64(), bool: pa.bool_()}[scalar]
+    if get_origin(hint) is Mapping:
+        return pa.map_(pa.string(), pa.float64())
+    return pa.list_(pa.struct(_columns(get_args(hint)[0])))

@@ -9,8 +9,8 @@ from __future__ import annotations
 import gzip
 import hashlib
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +21,13 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, read_bytes, unpack_json
 from cdtool.base.files.strict_json import finite, strict_json
+from cdtool.base.files.typed_json import plain, typed
 from cdtool.recordings.recording import Contact
-from cdtool.results.files.typed_rows import build
 from cdtool.results.traces.trace import ContactOutcome, Panel, StatisticCurve, Trace
 
 SCHEMA_VERSION = 3
-# The version before: "not assessable", where results.json has had "not_assessable" since its version 3.
-_SPACED_WORDS = 2
 NO_LIMIT = 1_000_000_000
+_OPERATION = re.compile(r"(?<=#)\d+\Z")
 # The name of the file in a results.parquet.
 TRACES_IN_FOLDER = "results.traces.json.gz"
 
@@ -123,10 +122,9 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = unpack_json(content)
-        if values["schema_version"] not in (_SPACED_WORDS, SCHEMA_VERSION):
+        if values["schema_version"] != SCHEMA_VERSION:
             raise RecordingError(
-                f"{path}: schema_version is {values['schema_version']}; "
-                f"this version of cdtool reads {_SPACED_WORDS} and {SCHEMA_VERSION}",
+                f"{path}: schema_version is {values['schema_version']}; this version of cdtool reads {SCHEMA_VERSION}",
                 "run cdtool benchmark again",
             )
         if results is not None and values["results_sha256"] != _digest(results):
@@ -205,10 +203,11 @@ def trace_values(trace: Trace) -> dict[str, Any]:
     time_step = max(_TIME_STEP, 10.0 ** (math.floor(math.log10(max(trace.end - trace.start, 1.0))) - 8))
     return {
         "recording": trace.recording,
+        "operation": trace.operation,
         "group": trace.group,
         "start": trace.start,
         "end": trace.end,
-        "contacts": [finite(asdict(contact)) for contact in trace.contacts],
+        "contacts": finite(plain(trace.contacts, tuple[Contact, ...])),
         "contact": trace.contact,
         "view": list(trace.view),
         "joints": trace.joints,
@@ -228,7 +227,7 @@ def _panel_values(panel: Panel, start: float, time_step: float) -> dict[str, Any
         "joint": panel.joint,
         "verdict": panel.verdict,
         "reason": panel.reason,
-        "seen": [finite(asdict(seen)) for seen in panel.seen],
+        "seen": finite(plain(panel.seen, tuple[ContactOutcome, ...])),
         "alarms": list(panel.alarms),
         "false_alarms": list(panel.false_alarms),
         "why": list(panel.why),
@@ -242,12 +241,13 @@ def _panel_values(panel: Panel, start: float, time_step: float) -> dict[str, Any
 
 
 def _trace(values: dict[str, Any]) -> Trace:
+    recording = str(values["recording"])
     return Trace(
-        recording=str(values["recording"]),
+        recording=recording,
         group=str(values["group"]),
         start=float(values["start"]),
         end=float(values["end"]),
-        contacts=tuple(build(Contact, _numbers(item), "contact") for item in values["contacts"]),
+        contacts=tuple(typed(Contact, _numbers(item), "contact") for item in values["contacts"]),
         contact=int(values["contact"]),
         view=(float(values["view"][0]), float(values["view"][1])),
         force_time=_decoded(values["force_time"]),
@@ -255,6 +255,8 @@ def _trace(values: dict[str, Any]) -> Trace:
         panels=tuple(_panel(item) for item in values["panels"]),
         joints=int(values["joints"]),
         chosen=str(values["chosen"]),
+        # In files of earlier versions only the name has it.
+        operation=int(values.get("operation", (_OPERATION.search(recording) or "0")[0])),
     )
 
 
@@ -265,10 +267,9 @@ def _panel(values: dict[str, Any]) -> Panel:
         unit=str(values["unit"]),
         joint=str(values["joint"]),
         course=StatisticCurve(time, value, lower, upper, np.array(values["status"], dtype=np.uint8)),
-        # A file of the version before has another spelling.
-        verdict="not_assessable" if values["verdict"] == "not assessable" else str(values["verdict"]),
+        verdict=str(values["verdict"]),
         reason=str(values["reason"]),
-        seen=tuple(build(ContactOutcome, _numbers(item), "seen") for item in values["seen"]),
+        seen=tuple(typed(ContactOutcome, _numbers(item), "seen") for item in values["seen"]),
         alarms=tuple(map(float, values["alarms"])),
         false_alarms=tuple(map(float, values["false_alarms"])),
         why=tuple(map(str, values["why"])),

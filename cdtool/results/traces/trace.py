@@ -106,8 +106,9 @@ class Panel:
 class Trace:
     """One operation with every detector's panel: `contact` is the number in `contacts` that is shown, -1 for none.
 
-    `view` is the interval around it [s]; `force` (m,) [N] is the load cell on `force_time`, empty without one. `chosen`
-    states why the trace was stored; `joints` is the number of the machine's joints.
+    `recording` is its name, LOG#N for `operation` N of a log that is cut. `view` is the interval around the contact
+    [s]; `force` (m,) [N] is the load cell on `force_time`, empty without one. `chosen` states why the trace was stored;
+    `joints` is the number of the machine's joints.
     """
 
     recording: str
@@ -122,6 +123,12 @@ class Trace:
     panels: tuple[Panel, ...]
     joints: int = 1
     chosen: str = ""
+    operation: int = 0
+
+    @property
+    def log(self) -> str:
+        """Return the recording as the rows of results name it."""
+        return self.recording.removesuffix(f"#{self.operation}") if self.operation else self.recording
 
     @property
     def shown(self) -> Contact | None:
@@ -190,6 +197,7 @@ def make_trace(
         panels=tuple(panels),
         joints=len(recording.joints),
         chosen=chosen,
+        operation=operation.number,
     )
 
 

@@ -51,7 +51,7 @@ _LARGEST_ERROR = 0.05
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Predicted:
     """A signal that is part of a prediction: its samples, the order of the derivative, and a factor (J,) or scalar."""
 
     time: FloatArray
@@ -139,8 +139,8 @@ def _is_measured(recording: Recording, channel: str) -> bool:
     return derived is None or not any(item.kind == derived for item in recording.findings)
 
 
-def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _Part:
-    return _Part(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
+def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _Predicted:
+    return _Predicted(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
 
 
 def _motion_latencies(recording: Recording, joint: int, name: str, contacts: Sequence[Contact]) -> list[ChannelLatency]:
@@ -161,7 +161,7 @@ def _motion_latencies(recording: Recording, joint: int, name: str, contacts: Seq
     return found
 
 
-def _by_sections(empty: ChannelLatency, observed: _Part, predictor: _Part, until: float) -> ChannelLatency:
+def _by_sections(empty: ChannelLatency, observed: _Predicted, predictor: _Predicted, until: float) -> ChannelLatency:
     start = max(float(observed.time[0]), float(predictor.time[0]))
     end = min(float(observed.time[-1]), float(predictor.time[-1]), until)
     period = max(observed.period, predictor.period)
@@ -175,7 +175,7 @@ def _by_sections(empty: ChannelLatency, observed: _Part, predictor: _Part, until
     return found
 
 
-def _sections(start: float, end: float, period: float, predictor: _Part) -> list[_Window]:
+def _sections(start: float, end: float, period: float, predictor: _Predicted) -> list[_Window]:
     """Return the sections of a motion in which it changes, at most `_MOST_SECTIONS`."""
     length = max(_SECTION, _PERIODS_PER_SECTION * period, (end - start) / _FINEST_CUT)
     if end - start < length:
@@ -237,7 +237,7 @@ def _rise_time(force: Series, contact: Contact) -> float:
 
 def _balances(
     recording: Recording, machine: Machine, base: str, others: Sequence[ChannelLatency]
-) -> tuple[RestsOn, list[list[_Part]]]:
+) -> tuple[RestsOn, list[list[_Predicted]]]:
     """Return what the balance rests on, and one sum of parts per joint that may feel the contact."""
     order = 2 if base == "position" else 1
     inertia = machine.nominal_inertia
@@ -255,7 +255,7 @@ def _balances(
         if _is_measured(recording, "acceleration") and not machine.coupled and reflected is not None:
             rests_on = "two masses"
             acceleration = recording["acceleration"]
-            load = _Part(
+            load = _Predicted(
                 acceleration.time - (lateness or 0.0),
                 np.ascontiguousarray(acceleration.values[:, j]),
                 0,
@@ -285,7 +285,7 @@ def _lateness(others: Sequence[ChannelLatency], base: str, joint: str) -> float 
 
 
 def _latency(
-    empty: ChannelLatency, observed: _Part, sums: Sequence[Sequence[_Part]], windows: Sequence[_Window]
+    empty: ChannelLatency, observed: _Predicted, sums: Sequence[Sequence[_Predicted]], windows: Sequence[_Window]
 ) -> ChannelLatency:
     """Return the latency with the narrowest interval of all smoothings, widened by its change at twice that."""
     period = max(observed.period, *(part.period for parts in sums for part in parts))
@@ -308,14 +308,14 @@ def _latency(
 
 
 def _joint_events(
-    observed: _Part, sums: Sequence[Sequence[_Part]], windows: Sequence[_Window], width: float
+    observed: _Predicted, sums: Sequence[Sequence[_Predicted]], windows: Sequence[_Window], width: float
 ) -> list[TimedEvent]:
     """Return the events of the joint that explains the observed signal best."""
     per_joint = [[_event(observed, parts, window, width) for window in windows] for parts in sums]
     return min(per_joint, key=_score)
 
 
-def _event(observed: _Part, parts: Sequence[_Part], window: _Window, width: float) -> TimedEvent:
+def _event(observed: _Predicted, parts: Sequence[_Predicted], window: _Window, width: float) -> TimedEvent:
     step = width / POINTS_PER_WIDTH
     own = Grid.over(window.start, window.end, step)
     if own.count < LEAST_POINTS:

@@ -138,7 +138,7 @@ def test_storages_name_version_and_time_differently(found, etag, changed):
 
 def test_an_error_of_a_log_names_the_url_once(memory):
     memory.pipe_file("/logs/a.csv", b"")
-    from cdtool.commands.judging.runs import read_log
+    from cdtool.commands.judging.runs import read
 
     with pytest.raises(RecordingError, match=r"^memory://logs/a\.csv: is empty"):
-        read_log("memory://logs/a.csv", "sample_logs/gate/machine.toml")
+        read("memory://logs/a.csv", "sample_logs/gate/machine.toml")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.base.exit_status import STATUSES_OF
-from cdtool.execution.store.use import StoreUse
+from cdtool.execution.store.store import Store
 from cdtool.results.evaluated import evaluate
 from cdtool.results.files.results_file import to_json
 from cdtool.results.limits import LimitRule
@@ -94,8 +94,8 @@ class Folder:
 
     @property
     def store(self) -> Path:
-        with StoreUse(self.path / "store").opened() as store:
-            return store.folder
+        Store(self.path / "store").create()
+        return self.path / "store"
 
     def triggers(self, rows: str) -> Path:
         path = self.path / "triggers.csv"

@@ -10,7 +10,7 @@ from scipy.io import savemat
 
 from cdtool.base.errors import CdtoolError
 from cdtool.formats.machine_file import read_machine_file
-from cdtool.formats.mat.version_5 import read_variables
+from cdtool.formats.mat import Mat
 from tests.command import cdtool
 from tests.project.pages import ROOT
 
@@ -106,4 +106,4 @@ def test_dimensions_of_a_matlab_file_beyond_every_float_are_one_line(tmp_path):
     content[156:160] = (224).to_bytes(4, "little")  # the size of the dimensions: 56 of them
     path.write_bytes(content)
     with pytest.raises(CdtoolError, match=r"log\.mat: damaged at byte 128: a part of an array has 224 bytes"):
-        read_variables(path)
+        Mat().columns(path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from cdtool.commands.scoring.left_out import LeftOut
+from cdtool.commands.scoring.scoring import LeftOut
 from cdtool.results.results import Skipped
 from tests.command import cdtool
 from tests.commands.console.damaged_copies import damaged

@@ -11,7 +11,7 @@ import pytest
 from cdtool.base.errors import OutputError, RecordingError, UsageError
 from cdtool.base.files.writing import replaced
 from cdtool.commands.convert.converting import convert
-from cdtool.commands.judging.runs import read_log
+from cdtool.commands.judging.runs import read
 from cdtool.formats.channels.reading import survey
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.written_files import WRITERS
@@ -248,8 +248,8 @@ def test_a_clock_that_begins_at_5_s_begins_there_in_mcap_too(tmp_path):
     (tmp_path / "log.csv").write_text(f"t,x,F\n{rows}\n", encoding="utf-8")
     (tmp_path / "gate.toml").write_text(GATE_TABLE, encoding="utf-8")
     done = convert(tmp_path / "log.csv", tmp_path / "log.mcap", machine=tmp_path / "gate.toml")
-    before = read_log(tmp_path / "log.csv", read_machine_file(tmp_path / "gate.toml"))
-    after = read_log(done.files[0], read_machine_file(done.machine_files[0]))
+    before = read(tmp_path / "log.csv", read_machine_file(tmp_path / "gate.toml"))
+    after = read(done.files[0], read_machine_file(done.machine_files[0]))
     assert before["torque"].time[0] == 5.0
     assert after["torque"].time.tolist() == before["torque"].time.tolist()
     assert after.origin == before.origin

@@ -9,7 +9,7 @@ import pytest
 
 import cdtool
 from cdtool.commands.convert.converting import convert
-from cdtool.commands.convert.log_rows import LogRows
+from cdtool.commands.convert.log_rows import ColumnRows
 from cdtool.formats.channels.reading import survey
 from tests.commands.convert.kinds import KINDS, needs
 from tests.formats.container_files import assert_same, logged, machine_file, two_clocks
@@ -53,7 +53,7 @@ def test_all_columns_of_several_clocks_keep_the_start_without_a_machine_file(suf
     for path in first.files:
         again = convert(path, tmp_path / "again.csv", force=True)
         for name in (path, again.files[0]):
-            assert LogRows(Path(name)).origin == LogRows(log).origin > 1.6e9
+            assert ColumnRows(Path(name)).origin == ColumnRows(log).origin > 1.6e9
 
 
 def test_info_shows_the_same_times_of_a_converted_table(tmp_path):
@@ -81,5 +81,5 @@ def test_info_shows_the_same_times_of_a_converted_table(tmp_path):
 )
 def test_only_a_header_written_by_convert_states_the_start(head, origin, tmp_path):
     (tmp_path / "log.csv").write_text(head + "t [s],v\n" + "".join(f"{k / 10},{k % 7}\n" for k in range(50)))
-    assert LogRows(tmp_path / "log.csv").origin == origin
+    assert ColumnRows(tmp_path / "log.csv").origin == origin
     assert list(survey(tmp_path / "log.csv").columns) == ["t [s]", "v"]

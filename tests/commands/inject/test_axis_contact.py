@@ -11,13 +11,13 @@ import pytest
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
 from cdtool.commands.inject.axis_contact import Doubt, InjectedContact, axis_contact
-from cdtool.commands.inject.injected_recording import injected_recording
-from cdtool.commands.inject.refusal import Refusal, refusal
+from cdtool.commands.inject.injected_logs import injected_recording
+from cdtool.commands.inject.with_injected import Refusal, refusal
 from cdtool.commands.simulate.gate_model import GateRun, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import USED, AxisRun, axis_run
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import AxisModel, Drive, Sensors
+from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Sensors
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.recordings.recording import Recording, Series
 from tests.machines.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle
@@ -144,7 +144,7 @@ def test_the_brackets_of_an_unknown_controller_contain_the_known_one() -> None:
 
 def test_a_rigid_drive_in_the_place_of_an_elastic_one_is_flagged_and_shows_the_contact_too_early() -> None:
     free, _, _ = twins("stiff", 13)
-    rigid = replace(MODEL, drive=Drive(motor_mass=MODEL.drive.motor_mass, load_mass=MODEL.drive.load_mass))
+    rigid = replace(MODEL, drive=ElasticDrive(motor_mass=MODEL.drive.motor_mass, load_mass=MODEL.drive.load_mass))
     true, wrong = (contact_in(free, 4.0, "stiff", model) for model in (MODEL, rigid))
     assert Doubt.RIGID_DRIVE in wrong.doubts
     assert Doubt.RIGID_DRIVE not in true.doubts
@@ -198,7 +198,7 @@ def test_the_brackets_of_a_drive_beyond_its_known_wind_up_contain_the_true_torqu
 
 def test_a_drive_without_doubt_has_no_bracket() -> None:
     assert assumptions_of(MODEL) == (Assumption(),)
-    rigid = replace(MODEL, drive=Drive(load_mass=600.0, motor_mass=500.0, observed_wind_up=1e-3))
+    rigid = replace(MODEL, drive=ElasticDrive(load_mass=600.0, motor_mass=500.0, observed_wind_up=1e-3))
     assert assumptions_of(rigid) == (Assumption(),)
 
 
@@ -311,8 +311,8 @@ def test_an_obstacle_that_never_acts_is_an_error() -> None:
         axis_contact(axis_run(ON_LOAD_SIDE.referred_to_load(free)), MODEL, soft, 4.0, 0.0)
 
 
-UNKNOWN_DRIVE = replace(MODEL, drive=Drive(load_mass=1154.0))
-KNOWN_RIGID = replace(MODEL, drive=Drive(load_mass=1154.0, stated_rigid=True))
+UNKNOWN_DRIVE = replace(MODEL, drive=ElasticDrive(load_mass=1154.0))
+KNOWN_RIGID = replace(MODEL, drive=ElasticDrive(load_mass=1154.0, stated_rigid=True))
 
 
 @pytest.mark.parametrize(

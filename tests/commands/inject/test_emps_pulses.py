@@ -12,8 +12,8 @@ import pytest
 
 from cdtool.commands.inject.assumption import ControllerReaction
 from cdtool.commands.inject.axis_contact import axis_contact
-from cdtool.commands.inject.injected_recording import injected_recording
-from cdtool.commands.inject.refusal import refusal
+from cdtool.commands.inject.injected_logs import injected_recording
+from cdtool.commands.inject.with_injected import refusal
 from cdtool.detectors.momentum import Momentum
 from cdtool.formats.machine_file import MachineFile
 from cdtool.machines.axis_model.axis_run import axis_run

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdtool.base.errors import RecordingError, UsageError
-from cdtool.commands.inject.joint_mark import JointMark
+from cdtool.commands.inject.inject_section import JointMark
 from cdtool.recordings.recording import Recording, Series
 from tests.machines.robot_model.test_chain import planar_arm
 from tests.synthetic.robots import six_joint_robot

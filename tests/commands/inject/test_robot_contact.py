@@ -14,7 +14,7 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.tables import Table
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, DriveBeyond
 from cdtool.commands.inject.axis_contact import Doubt, InjectedContact
-from cdtool.commands.inject.injected_recording import injected_recording
+from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.robot_contact import RobotLog, StruckPoint, least_known_joint, robot_contact
 from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial

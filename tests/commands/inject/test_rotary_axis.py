@@ -10,13 +10,13 @@ import pytest
 import cdtool
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 
 # A swing door: 40 kg m2, its edge 0.8 m from the hinge.
 LEVER, INERTIA, PERIOD = 0.8, 40.0, 1e-3
 CONTROLLER = Controller(period=PERIOD, speed_gain=400.0, integral_gain=800.0)
-MODEL = AxisModel(drive=Drive(load_mass=INERTIA), friction=Friction(coulomb_forward=8.0), controller=CONTROLLER)
+MODEL = AxisModel(drive=ElasticDrive(load_mass=INERTIA), friction=Friction(coulomb_forward=8.0), controller=CONTROLLER)
 MACHINE = f"""[machine]
 type = "rotary_axis"
 name = "door"

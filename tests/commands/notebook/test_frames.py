@@ -12,8 +12,7 @@ import pytest
 import cdtool
 from cdtool.base.errors import UsageError
 from cdtool.results.evaluated import evaluate
-from cdtool.results.files.results_folder import tables
-from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, Results
+from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, Results, tables
 from cdtool.results.summary import FIGURES
 from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE
 

@@ -12,7 +12,7 @@ import pytest
 import cdtool
 from cdtool.detectors.base import gain
 from cdtool.detectors.momentum import Momentum
-from cdtool.execution.store.use import StoreUse
+from cdtool.execution.store.store import Store
 from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE
 
 
@@ -75,7 +75,7 @@ def test_a_benchmark_takes_detectors_with_their_gains(tmp_path):
     study = tmp_path / "benchmark.toml"
     study.write_text(re.sub(r'"((?:free|holdout|stiff|soft)/)', rf'"{GATE}/\1', text))
     wanted = cdtool.benchmark(study, detectors=["momentum"]).contacts.latency_ms.tolist()
-    store = StoreUse(tmp_path / "store")
+    store = Store(tmp_path / "store")
     for names in (["momentum"], [Momentum(bandwidth=20.0), "pt"]):
         found = cdtool.benchmark(GATE / "benchmark.toml", detectors=names, store=store, jobs=len(names))
     assert found.results.detectors == ("momentum", "pure_torque")

@@ -22,7 +22,7 @@ from cdtool.commands.protocol.assessment.plan import (
     TestParticulars,
 )
 from cdtool.commands.protocol.assessment.protocol import Protocol
-from cdtool.commands.protocol.assessment.reasons import Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict
 from cdtool.commands.protocol.checking import check_protocol
 from cdtool.commands.protocol.document.words import words_of
 from cdtool.commands.protocol.drafting import draft_protocol
@@ -46,7 +46,7 @@ def made(rig) -> Protocol:
     return make_protocol(read_protocol_file(rig / "protocol.toml"), cdtool.benchmark(rig / "benchmark.toml"))
 
 
-def kinds_of(verdict: Verdict) -> list[str]:
+def kinds_of(verdict: ProtocolVerdict) -> list[str]:
     return [reason.kind.value for reason in verdict.reasons]
 
 

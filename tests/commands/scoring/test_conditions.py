@@ -14,7 +14,7 @@ from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark
 from cdtool.commands.scoring.dry_run import dry_run
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.tune.tuned_files import _rebase
-from cdtool.execution.store.use import StoreUse
+from cdtool.execution.store.store import Store
 from cdtool.results.changed_conditions import condition_rows
 from cdtool.results.files.results_file import to_json
 from tests.bits import every_value
@@ -104,7 +104,7 @@ def test_a_group_has_the_window_of_its_counterpart_and_a_section_of_its_own(read
 
 
 def test_the_store_has_them(gate, tmp_path):
-    file, store = write(gate, WINTER), StoreUse(tmp_path / "store")
+    file, store = write(gate, WINTER), Store(tmp_path / "store")
     first = cdtool.benchmark(file, store=store)
     assert dry_run(file, store=store).logs == ()
     again = cdtool.benchmark(file, store=store)

@@ -11,7 +11,7 @@ import pytest
 
 import cdtool
 from cdtool.commands.judging import runs
-from cdtool.commands.scoring import gathering, learned_thresholds
+from cdtool.commands.scoring import learned_thresholds, scored_logs
 from cdtool.execution.workers import Workers, in_order
 from cdtool.results.files.results_file import to_json
 from cdtool.results.traces.file import encode_traces
@@ -74,7 +74,7 @@ def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, by_one, thresh
             sent.append(len(result))
             yield pickle.loads(result)
 
-    monkeypatch.setattr(gathering, "in_order", by_pickles)
+    monkeypatch.setattr(scored_logs, "in_order", by_pickles)
     monkeypatch.setattr(runs, "in_order", by_pickles)
     assert run(gate, threshold) == alone
     assert len(sent) == 14

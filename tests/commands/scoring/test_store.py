@@ -5,21 +5,19 @@ import os
 import shutil
 import subprocess
 import sys
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import cdtool
-from cdtool.base.errors import RecordingError
+from cdtool.base.errors import OutputError, RecordingError
 from cdtool.commands.scoring import pieces
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file, with_detectors
 from cdtool.commands.scoring.dry_run import dry_run
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.execution.store.store import Store
 from cdtool.execution.store.upkeep import collect_garbage, store_status
-from cdtool.execution.store.use import StoreUse
 from cdtool.execution.workers import Workers
 from cdtool.results.files.results_file import to_json
 from cdtool.results.traces.file import encode_traces
@@ -88,13 +86,8 @@ def bytes_of(done: cdtool.BenchmarkResult) -> bytes:
 def run(folder: Path, store: Path | None, **settings) -> tuple[bytes, int | None]:
     """Return results and traces as bytes, and the number of recordings that were computed."""
     jobs = settings.pop("jobs", 1)
-    use = None if store is None else StoreUse(store, **settings)
+    use = None if store is None else Store(store, **settings)
     done = cdtool.benchmark(folder / "b.toml", store=use, jobs=jobs)
-    if store is not None and done.stored is not None and not done.stored.computed:
-        # The same from the outcomes of the logs as from the results of the run, if they were there.
-        shutil.rmtree(store / "finished", ignore_errors=True)
-        again = cdtool.benchmark(folder / "b.toml", store=use, jobs=jobs)
-        assert bytes_of(again) == bytes_of(done) and again.stored == done.stored
     return bytes_of(done), done.stored.computed if done.stored else None
 
 
@@ -114,7 +107,7 @@ def alone(folder: Path) -> bytes:
 
 def planned(folder: Path, store: Path, **settings) -> dict[str, tuple[str, ...]]:
     """Return the detectors that would run, by recording."""
-    found = dry_run(folder / "b.toml", store=StoreUse(store, **settings))
+    found = dry_run(folder / "b.toml", store=Store(store, **settings))
     return {item.recording: item.detectors for item in found.logs}
 
 
@@ -193,9 +186,7 @@ def test_a_file_with_another_time_is_hashed_once(gate, tmp_path, monkeypatch):
     for log in gate.rglob("*.csv"):
         os.utime(log, ns=(1, 1))
     assert run(gate, tmp_path / "s", trust_times=True)[1] == 0
-    monkeypatch.setattr(
-        "cdtool.commands.scoring.store.known_sources.read_sources", lambda _: pytest.fail("hashed again")
-    )
+    monkeypatch.setattr("cdtool.execution.store.store.read_sources", lambda _: pytest.fail("hashed again"))
     assert run(gate, tmp_path / "s", trust_times=True)[1] == 0
 
 
@@ -232,7 +223,7 @@ def test_a_log_that_ends_its_worker_is_left_out_also_if_other_detectors_are_stor
 
     with monkeypatch.context() as patched:
         patched.setattr(pieces.PieceScoring, "__call__", lost)
-        done = cdtool.benchmark(gate / "b.toml", store=StoreUse(filled))
+        done = cdtool.benchmark(gate / "b.toml", store=Store(filled))
     left_out = [(item.recording, item.reason) for item in done.results.skipped]
     assert left_out == [("stiff/03.csv", "its worker process was killed")]
     assert run(gate, filled) == (alone(gate), 1)
@@ -263,7 +254,7 @@ def test_a_log_that_changes_while_it_is_read_is_left_out_with_that_reason(gate, 
         return found
 
     monkeypatch.setattr(pieces, "state_of", changing)
-    use = StoreUse(tmp_path / "s") if with_store else None
+    use = Store(tmp_path / "s") if with_store else None
     done = cdtool.benchmark(gate / "b.toml", store=use)
     assert [(item.recording, item.reason) for item in done.results.skipped] == [
         ("stiff/03.csv", "changed while it was read")
@@ -305,7 +296,7 @@ def test_a_trace_of_a_log_that_has_changed_since_is_left_out(gate, filled, monke
         return call(self, piece)
 
     monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
-    done = cdtool.benchmark(gate / "b.toml", store=StoreUse(filled))
+    done = cdtool.benchmark(gate / "b.toml", store=Store(filled))
     assert log.read_bytes() != text
     assert "stiff/03.csv" not in {item.recording for item in done.traces}
     log.write_bytes(text)
@@ -341,32 +332,41 @@ def test_runs_in_one_file(gate, tmp_path):
     assert run(gate, tmp_path / "s") == (expected, 0)
 
 
-def test_a_damaged_or_missing_part_is_computed_again(gate, tmp_path):
+def logs_in(store: Path) -> list[Path]:
+    return [path for path in (store / "logs").rglob("*") if path.is_file()]
+
+
+def test_a_damaged_or_missing_file_is_computed_again(gate, tmp_path):
     expected, _ = run(gate, tmp_path / "s")
-    (part,) = (tmp_path / "s" / "parts").iterdir()
-    content = bytearray(part.read_bytes())
+    first, second, *_ = logs_in(tmp_path / "s")
+    content = bytearray(first.read_bytes())
     content[len(content) // 3] ^= 0xFF
-    part.write_bytes(content)
-    assert run(gate, tmp_path / "s") == (expected, 6)
-    for part in (tmp_path / "s" / "parts").iterdir():
-        part.unlink()
+    first.write_bytes(content)
+    second.write_bytes(second.read_bytes()[:-1])
+    assert run(gate, tmp_path / "s") == (expected, 2)
+    for path in logs_in(tmp_path / "s"):
+        path.unlink()
     assert run(gate, tmp_path / "s") == (expected, 6)
 
 
-def test_a_part_that_vanishes_after_the_store_was_opened_is_computed_again(gate, tmp_path, monkeypatch):
-    expected, _ = run(gate, tmp_path / "s")
-    with StoreUse(tmp_path / "s").opened() as store:
-        monkeypatch.setattr(StoreUse, "opened", lambda *_: nullcontext(store))
-        for part in (tmp_path / "s" / "parts").iterdir():
-            part.unlink()
-        assert run(gate, tmp_path / "s") == (expected, 6)
+def test_a_missing_trace_is_made_again(gate, filled):
+    shutil.rmtree(filled / "traces")
+    assert run(gate, filled)[0] == alone(gate)
+    assert (filled / "traces").is_dir()
+
+
+def test_a_store_that_cannot_be_written_is_one_line(gate, filled):
+    shutil.rmtree(filled / "logs")
+    (filled / "logs").touch()
+    with pytest.raises(OutputError, match="cannot be written"):
+        run(gate, filled)
 
 
 def test_keys_are_the_same_in_another_process(gate, filled):
     code = (
         "from pathlib import Path; from cdtool.commands.scoring.dry_run import dry_run;"
-        "from cdtool.execution.store.use import StoreUse;"
-        "print(len(dry_run('b.toml', store=StoreUse(Path('../s'))).logs))"
+        "from cdtool.execution.store.store import Store;"
+        "print(len(dry_run('b.toml', store=Store(Path('../s'))).logs))"
     )
     for seed in ("1", "2"):
         # The paths in the results are relative to the benchmark file, whatever the folder it is called from.
@@ -391,32 +391,21 @@ def test_a_fleet_that_was_moved_is_known(gate, tmp_path):
 def killed_run(gate):
     """Kill a benchmark with a store after four of its logs."""
     code = (
-        "import os; from pathlib import Path; import cdtool; from cdtool.execution.store.use import StoreUse\n"
+        "import os; from pathlib import Path; import cdtool; from cdtool.execution.store.store import Store\n"
         "def progress(done, total):\n"
         "    if done == 4: os.kill(os.getpid(), 9)\n"
-        "cdtool.benchmark('b.toml', store=StoreUse(Path('../s')), progress=progress)"
+        "cdtool.benchmark('b.toml', store=Store(Path('../s')), progress=progress)"
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(cdtool.__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", code], check=False, cwd=gate, env=environment)
     assert done.returncode == -9
 
 
-def test_status_and_dry_run_count_what_the_journal_of_a_killed_run_holds(gate, tmp_path):
+def test_a_killed_run_continues_where_it_stopped(gate, tmp_path):
     killed_run(gate)
-    content = {path: path.read_bytes() for path in (tmp_path / "s").rglob("*") if path.is_file()}
-    status = store_status(tmp_path / "s")
-    assert (status.recordings, status.failed, status.damaged) == (4, 0, ())
-    assert status.unused == sum(status.entries.values()) > 4
-    planned = dry_run(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    planned = dry_run(gate / "b.toml", store=Store(tmp_path / "s"))
     assert (len(planned.logs), planned.total) == (2, 6)
-    assert {path: path.read_bytes() for path in (tmp_path / "s").rglob("*") if path.is_file()} == content
-
-
-def test_journals_of_a_killed_run_are_taken_over(gate, tmp_path):
-    killed_run(gate)
-    assert list((tmp_path / "s").glob("*.journal"))
     assert run(gate, tmp_path / "s") == (alone(gate), 2)
-    assert not list((tmp_path / "s").glob("*.journal"))
 
 
 @pytest.mark.parametrize("threshold", THRESHOLDS.names())
@@ -433,34 +422,32 @@ def test_what_was_learned_is_restored_without_loss(made, threshold, tmp_path):
 def test_a_folder_that_is_not_a_store_is_refused(gate):
     with pytest.raises(cdtool.base.errors.ConfigurationError, match="neither a store nor an empty folder"):
         run(gate, gate)
-    assert not (gate / "parts").exists()
+    assert not (gate / "logs").exists()
 
 
 def test_a_dry_run_writes_nothing(gate, tmp_path):
-    found = dry_run(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    found = dry_run(gate / "b.toml", store=Store(tmp_path / "s"))
     assert (len(found.logs), found.total, found.seconds) == (6, 6, None)
     assert not (tmp_path / "s").exists()
     run(gate, tmp_path / "s")
     (gate / "stiff" / "04.csv").write_text("t\n1\n", encoding="utf-8")
     before = sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "s").rglob("*"))
-    found = dry_run(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    found = dry_run(gate / "b.toml", store=Store(tmp_path / "s"))
     assert [(item.recording, item.bytes) for item in found.logs] == [("stiff/04.csv", 4)]
     assert found.seconds
     assert sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "s").rglob("*")) == before
 
 
-def test_the_store_states_which_entries_a_run_has_used(gate, tmp_path):
-    run(gate, tmp_path / "s")
-    store = Store(tmp_path / "s", writes=False)
-    found = store_status(tmp_path / "s")
-    assert (found.recordings, found.failed, found.unused, len(found.runs)) == (6, 0, 0, 1)
-    assert found.entries["detector"] == 12
-    assert store.parts
+def test_what_was_not_used_for_a_time_is_removed(gate, filled):
+    for path in filled.rglob("*/*/*"):
+        os.utime(path, (1.0, 1.0))
     with (gate / "machine.toml").open("a", encoding="utf-8") as file:
         file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
-    run(gate, tmp_path / "s")
-    assert collect_garbage(tmp_path / "s", keep_runs=1).removed == 0  # it is too young
-    done = collect_garbage(tmp_path / "s", keep_runs=1, older_than_days=0.0)
-    assert done.removed >= 7  # the momentum observer's rows of six recordings, and what was learned
-    assert store_status(tmp_path / "s").unused == 0
-    assert run(gate, tmp_path / "s") == (alone(gate), 0)
+    entries = store_status(filled).entries
+    assert (entries["logs"], entries["learned"]) == (6, 1)
+    run(gate, filled)
+    done = collect_garbage(filled)
+    assert done.removed >= 2  # what was learned, and the traces
+    assert done.kept == sum(store_status(filled).entries.values()) >= 13
+    assert run(gate, filled) == (alone(gate), 0)
+    assert collect_garbage(filled, older_than_days=0.0).kept == 0

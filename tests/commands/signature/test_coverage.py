@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.alarms.pipeline import judge
 from cdtool.base.errors import SignatureError, UsageError
-from cdtool.commands.signature.coverage import Coverage, LeftOut, check_coverage, gaps_of
+from cdtool.commands.signature.coverage import LeftOutRun, SignatureCoverage, check_coverage, gaps_of
 from cdtool.detectors.detection import Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.results.curves.sweep import critical_factor
@@ -22,9 +22,9 @@ RULE = Signature(sides="one")
 RUNS = season(14)
 
 
-def coverage(**changed: object) -> Coverage:
-    runs = tuple(LeftOut(f"run{i}", 2.0, alarm=False) for i in range(14))
-    made = Coverage(MotionClass(1, 0.2), 5.5, 1e-3, runs, (), 1e-2, 30, 6.21, ())
+def coverage(**changed: object) -> SignatureCoverage:
+    runs = tuple(LeftOutRun(f"run{i}", 2.0, alarm=False) for i in range(14))
+    made = SignatureCoverage(MotionClass(1, 0.2), 5.5, 1e-3, runs, (), 1e-2, 30, 6.21, ())
     return replace(made, **changed)
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from cdtool.alarms.pipeline import judge
 from cdtool.base.errors import SignatureError
-from cdtool.commands.signature.advice import advice
 from cdtool.commands.signature.coverage import check_coverage
 from cdtool.commands.signature.drift import audit_drift
+from cdtool.commands.signature.upkeep import advice
 from cdtool.commands.signature.words import verdicts
 from cdtool.detectors.detection import Status
 from cdtool.results.curves.sweep import critical_factor

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.formats.channels.channel_assembly import assemble_recording
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.channels.reading import read_recording
+from cdtool.formats.columns import Column
 from cdtool.formats.mcap.write import Stream, write_mcap
+from cdtool.formats.source import Source
 from tests.base.findings.facts import fact_of
 
 RATIO = 2.0e-3
@@ -213,3 +217,11 @@ def test_a_field_with_more_values_than_joints_is_a_clear_error(tmp_path, machine
 def test_a_clock_without_a_number_is_a_clear_error(log, machine):
     with pytest.raises(RecordingError, match="column 't' contains no time stamp"):
         read_recording(log("t,i_motor,n_motor\nnan,1,2\n,2,3\n"), machine())
+
+
+def test_columns_of_different_lengths_for_one_channel_are_refused_in_one_line(tmp_path, machine):
+    columns = {name: Column(name, np.arange(count)) for name, count in {"t": 5.0, "a": 5.0, "b": 4.0}.items()}
+    sources = (ChannelSource("position", columns=("a", "b"), keys=("a", "b"), factor=(1.0, 1.0), unit="rad"),)
+    mapped = ChannelMap(TimeSource(column="t", key="t"), sources, ("one", "two"))
+    with pytest.raises(RecordingError, match=r"channel 'position' .* has 4 values, its clock 5"):
+        assemble_recording(Source(tmp_path / "log.mat", "mat", columns), mapped, machine().machine, "digest")

@@ -7,7 +7,7 @@ import pytest
 
 from cdtool.commands.judging.information import info
 from cdtool.formats.channels.clock_guess import is_clock_name
-from cdtool.formats.csv.number_clock import DAY_S
+from cdtool.formats.csv.table import DAY_S
 
 
 @pytest.mark.parametrize("rate_hz", [1.0, 10.0, 1000.0])

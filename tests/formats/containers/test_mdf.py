@@ -91,9 +91,9 @@ def test_damaged_files_are_one_line_without_output_from_the_library(saved, capfd
 
 
 @pytest.mark.parametrize(("module", "name"), [("mdf_v4", "MDF4"), ("mdf_v3", "MDF3")])
-def test_a_log_that_is_interrupted_while_it_is_made_prints_nothing(monkeypatch, tmp_path, module, name):
+def test_a_log_that_is_interrupted_while_it_is_made_prints_nothing(monkeypatch, module, name):
     """SIGTERM in the constructor: the destructor of a log without its attributes."""
-    _library(tmp_path / "log.mf4")
+    _library()
     version = getattr(import_module(f"asammdf.blocks.{module}"), name)
     seen = []
     monkeypatch.setattr("sys.unraisablehook", seen.append)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from cdtool.base.errors import RecordingError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.messages.decoded_batch import ABSENT, OTHER_JOINTS, PRESENT
-from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.fields import element_names
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 from tests.formats.messages import test_cdr, test_ros1

@@ -13,7 +13,7 @@ from mcap_ros2._cdr import CdrWriter, EncapsulationKind
 from mcap_ros2._dynamic import _for_each_msgdef, _write_complex_type, generate_dynamic
 
 from cdtool.formats.messages.decoded_batch import ABSENT, UndecodableError
-from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.fields import FieldMissingError, numeric_fields
 from tests.data_folder import DATA, data, needs_data
 from tests.formats.messages.batches import assert_follows_field_language, batch_of, fields_of, header_stamp, plain

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.fields import numeric_fields
 from tests.formats.mcap_files import by_hand  # noqa: F401
 from tests.formats.messages.batches import assert_follows_field_language, batch_of, fields_of, header_stamp, same

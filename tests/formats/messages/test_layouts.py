@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from cdtool.formats.messages.decoded_batch import UndecodableError
-from cdtool.formats.messages.encodings import decoder_for
-from cdtool.formats.messages.layout import Array, Message, Number, SchemaError, Text
+from cdtool.formats.messages.decoders import decoder_for
+from cdtool.formats.messages.layout import Array, Message, Number, SchemaError, TextType
 from cdtool.formats.messages.ros_definitions import parse_definitions
 from cdtool.formats.messages.schemas import DEFINITIONS
 from tests.formats.messages.batches import batch_of, fields_of
@@ -23,10 +23,10 @@ def test_types_arrays_defaults_constants_and_comments_are_distinguished():
     )
     assert [(member.name, member.kind, member.array) for member in parsed] == [
         ("a", Number("f8"), None),
-        ("b", Text(), None),
+        ("b", TextType(), None),
         ("c", Number("i1"), Array(3)),
         ("d", Number("f4"), Array()),
-        ("e", Text(), Array()),
+        ("e", TextType(), Array()),
         ("f", Number("u1"), None),
         ("g", Number("u1"), None),
         ("i", Number("?"), Array()),

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cdtool.formats.messages.decoded_batch import UndecodableError
-from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.fields import element_names
 from tests.formats.messages.batches import batch_of, fields_of, same
 from tests.formats.messages.protobuf_messages import CASES, contents

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.fields import FieldMissingError, parse_field
 from tests.formats.messages.batches import batch_of
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cdtool.formats.messages.encodings import decoder_for
+from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.layout import Message, Number
 from cdtool.formats.messages.ros_definitions import parse_definitions
 from tests.formats.messages.batches import assert_follows_field_language, batch_of, fields_of

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from cdtool.commands.simulate.gate_model import GateParameters
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
 
 
 def gate_as_model(gate: GateParameters, *, front: bool = True) -> AxisModel:
-    drive = Drive(
+    drive = ElasticDrive(
         motor_mass=gate.motor_mass,
         load_mass=gate.leaf_mass,
         stiffness=gate.take_up_stiffness,

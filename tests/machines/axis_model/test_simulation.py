@@ -11,7 +11,7 @@ import pytest
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis, substeps, wind_up_at
 from tests.machines.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle
 
@@ -47,7 +47,7 @@ def test_the_gate_runs_as_in_its_own_simulator(impact: str, obstacle: Obstacle) 
 
 
 def rigid(mass: float, **friction: float) -> AxisModel:
-    return AxisModel(drive=Drive(load_mass=mass), friction=Friction(**friction))
+    return AxisModel(drive=ElasticDrive(load_mass=mass), friction=Friction(**friction))
 
 
 def test_a_rigid_axis_under_a_constant_force_accelerates_as_newton_says() -> None:
@@ -82,7 +82,7 @@ def test_an_obstacle_behind_is_hit_in_backward_travel() -> None:
 
 def test_motor_and_load_swing_at_the_two_mass_resonance() -> None:
     motor, load, stiffness = 3.0, 6.0, 5e4
-    model = AxisModel(drive=Drive(motor_mass=motor, load_mass=load, stiffness=stiffness, backlash=0.0))
+    model = AxisModel(drive=ElasticDrive(motor_mass=motor, load_mass=load, stiffness=stiffness, backlash=0.0))
     impulse = np.zeros(1000)
     impulse[:3] = 200.0
     motion = simulate_axis(model, AxisInputs(np.zeros(1000), command=impulse), period=2e-4)
@@ -108,7 +108,7 @@ def test_a_cascade_follows_its_position_reference() -> None:
         period=1e-3, speed_gain=8557.0, position_gain=160.0, speed_filter_order=1, speed_filter_hz=175.0
     )
     model = AxisModel(
-        drive=Drive(load_mass=95.0),
+        drive=ElasticDrive(load_mass=95.0),
         friction=Friction(coulomb_forward=20.0, coulomb_backward=20.0, viscous=203.0),
         controller=controller,
     )
@@ -120,7 +120,7 @@ def test_a_cascade_follows_its_position_reference() -> None:
 
 def test_a_delayed_command_acts_later() -> None:
     controller = Controller(period=1e-3, speed_gain=100.0, speed_filter_order=0)
-    model = AxisModel(drive=Drive(load_mass=10.0), controller=controller)
+    model = AxisModel(drive=ElasticDrive(load_mass=10.0), controller=controller)
     late = replace(model, controller=replace(controller, delay=5e-3))
     reference = np.where(np.arange(100) < 20, 0.0, 0.1)
     at_once = simulate_axis(model, AxisInputs(reference))
@@ -131,7 +131,7 @@ def test_a_delayed_command_acts_later() -> None:
 
 def test_the_command_is_limited_in_slope_and_size() -> None:
     controller = Controller(period=1e-3, speed_gain=1e4, slew_limit=500.0, force_limit=60.0, anti_windup_rate=10.0)
-    model = AxisModel(drive=Drive(load_mass=100.0), controller=controller)
+    model = AxisModel(drive=ElasticDrive(load_mass=100.0), controller=controller)
     motion = simulate_axis(model, AxisInputs(np.full(1000, 0.2)))
     assert np.max(np.abs(np.diff(motion["command"]))) <= 0.5 + 1e-9
     assert np.max(np.abs(motion["command"])) == 60.0
@@ -139,7 +139,7 @@ def test_the_command_is_limited_in_slope_and_size() -> None:
 
 @pytest.mark.parametrize(("force", "wind_up"), [(-500.0, -0.012), (0.0, 0.0), (100.0, 0.001), (600.0, 0.0055)])
 def test_a_drive_winds_up_along_its_force_curve(force: float, wind_up: float) -> None:
-    drive = Drive(
+    drive = ElasticDrive(
         load_mass=500.0,
         motor_mass=300.0,
         stiffness=1e5,
@@ -163,14 +163,14 @@ def test_half_the_step_changes_the_contact_force_by_less_than_a_thousandth(monke
 
 
 def test_a_light_load_with_dry_friction_gets_more_steps() -> None:
-    light = AxisModel(drive=Drive(load_mass=0.05), friction=Friction(coulomb_forward=2.5, coulomb_backward=2.5))
+    light = AxisModel(drive=ElasticDrive(load_mass=0.05), friction=Friction(coulomb_forward=2.5, coulomb_backward=2.5))
     motion = simulate_axis(light, AxisInputs(np.zeros(500), command=np.full(500, 3.0)), period=1e-3)
     assert np.all(np.isfinite(motion.rows))
     assert motion["load_speed"][-1] == pytest.approx(0.5 / 0.05 * 0.499, rel=0.01)
 
 
 def test_a_model_that_needs_too_many_steps_is_refused() -> None:
-    model = AxisModel(drive=Drive(motor_mass=1e-6, load_mass=100.0, stiffness=1e9))
+    model = AxisModel(drive=ElasticDrive(motor_mass=1e-6, load_mass=100.0, stiffness=1e9))
     with pytest.raises(ConfigurationError, match="integration steps"):
         simulate_axis(model, AxisInputs(np.zeros(10), command=np.zeros(10)), period=1e-3)
 
@@ -182,7 +182,7 @@ def test_a_model_without_controller_needs_a_command() -> None:
 
 def test_a_front_without_mass_is_a_spring_in_series_with_the_obstacle() -> None:
     inputs = AxisInputs(np.zeros(300), command=np.zeros(300), initial_speed=0.3)
-    front = AxisModel(drive=Drive(load_mass=5.0, front_stiffness=3e4))
+    front = AxisModel(drive=ElasticDrive(load_mass=5.0, front_stiffness=3e4))
     motion = simulate_axis(front, inputs, Obstacle.spring(2e4).at(0.01, 1), period=1e-3)
     both = simulate_axis(rigid(5.0), inputs, Obstacle.spring(1.2e4).at(0.01, 1), period=1e-3)
     np.testing.assert_allclose(motion["contact_force"], both["contact_force"], rtol=1e-9)
@@ -190,6 +190,6 @@ def test_a_front_without_mass_is_a_spring_in_series_with_the_obstacle() -> None:
 
 def test_a_feed_forward_is_added_to_the_controller() -> None:
     controller = Controller(period=1e-3, speed_gain=50.0, speed_filter_order=0)
-    model = AxisModel(drive=Drive(load_mass=10.0), controller=controller)
+    model = AxisModel(drive=ElasticDrive(load_mass=10.0), controller=controller)
     motion = simulate_axis(model, AxisInputs(np.zeros(50), command=np.full(50, 7.0), feed_forward=True))
     np.testing.assert_allclose(motion["command"], 7.0 - 50.0 * motion["measured_speed"], atol=1e-12)

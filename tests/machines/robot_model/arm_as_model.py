@@ -8,7 +8,7 @@ from cdtool.commands.inject.robot_contact import StruckPoint
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
 from cdtool.machines.axis_model.model_table import Bristle
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.robot_model.parameters import RobotModel, robot_model
 
@@ -21,7 +21,7 @@ def arm_as_model(machine: PlanarArm, arm: ArmParameters) -> RobotModel:
 
 
 def _joint(arm: ArmParameters, rigid: AxisModel, joint: int) -> AxisModel:
-    drive = Drive(
+    drive = ElasticDrive(
         motor_mass=arm.reflected_inertia[joint],
         load_mass=rigid.drive.load_mass,
         stiffness=arm.soft_stiffness,

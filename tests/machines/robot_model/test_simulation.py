@@ -14,7 +14,7 @@ from cdtool.commands.simulate.arm_model import ArmStroke, integrate_arm
 from cdtool.commands.simulate.arm_parameters import ArmParameters
 from cdtool.machines.axis_model.model_table import Bristle, ModelTable
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import Drive
+from cdtool.machines.axis_model.parameters import ElasticDrive
 from cdtool.machines.robot_model.parameters import RobotModel, point_in_joint, robot_model
 from cdtool.machines.robot_model.simulation import PointContact, RobotInputs, simulate_robot, substeps, wind_up_at
 from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
@@ -131,10 +131,10 @@ def test_a_bristle_holds_a_joint_that_a_smooth_sign_lets_creep() -> None:
 
 
 def test_the_wind_up_has_the_torque_of_the_drive_in_both_directions() -> None:
-    drive = Drive(motor_mass=0.1, load_mass=0.2, stiffness=440.0, take_up_travel=0.003, end_stiffness=800.0)
+    drive = ElasticDrive(motor_mass=0.1, load_mass=0.2, stiffness=440.0, take_up_travel=0.003, end_stiffness=800.0)
     assert wind_up_at(drive, 0.88) == pytest.approx(0.002)
     assert wind_up_at(drive, -(1.32 + 1.6)) == pytest.approx(-0.005)
-    assert wind_up_at(Drive(load_mass=0.2), 5.0) == 0.0
+    assert wind_up_at(ElasticDrive(load_mass=0.2), 5.0) == 0.0
 
 
 def test_what_cannot_be_simulated_is_an_error() -> None:

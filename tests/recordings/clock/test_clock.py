@@ -40,7 +40,7 @@ def test_later_samples_never_change_the_previous_value(stamps, now):
 
 
 def test_faulty_stamps_are_dropped_and_reported_together_with_their_rows():
-    clean = clean_time([0.0, 1.0, 2.0, 2.0, 1.5, 3.0, np.nan, 4.0, 5.0, 6.0, 7.0, 8.0], first_row=2, row_name="line")
+    clean = clean_time([0.0, 1.0, 2.0, 2.0, 1.5, 3.0, np.nan, 4.0, 5.0, 6.0, 7.0, 8.0], first_row=2)
     np.testing.assert_array_equal(clean.time, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
     np.testing.assert_array_equal(np.flatnonzero(clean.keep), [0, 1, 2, 5, 7, 8, 9, 10, 11])
     assert [fact_of(item) for item in clean.findings] == [

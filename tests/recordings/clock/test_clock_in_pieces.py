@@ -42,7 +42,7 @@ def test_a_clock_in_pieces_is_cleaned_as_a_whole_clock(stamps, parts, first_row)
     cleaner = ClockCleaner()
     times = [cleaner.times(piece, piece) for piece in pieces]
     times.append(cleaner.times(np.empty(0), np.empty(0), final=True))
-    whole = clean_time(stamps, first_row, "line" if first_row else "sample")
+    whole = clean_time(stamps, first_row)
     assert np.array_equal(np.concatenate(times), whole.time)
     assert as_shown(cleaner.findings(first_row)) == as_shown(whole.findings)
     series = Series(whole.time, np.zeros(len(whole.time)), "s")

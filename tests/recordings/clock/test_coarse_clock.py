@@ -114,7 +114,7 @@ def test_after_a_change_of_the_sample_rate_the_line_has_the_new_slope(before, af
 
 def test_samples_of_a_stopped_clock_are_dropped_and_reported_as_a_loss():
     stamps = np.minimum(floor_to_step(np.arange(4000) * 1e-3, 0.01), 2.0)
-    clean = clean_time(stamps, first_row=2, row_name="line")
+    clean = clean_time(stamps, first_row=2)
     assert clean.keep.sum() == 2020
     assert loss_facts(clean) == [
         ("stuck_stamps", {"count": 1980, "rows": 4000, "first": (2022, 2023, 2024), "row_name": "line"})

@@ -28,7 +28,7 @@ def clocks(draw):
 
 def outcome(times):
     try:
-        clean = clean_time(times, 2, "line", counted=times)
+        clean = clean_time(times, 2, counted=times)
     except RecordingError as fault:
         return str(fault)
     return clean.time.tobytes(), clean.keep.tolist(), repr(clean.findings)

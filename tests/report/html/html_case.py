@@ -55,7 +55,7 @@ def case(named: Naming = str, contacts: int = 12, *, limits: bool = True) -> tup
         ),
         contacts=tuple(rows),
         false_alarms=(
-            FalseAlarmResult(f"{named('free.csv')}#2", holdout, detectors[1], named("axis"), 4.0, "above", 7.0, 5.0),
+            FalseAlarmResult(named("free.csv"), holdout, detectors[1], named("axis"), 4.0, "above", 7.0, 5.0, 2),
         ),
         exposure=tuple(
             ExposureResult(group, detector, 12, 12, 0.25, 1, {"start-up": 0.05, "missing samples": 0.01})
@@ -102,7 +102,8 @@ def free_trace(named: Naming, group: str) -> Trace:
         _panel(named, "quick", None, (1.0,)),
         _panel(named, "slow", None, (), verdict="not_assessable", reason=named("start-up 100 %")),
     )
-    return Trace(f"{named('free.csv')}#2", group, 0.0, 4.0, (), -1, (0.0, 4.0), np.empty(0), np.empty(0), panels)
+    name, nothing = f"{named('free.csv')}#2", np.empty(0)
+    return Trace(name, group, 0.0, 4.0, (), -1, (0.0, 4.0), nothing, nothing, panels, operation=2)
 
 
 def _panel(

@@ -9,7 +9,7 @@ import pytest
 from cdtool.commands.inject.coverage.page import coverage_html
 from cdtool.report.html.page import to_html
 from cdtool.report.html.sections_page import PageSection, SectionsPage
-from cdtool.report.table import Cell, Column, Table
+from cdtool.report.table import Cell, Heading, Table
 from cdtool.report.writers.base import Report
 from tests.report.html.coverage_case import coverage_case
 from tests.report.html.html_case import case
@@ -25,7 +25,7 @@ def coverage_page() -> str:
 
 
 def sections_page() -> str:
-    table = Table("one", "One table", (Column("name"), Column("value")), [[Cell("a"), Cell("1")]])
+    table = Table("one", "One table", (Heading("name"), Heading("value")), [[Cell("a"), Cell("1")]])
     return SectionsPage("Kind", "title", "headline", "", "good", (), (PageSection("Section", (table,)),)).html()
 
 

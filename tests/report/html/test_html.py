@@ -25,7 +25,6 @@ from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, p
 from cdtool.report.number_text import number, percent, with_interval
 from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
 from cdtool.report.table import interval_cell
-from cdtool.report.tables.recordings import log_of
 from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.results import ContactResult, RecordingResult, Results
@@ -353,9 +352,9 @@ def test_every_recording_has_a_row_without_script_and_opens_its_own_trace(made, 
 
 
 def test_a_hash_sign_in_a_logs_own_name_is_no_operation():
-    logs = frozenset({("a", "run#2"), ("a", "run")})
-    assert log_of("a", "run#2", logs) == ("a", "run#2")
-    assert log_of("a", "run#3", logs) == ("a", "run")
+    _, traces = case()
+    assert replace(traces[0], recording="run#2").log == "run#2"
+    assert replace(traces[0], recording="run#2#3", operation=3).log == "run#2"
 
 
 def test_what_was_left_out_and_the_provenance_are_shown(page):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -181,7 +182,7 @@ def test_no_sweep_no_false_alarm_everything_missed_and_nothing_assessable_are_dr
     plot_amoc(missed, tmp_path / "missed.svg")
     assert "20 of 20" in texts(tmp_path / "missed.svg")
     blind = swept("momentum", "stiff", lambda _: None, none, lambda _: CONTACTS, not_assessable=CONTACTS)
-    figure = drawn(of([SweepResult(**{**vars(row), "missed": 0}) for row in blind]))
+    figure = drawn(of([replace(row, missed=0) for row in blind]))
     assert in_use(figure) == [] and arrows(figure) == []
 
 

@@ -71,19 +71,6 @@ def test_a_trace_of_a_recording_of_hours_can_be_read(tmp_path, last):
     assert encode_traces([again]) == path.read_bytes()
 
 
-def test_traces_of_the_version_before_have_one_spelling_of_not_assessable_once_they_are_read(tmp_path):
-    blind = replace(trace(), panels=(replace(trace().panels[0], verdict="not_assessable", reason="start-up"),))
-    values = json.loads(gzip.decompress(encode_traces([blind])))
-    assert values["schema_version"] == 3 and values["traces"][0]["panels"][0]["verdict"] == "not_assessable"
-    values["schema_version"] = 2
-    values["traces"][0]["panels"][0]["verdict"] = "not assessable"
-    path = tmp_path / "results.traces.json.gz"
-    path.write_bytes(gzip.compress(json.dumps(values).encode(), mtime=0))
-    (read,) = read_traces(path)
-    assert read.panels[0].verdict == "not_assessable" and read.panels[0].is_not_assessable
-    assert encode_traces([read]) == encode_traces([blind])
-
-
 def test_values_above_a_limit_stay_above_it_and_a_missing_limit_stays_missing(tmp_path):
     kept = trace()
     course = replace(kept.panels[0].course, lower=np.full_like(kept.panels[0].course.lower, -np.inf))

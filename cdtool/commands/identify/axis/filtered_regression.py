@@ -60,7 +60,7 @@ _INVOLVED = 1e-3
 _ITERATIONS, _SAME = 30, 1e-6
 
 
-class Loss(Enum):
+class ResidualLoss(Enum):
     """The loss of a residual r in units of the scatter: how much an outlier counts."""
 
     SQUARES = "squares"
@@ -419,7 +419,10 @@ class LinearFit:
 
 
 def fit_linear(
-    regressors: FloatArray, force: FloatArray, instruments: FloatArray | None = None, loss: Loss = Loss.SQUARES
+    regressors: FloatArray,
+    force: FloatArray,
+    instruments: FloatArray | None = None,
+    loss: ResidualLoss = ResidualLoss.SQUARES,
 ) -> LinearFit:
     """Fit force = regressors @ coefficients by least squares, or by instrumental variables.
 
@@ -432,7 +435,7 @@ def fit_linear(
     instruments : ndarray, shape (m, p), optional
         Correlated with the regressors, not with the noise. A controller feeds the noise back into the motion, so that
         regressors from measurements are correlated with it, and those from references are not.
-    loss : Loss
+    loss : ResidualLoss
         Anything but SQUARES gives outliers less weight (iterated; the scale is 1.4826 times the median of |residual|).
 
     Returns
@@ -472,7 +475,7 @@ def fit_linear(
             "the recordings need more varied motion",
         )
     coefficients = _solved(scaled, force, given, weights)
-    for _ in range(_ITERATIONS if loss is not Loss.SQUARES else 0):
+    for _ in range(_ITERATIONS if loss is not ResidualLoss.SQUARES else 0):
         weights = _robust_weights(force - scaled @ coefficients, force, loss)
         before = coefficients
         coefficients = _solved(scaled, force, given, weights)
@@ -500,12 +503,12 @@ def _solved(regressors: FloatArray, force: FloatArray, instruments: FloatArray, 
     return np.asarray(np.linalg.solve(weighted @ regressors, weighted @ force), dtype=np.float64)
 
 
-def _robust_weights(residuals: FloatArray, force: FloatArray, loss: Loss) -> FloatArray:
+def _robust_weights(residuals: FloatArray, force: FloatArray, loss: ResidualLoss) -> FloatArray:
     """Return rho'(u) / u of each residual, u in units of 1.345 times the scatter (Huber's 95 % efficiency)."""
     # No sensor resolves 1e-9 of its range: less scatter is rounding, which must not choose weights.
     scatter = max(1.4826 * float(np.median(np.abs(residuals))), 1e-9 * float(np.max(np.abs(force)))) or 1.0
     ratio = np.abs(residuals) / (1.345 * scatter)
-    if loss is Loss.HUBER:
+    if loss is ResidualLoss.HUBER:
         return 1.0 / np.maximum(ratio, 1.0)
     weights: FloatArray = 1.0 / np.sqrt(1.0 + ratio**2)
     return weights

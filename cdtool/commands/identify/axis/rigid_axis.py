@@ -19,7 +19,7 @@ from cdtool.commands.identify.axis.filtered_regression import (
     FilteredRun,
     IntArray,
     LinearFit,
-    Loss,
+    ResidualLoss,
     TorqueLag,
     block_covariance,
     filter_run,
@@ -86,7 +86,7 @@ class RigidAxisSettings:
     low_pass_hz: float = 20.0
     unknown_speed: float | None = None
     method: Method | None = None
-    loss: Loss = Loss.SQUARES
+    loss: ResidualLoss = ResidualLoss.SQUARES
     prediction: FrictionForm | None = None
     cross_validate: bool = True
     rotary: bool = False
@@ -472,7 +472,7 @@ def _torque_lag(equations: _Equations, excitation: Excitation, settings: RigidAx
 
 
 @dataclass(frozen=True, eq=False)
-class _Solution:
+class _AxisSolution:
     """The fit whose coefficients are reported: mass, viscous if `has_viscous`, Coulomb, and constant if two-way."""
 
     fit: LinearFit
@@ -500,7 +500,7 @@ def _chosen_columns(excitation: Excitation) -> list[int]:
     return chosen if excitation.is_one_way else [*chosen, 3]
 
 
-def _solve(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _Solution:
+def _solve(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _AxisSolution:
     base = (0, 1, 2) if excitation.is_one_way else (0, 1, 2, 3)
     if len(excitation.speeds) >= SPEEDS_NEEDED:
         return _solution(equations, base, settings)
@@ -519,7 +519,7 @@ def _solve(equations: _Equations, excitation: Excitation, settings: RigidAxisSet
     return replace(without, mass=without.mass + half, mass_error=math.hypot(without.mass_error, half))
 
 
-def _with_noise_error(solution: _Solution, excitation: Excitation) -> _Solution:
+def _with_noise_error(solution: _AxisSolution, excitation: Excitation) -> _AxisSolution:
     """Add to the mass's error what noise in the acceleration takes from it by least squares: the share of its power."""
     if solution.method is not Method.LEAST_SQUARES or not excitation.acceleration > 0.0:
         return solution
@@ -549,12 +549,12 @@ def _covariance(equations: _Equations, fit: LinearFit, settings: RigidAxisSettin
     return block_covariance(fit, equations.block) + along
 
 
-def _solution(equations: _Equations, chosen: Sequence[int], settings: RigidAxisSettings) -> _Solution:
+def _solution(equations: _Equations, chosen: Sequence[int], settings: RigidAxisSettings) -> _AxisSolution:
     columns = list(chosen)
     instruments = None if equations.instruments is None else equations.instruments[:, columns]
     fit, method = _regress(equations, equations.regressors[:, columns], instruments, settings)
     covariance = _covariance(equations, fit, settings)
-    plain = _Solution(fit, covariance, math.nan, math.nan, tuple(_NAMES[item] for item in columns), method)
+    plain = _AxisSolution(fit, covariance, math.nan, math.nan, tuple(_NAMES[item] for item in columns), method)
     mass, mass_error = plain.value(mass=1.0)
     return replace(plain, mass=mass, mass_error=mass_error)
 
@@ -600,7 +600,7 @@ def _units(settings: RigidAxisSettings) -> _Units:
 
 
 def _answers(
-    solution: _Solution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings, lag: _LagAnswer
+    solution: _AxisSolution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings, lag: _LagAnswer
 ) -> tuple[tuple[Estimate, ...], tuple[NotIdentifiable, ...]]:
     units = _units(settings)
     answers = [
@@ -619,7 +619,7 @@ def _torque_filter(lag: _LagAnswer, method: Method) -> Estimate:
 
 
 def _load_mass(
-    solution: _Solution, excitation: Excitation, motor_mass: float, units: _Units
+    solution: _AxisSolution, excitation: Excitation, motor_mass: float, units: _Units
 ) -> Estimate | NotIdentifiable:
     load, error = solution.mass - motor_mass, solution.mass_error
     is_accelerated = Missing.ACCELERATION not in excitation.missing
@@ -643,7 +643,7 @@ def _load_mass(
     return NotIdentifiable("machine", "load_mass", tuple(missing), numbers)
 
 
-def _speed_numbers(solution: _Solution, excitation: Excitation) -> dict[str, float]:
+def _speed_numbers(solution: _AxisSolution, excitation: Excitation) -> dict[str, float]:
     numbers = {
         "speeds": float(len(excitation.speeds)),
         "speeds_needed": float(SPEEDS_NEEDED),
@@ -655,7 +655,7 @@ def _speed_numbers(solution: _Solution, excitation: Excitation) -> dict[str, flo
     return numbers
 
 
-def _viscous(solution: _Solution, excitation: Excitation, units: _Units) -> Estimate | NotIdentifiable:
+def _viscous(solution: _AxisSolution, excitation: Excitation, units: _Units) -> Estimate | NotIdentifiable:
     numbers = _speed_numbers(solution, excitation)
     if "viscous" in solution.names:
         value, error = solution.value(viscous=1.0)
@@ -673,7 +673,7 @@ _COULOMB_KEYS = (
 )
 
 
-def _coulomb(solution: _Solution, excitation: Excitation, units: _Units) -> list[Estimate | NotIdentifiable]:
+def _coulomb(solution: _AxisSolution, excitation: Excitation, units: _Units) -> list[Estimate | NotIdentifiable]:
     missing = [Missing.SECOND_SPEED] if "viscous" not in solution.names else []
     missing += [Missing.REVERSALS] if excitation.is_one_way else []
     numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
@@ -695,7 +695,7 @@ def _coulomb(solution: _Solution, excitation: Excitation, units: _Units) -> list
     return answers
 
 
-def _residuals(equations: _Equations, solution: _Solution) -> Residuals:
+def _residuals(equations: _Equations, solution: _AxisSolution) -> Residuals:
     acceleration = equations.regressors[:, 0]
     return Residuals(
         equations.run,
@@ -732,7 +732,7 @@ class _Samples:
     fold: IntArray
     columns: dict[FrictionShape, FloatArray]
 
-    def fitted(self, form: FrictionForm, chosen: BoolArray, loss: Loss) -> PredictionModel | None:
+    def fitted(self, form: FrictionForm, chosen: BoolArray, loss: ResidualLoss) -> PredictionModel | None:
         """Return the model of a form with the smallest residual in the chosen rows; None with too few of them."""
         best, smallest = None, math.inf
         rows = chosen & self.is_moving

@@ -37,7 +37,7 @@ from cdtool.commands.identify.estimate import (
     NotIdentifiable,
 )
 from cdtool.machines.axis_model.axis_run import AxisRun
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
 from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.machines.axis_model.simulation import AxisInputs, AxisMotion, simulate_axis
 
@@ -176,7 +176,7 @@ class _Problem:
         load, stiffness, coulomb, viscous, rise, onset, ratio, rise_speed, take_up, end = values
         settings, motor = self.settings, self.settings.motor_mass
         damping = 2.0 * ratio * math.sqrt(stiffness * motor * load / (motor + load))
-        drive = Drive(motor_mass=motor, load_mass=load, stiffness=stiffness, damping=damping)
+        drive = ElasticDrive(motor_mass=motor, load_mass=load, stiffness=stiffness, damping=damping)
         if vector[_ONE_STIFFNESS] < _NEVER:
             drive = replace(drive, take_up_travel=take_up, end_stiffness=end, end_damping=damping)
         friction = Friction(

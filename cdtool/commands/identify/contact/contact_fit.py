@@ -29,7 +29,7 @@ from cdtool.commands.identify.estimate import (
     Missing,
     NotIdentifiable,
 )
-from cdtool.machines.axis_model.parameters import AxisModel, Drive, Friction
+from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Friction
 from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.machines.axis_model.simulation import wind_up_at
 
@@ -133,7 +133,7 @@ class ContactFit:
 
     identified: Identified
     together: tuple[Estimate, ...]
-    drive: Drive
+    drive: ElasticDrive
     friction: Friction
     delays: tuple[float, ...]
     wind_up: float
@@ -170,15 +170,15 @@ def identify_contacts(
     peak = _largest_drive_force(contacts, model.drive)
     known = (settings.largest_wind_up or model.drive.observed_wind_up) * model.drive.stiffness
     if peak <= _BEYOND * known:
-        one_stage = _Problem(contacts, model, settings, two_stage=False).fit()
+        one_stage = _ContactProblem(contacts, model, settings, two_stage=False).fit()
         numbers = {"drive_force": peak, "drive_force_of_impact_free_runs": known}
         refused = [NotIdentifiable("model.drive", key, (Missing.CONTACTS,), numbers) for key in _SECOND_STAGE[:2]]
         return _checked(_refusing(one_stage, refused))
-    fit = _Problem(contacts, model, settings, two_stage=True).fit()
+    fit = _ContactProblem(contacts, model, settings, two_stage=True).fit()
     if not math.isinf(fit.drive.take_up_travel):
         return _checked(fit)
     refused = [item for item in fit.identified.not_identifiable if item.key in _SECOND_STAGE[:2]]
-    one_stage = _Problem(contacts, model, settings, two_stage=False).fit()
+    one_stage = _ContactProblem(contacts, model, settings, two_stage=False).fit()
     # A second stage that is not known well may still be needed to know the load.
     is_needed = fit.relative_error["torque"] < 0.9 * one_stage.relative_error["torque"]
     return _checked(fit if is_needed else _refusing(one_stage, refused))
@@ -201,7 +201,7 @@ def _checked(fit: ContactFit) -> ContactFit:
     return fit
 
 
-class _Problem:
+class _ContactProblem:
     """The fit of one set of contacts.
 
     The vector has a number per name of `shared`, then one per name of `_OF_CONTACT` for each contact: logarithms of
@@ -247,7 +247,7 @@ class _Problem:
         }
         return units[name]
 
-    def drive(self, vector: FloatArray) -> Drive:
+    def drive(self, vector: FloatArray) -> ElasticDrive:
         """Return the drive of a vector."""
         base, values = self.model.drive, self.values(vector)
         load = values["load_mass"]
@@ -483,7 +483,7 @@ class _Problem:
             condition_number=float(np.linalg.cond(jacobian / np.where(norms > 0.0, norms, 1.0))),
         )
 
-    def estimates(self, drive: Drive, errors: FloatArray) -> list[Estimate]:
+    def estimates(self, drive: ElasticDrive, errors: FloatArray) -> list[Estimate]:
         """Return all parameters of the drive that were fitted."""
         mass, force, travel = self.settings.units
         units = {
@@ -506,7 +506,7 @@ class _Problem:
         return estimates
 
     def doubts(
-        self, drive: Drive, estimates: Sequence[Estimate], errors: FloatArray, wind_up: float
+        self, drive: ElasticDrive, estimates: Sequence[Estimate], errors: FloatArray, wind_up: float
     ) -> dict[str, Missing]:
         """Return what is needed for each parameter that these contacts do not determine."""
         doubts = {}
@@ -527,7 +527,9 @@ class _Problem:
             doubts |= dict.fromkeys(_SECOND_STAGE, Missing.HIGHER_RATE)
         return doubts
 
-    def kept(self, drive: Drive, doubtful: set[str], wind_up: float) -> tuple[Drive, Friction, tuple[str, ...]]:
+    def kept(
+        self, drive: ElasticDrive, doubtful: set[str], wind_up: float
+    ) -> tuple[ElasticDrive, Friction, tuple[str, ...]]:
         """Return drive and friction with what is identified, and the names of the values that they have from here."""
         base, friction = self.model.drive, self.model.friction
         if "load_mass" in doubtful:
@@ -561,7 +563,7 @@ def _not_identifiable(estimate: Estimate, needed: Missing) -> NotIdentifiable:
     return NotIdentifiable(estimate.section, estimate.key, (needed,), numbers)
 
 
-def _numbers(drive: Drive, friction: Friction, period: float) -> tuple[float, ...]:
+def _numbers(drive: ElasticDrive, friction: Friction, period: float) -> tuple[float, ...]:
     values = {name: getattr(drive, name, getattr(friction, name, 0.0)) for name in contact_kernel.PARAMETER_ORDER}
     values |= {"main_mass": drive.load_mass - drive.front_mass, "period": period}
     if not math.isfinite(drive.end_stiffness):
@@ -569,7 +571,7 @@ def _numbers(drive: Drive, friction: Friction, period: float) -> tuple[float, ..
     return tuple(float(values[name]) for name in contact_kernel.PARAMETER_ORDER)
 
 
-def _substeps(drive: Drive, friction: Friction, period: float) -> int:
+def _substeps(drive: ElasticDrive, friction: Friction, period: float) -> int:
     """Return the number of integration steps per sample that the fastest motion of the load needs."""
     main = drive.load_mass - drive.front_mass
     stiffest = max(drive.stiffness, drive.end_stiffness if math.isfinite(drive.end_stiffness) else 0.0)
@@ -583,12 +585,12 @@ def _substeps(drive: Drive, friction: Friction, period: float) -> int:
     return int(np.clip(math.ceil(period * max(max(rates) / _LARGEST_STEP, 1.0 / _LONGEST_STEP)), 1, _MOST_SUBSTEPS))
 
 
-def _largest_drive_force(contacts: Sequence[LoadCellContact], drive: Drive) -> float:
+def _largest_drive_force(contacts: Sequence[LoadCellContact], drive: ElasticDrive) -> float:
     """Return the largest force of the drive on the load, as torque and motor show it [N, N m]."""
     return max(float(np.max(item.drive_force_of(drive.motor_mass))) for item in contacts)
 
 
-def _rough_wind_up(contact: LoadCellContact, drive: Drive) -> FloatArray:
+def _rough_wind_up(contact: LoadCellContact, drive: ElasticDrive) -> FloatArray:
     """Return the wind-up (n,) [m, rad] that follows from the forces on a load of the model's mass."""
     margin = contact.margin
     elastic = contact.drive_force_of(drive.motor_mass)

@@ -20,7 +20,7 @@ from cdtool.commands.judging.runs import find_logs, unread
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import MachineFile
 from cdtool.machines.axis_model.model_table import ModelTable
-from cdtool.machines.axis_model.parameters import AxisModel, Drive, Sensors
+from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Sensors
 from cdtool.recordings.recording import Contact, Recording
 from cdtool.results.results import Skipped
 from cdtool.truth.onset import find_contacts
@@ -143,7 +143,7 @@ def identify_struck(
     two_mass, controller = fits
     table = machine_file.model or ModelTable({})
     stated = table.of_joint("drive", joint)
-    drive = Drive(
+    drive = ElasticDrive(
         motor_mass=two_mass.model.drive.motor_mass,
         load_mass=two_mass.model.drive.load_mass,
         stiffness=two_mass.model.drive.stiffness,

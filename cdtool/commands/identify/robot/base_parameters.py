@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.identify.robot.robot_regressor import Column, Regressor, stacked_torque
+from cdtool.commands.identify.robot.robot_regressor import Regressor, RegressorColumn, stacked_torque
 
 # A column whose rest, after the projection on the others, is below this share of it is dependent on them; a factor
 # below it is rounding.
@@ -55,7 +55,7 @@ class Grouping:
             return False
         return int(np.count_nonzero(self.combination[self.base.index(column)])) == 1
 
-    def name(self, row: int, columns: tuple[Column, ...]) -> str:
+    def name(self, row: int, columns: tuple[RegressorColumn, ...]) -> str:
         """Return a combination in words: the column's own parameter first, the others with their factors."""
         own = self.base[row]
         parts = [columns[own].name]

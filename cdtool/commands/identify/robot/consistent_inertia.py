@@ -22,7 +22,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, UsageError, installing
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.robot.robot_dynamics import RobotFit, fitted_robot
-from cdtool.commands.identify.robot.robot_regressor import BODY_PARAMETERS, Column, Group, regressor_of
+from cdtool.commands.identify.robot.robot_regressor import BODY_PARAMETERS, ColumnGroup, RegressorColumn, regressor_of
 from cdtool.machines.urdf_robot import UrdfRobot
 
 _PER_BODY = len(BODY_PARAMETERS)
@@ -32,7 +32,7 @@ _MARGIN = 1e-7
 _FLAT = 1e-12
 # How much the distance to the machine's parameters counts beside the residual.
 _NEARNESS = 1e-8
-_NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB)
+_NOT_NEGATIVE = (ColumnGroup.DRIVE_INERTIA, ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 # Relative to the torques: a rise of the residual below it is the solver's.
 _ROUNDING = 1e-7
 _TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
@@ -91,10 +91,10 @@ def consistent_fit(fit: RobotFit) -> ConsistentFit:
     """
     if not isinstance(fit.machine, UrdfRobot):
         raise UsageError(f"machine '{fit.machine.name}': has no URDF", "consistent_fit is for type = 'urdf_robot'")
-    if not any(fit.columns[i].group is Group.INERTIAL for i in fit.grouping.columns):
+    if not any(fit.columns[i].group is ColumnGroup.INERTIAL for i in fit.grouping.columns):
         raise UsageError("the inertial parameters were not free", "identify with RobotParameters(inertial=True)")
     solver = _solver()
-    problem = _Problem(fit, solver)
+    problem = _InertiaProblem(fit, solver)
     values = problem.nearest_without_rise()
     is_repaired = values is None
     if values is None:
@@ -117,7 +117,7 @@ def _solver() -> Any:
         ) from fault
 
 
-class _Problem:
+class _InertiaProblem:
     """The semidefinite problem, in units in which the numbers of the robot are about 1.
 
     Lengths are divided by `reach`, masses by the robot's `mass`; base parameters and residual by their own size.
@@ -172,7 +172,7 @@ class _Problem:
     def _variables(self) -> tuple[Any, list[Any]]:
         pi = self._cvxpy.Variable(len(self._columns))
         constraints = []
-        order = [place for place, column in enumerate(self._columns) if column.group is Group.INERTIAL]
+        order = [place for place, column in enumerate(self._columns) if column.group is ColumnGroup.INERTIAL]
         for body in range(self._bodies):
             first = order[body * _PER_BODY]
             constraints.append(_matrix(self._cvxpy, pi[first : first + _PER_BODY]) >> _MARGIN * np.eye(4))
@@ -198,7 +198,7 @@ class _Problem:
 
     def _checked(self, values: FloatArray) -> FloatArray | None:
         """Return the parameters if every link is consistent; those that must not be negative are not."""
-        order = [place for place, column in enumerate(self._columns) if column.group is Group.INERTIAL]
+        order = [place for place, column in enumerate(self._columns) if column.group is ColumnGroup.INERTIAL]
         bodies = values[order].reshape(self._bodies, _PER_BODY)
         if not all(is_consistent(body) for body in bodies):
             return None
@@ -213,14 +213,14 @@ def _matrix(cvxpy: Any, pi: Any) -> Any:
     return cvxpy.reshape(np.array(basis).T @ pi, (4, 4), order="C")
 
 
-def _scales(machine: UrdfRobot, prior: FloatArray, columns: list[Column]) -> FloatArray:
+def _scales(machine: UrdfRobot, prior: FloatArray, columns: list[RegressorColumn]) -> FloatArray:
     """Return the unit of each column: the robot's mass times a power of its reach, or the size of a friction."""
     reach = max(sum(float(np.linalg.norm(joint.translation)) for joint in machine.tree.joints), 1e-3)
     mass = max(sum(joint.mass for joint in machine.tree.joints), 1e-3)
     inertial = np.array([1.0] + [reach] * 3 + [reach**2] * 6) * mass
     scales, seen = [], 0
     for column, value in zip(columns, prior.tolist(), strict=True):
-        if column.group is Group.INERTIAL:
+        if column.group is ColumnGroup.INERTIAL:
             scales.append(float(inertial[seen % _PER_BODY]))
             seen += 1
         else:

@@ -37,7 +37,7 @@ from cdtool.commands.identify.robot.robot_dynamics import (
     resting_windows,
     window_of_column,
 )
-from cdtool.commands.identify.robot.robot_regressor import Group, Regressor, TreeRegressor, regressor_of
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, Regressor, TreeRegressor, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
@@ -53,7 +53,7 @@ _CENTRE_ERROR = 5e-3
 # A constant with a larger relative standard error says nothing.
 _WORST_ERROR = 0.2
 # Of these a joint has its own with the payload.
-_FRICTION = (Group.VISCOUS, Group.COULOMB)
+_FRICTION = (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +95,7 @@ def drive_gains(
     regressor = regressor_of(machine)
     columns = _payload_columns(machine, regressor, payload)
     parts = [_part(run, index, regressor, index >= len(unloaded)) for index, run in enumerate((*unloaded, *loaded))]
-    joints = [_Joint.of(joint, parts, regressor, columns) for joint in range(len(machine.joints))]
+    joints = [_JointWindows.of(joint, parts, regressor, columns) for joint in range(len(machine.joints))]
     most = max(float(np.linalg.norm(joint.load)) for joint in joints)
     unit = "N m/A" if scale is not None else "1"
     found = [
@@ -143,7 +143,7 @@ def _part(run: RobotRun, index: int, regressor: Regressor, is_loaded: bool) -> _
 
 
 @dataclass(frozen=True, eq=False)
-class _Joint:
+class _JointWindows:
     """A joint's windows: what they contain beside the payload, its `load` (m,), that of its `shifts` (m, k)."""
 
     joint: int
@@ -153,7 +153,7 @@ class _Joint:
     equations: Equations
 
     @classmethod
-    def of(cls, joint: int, parts: Sequence[_Part], regressor: Regressor, columns: _PayloadColumns) -> _Joint:
+    def of(cls, joint: int, parts: Sequence[_Part], regressor: Regressor, columns: _PayloadColumns) -> _JointWindows:
         # Friction of its own for the runs with the payload.
         own = [column.joint == joint and column.group in _FRICTION for column in regressor.columns]
         free = np.concatenate((columns.free, np.eye(len(own))[own]))

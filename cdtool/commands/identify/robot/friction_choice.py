@@ -18,14 +18,14 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.estimate import Estimate, Identified, Missing, NotIdentifiable
 from cdtool.commands.identify.robot.robot_dynamics import RobotFit, RobotParameters, identify_robot
-from cdtool.commands.identify.robot.robot_regressor import Group
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
 
 # With a larger relative standard error viscous friction predicts faster motion wrong, however well that of the logs.
 _WORST_VISCOUS = 0.5
-_FRICTION = (Group.VISCOUS.value, Group.COULOMB.value)
+_FRICTION = (ColumnGroup.VISCOUS.value, ColumnGroup.COULOMB.value)
 
 
 class FrictionForm(Enum):
@@ -106,7 +106,7 @@ class _Choice:
         self._machine = machine
         self._speed = np.concatenate([run.speed for run in runs])
         self._torque = np.concatenate([run.torque for run in runs])
-        constant = Group.CONSTANT.value
+        constant = ColumnGroup.CONSTANT.value
 
         def candidate(form: FrictionForm, keys: tuple[str, ...], **changes: bool) -> _Candidate:
             return _Candidate(form, identify_robot(runs, machine, replace(what, **changes)), keys)
@@ -115,7 +115,7 @@ class _Choice:
         self.friction_alone = candidate(FrictionForm.FRICTION_ALONE, _FRICTION, offsets=False)
         self.offset = candidate(FrictionForm.OFFSET, (constant,), friction=False)
         self.drive = candidate(
-            FrictionForm.DRIVE_INERTIA, (Group.DRIVE_INERTIA.value, *_FRICTION, constant), drive_inertia=True
+            FrictionForm.DRIVE_INERTIA, (ColumnGroup.DRIVE_INERTIA.value, *_FRICTION, constant), drive_inertia=True
         )
 
     def of_joint(self, joint: int) -> JointFriction:
@@ -177,7 +177,7 @@ class _Choice:
 
 def _is_vague(estimate: Estimate) -> bool:
     """Return whether a viscous friction describes nothing but the speeds of the logs."""
-    return estimate.key == Group.VISCOUS.value and estimate.relative_error > _WORST_VISCOUS
+    return estimate.key == ColumnGroup.VISCOUS.value and estimate.relative_error > _WORST_VISCOUS
 
 
 def _as_missing(item: Estimate) -> NotIdentifiable:

@@ -39,7 +39,13 @@ from cdtool.commands.identify.robot.base_parameters import (
     independent_norms,
     random_rows,
 )
-from cdtool.commands.identify.robot.robot_regressor import Column, Group, Regressor, regressor_of, with_bodies
+from cdtool.commands.identify.robot.robot_regressor import (
+    ColumnGroup,
+    Regressor,
+    RegressorColumn,
+    regressor_of,
+    with_bodies,
+)
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
@@ -74,12 +80,12 @@ _FEWEST_EQUATIONS = 10
 # Of the samples in motion; below it, there is only one direction.
 _OTHER_DIRECTION = 0.05
 _UNITS = {
-    Group.DRIVE_INERTIA: ("kg m2", "kg"),
-    Group.VISCOUS: ("N m s/rad", "N s/m"),
-    Group.COULOMB: ("N m", "N"),
-    Group.CONSTANT: ("N m", "N"),
+    ColumnGroup.DRIVE_INERTIA: ("kg m2", "kg"),
+    ColumnGroup.VISCOUS: ("N m s/rad", "N s/m"),
+    ColumnGroup.COULOMB: ("N m", "N"),
+    ColumnGroup.CONSTANT: ("N m", "N"),
 }
-_NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB)
+_NOT_NEGATIVE = (ColumnGroup.DRIVE_INERTIA, ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,14 +109,14 @@ class RobotParameters:
             raise UsageError("no parameter is free", "free friction, offsets, drive_inertia or inertial")
 
     @property
-    def groups(self) -> frozenset[Group]:
+    def groups(self) -> frozenset[ColumnGroup]:
         """Return the groups of columns that are free."""
         free = {
-            Group.VISCOUS: self.friction,
-            Group.COULOMB: self.friction,
-            Group.CONSTANT: self.offsets,
-            Group.DRIVE_INERTIA: self.drive_inertia,
-            Group.INERTIAL: self.inertial,
+            ColumnGroup.VISCOUS: self.friction,
+            ColumnGroup.COULOMB: self.friction,
+            ColumnGroup.CONSTANT: self.offsets,
+            ColumnGroup.DRIVE_INERTIA: self.drive_inertia,
+            ColumnGroup.INERTIAL: self.inertial,
         }
         return frozenset(group for group, is_free in free.items() if is_free)
 
@@ -129,7 +135,7 @@ class TorqueError:
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class LeftOutTorque:
     """Torque (m,) [N m, N] that the model does not explain in parts of the log left out of the identification.
 
     `residual` with the parameters from the other parts, `previous` with the machine's own. `joints`, `blocks` (m,): the
@@ -197,12 +203,12 @@ class RobotFit:
 
     machine: CoupledMachine
     parameters: FloatArray
-    columns: tuple[Column, ...]
+    columns: tuple[RegressorColumn, ...]
     grouping: Grouping
     base: BaseParameterSet
     identified: Identified
     torque_error: TorqueError
-    left_out: LeftOut
+    left_out: LeftOutTorque
     condition_number: float
     equations: Equations
 
@@ -256,17 +262,17 @@ def fitted_robot(fit: RobotFit) -> UrdfRobot:
     machine = fit.machine
     if not isinstance(machine, UrdfRobot):
         raise UsageError(f"machine '{machine.name}': has no URDF", "fitted_robot is for type = 'urdf_robot'")
-    values = {group: np.array([fit.parameters[i] for i in _columns_of(fit, group)]) for group in Group}
+    values = {group: np.array([fit.parameters[i] for i in _columns_of(fit, group)]) for group in ColumnGroup}
     ratio = np.array(machine.transmission_ratio)
-    tree = with_bodies(machine.tree, values[Group.INERTIAL])
-    drives = dict(zip(tree.order, values[Group.DRIVE_INERTIA].tolist(), strict=True))
+    tree = with_bodies(machine.tree, values[ColumnGroup.INERTIAL])
+    drives = dict(zip(tree.order, values[ColumnGroup.DRIVE_INERTIA].tolist(), strict=True))
     joints = tuple(replace(joint, drive_inertia=drives[joint.name]) for joint in tree.joints)
     return replace(
         machine,
         tree=replace(tree, joints=joints),
-        viscous_friction=tuple((values[Group.VISCOUS] * ratio**2).tolist()),
-        coulomb_friction=tuple((values[Group.COULOMB] * np.abs(ratio)).tolist()),
-        constant_force=tuple((values[Group.CONSTANT] * ratio).tolist()),
+        viscous_friction=tuple((values[ColumnGroup.VISCOUS] * ratio**2).tolist()),
+        coulomb_friction=tuple((values[ColumnGroup.COULOMB] * np.abs(ratio)).tolist()),
+        constant_force=tuple((values[ColumnGroup.CONSTANT] * ratio).tolist()),
     )
 
 
@@ -278,7 +284,7 @@ def joint_estimates(fit: RobotFit, joint: int, method: Method) -> tuple[tuple[Es
     errors = {(item.key, item.joint): item.standard_error for item in fit.identified.estimates}
     known: list[Estimate] = []
     together: list[Estimate] = []
-    for group in (Group.VISCOUS, Group.COULOMB, Group.CONSTANT):
+    for group in (ColumnGroup.VISCOUS, ColumnGroup.COULOMB, ColumnGroup.CONSTANT):
         value = float(fit.parameters[_columns_of(fit, group)[joint]])
         error = errors.get((group.value, joint), math.nan)
         unit = _UNITS[group][_slides(fit.machine, joint)]
@@ -287,7 +293,7 @@ def joint_estimates(fit: RobotFit, joint: int, method: Method) -> tuple[tuple[Es
     return tuple(known), tuple(together)
 
 
-def _columns_of(fit: RobotFit, group: Group) -> list[int]:
+def _columns_of(fit: RobotFit, group: ColumnGroup) -> list[int]:
     return [i for i, column in enumerate(fit.columns) if column.group is group]
 
 
@@ -336,7 +342,7 @@ def _windows_of(runs: Sequence[RobotRun], regressor: Regressor, grouping: Groupi
         if run.joint_count != len(machine.joints):
             raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
         window = Window.of(what.half_width, run.period)
-        rigid = _rigid_torque(run, machine, window) * (Group.INERTIAL not in what.groups)
+        rigid = _rigid_torque(run, machine, window) * (ColumnGroup.INERTIAL not in what.groups)
         torque = window.average(run.torque) - rigid - _known_torque(run, regressor, window, what.groups)
         rows = np.stack([window_of_column(run, regressor, window, own) for own in grouping.base], axis=2)
         valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
@@ -371,15 +377,15 @@ def _rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> Flo
     return window.rate(momentum) + window.average(gravity - velocity_force)
 
 
-def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: frozenset[Group]) -> FloatArray:
+def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: frozenset[ColumnGroup]) -> FloatArray:
     """Return the windows' torques (K, J) of friction and drives that are not free, beside those of _rigid_torque."""
     values = regressor.values
     total = np.zeros_like(window.average(run.position))
     for column, item in enumerate(regressor.columns):
         # The machine's momentum contains its drives.
-        contained = item.group is Group.DRIVE_INERTIA and Group.INERTIAL not in free
+        contained = item.group is ColumnGroup.DRIVE_INERTIA and ColumnGroup.INERTIAL not in free
         factor = (0.0 if item.group in free else 1.0) - (1.0 if contained else 0.0)
-        if item.group is not Group.INERTIAL and values[column] and factor:
+        if item.group is not ColumnGroup.INERTIAL and values[column] and factor:
             total += factor * values[column] * window_of_column(run, regressor, window, column)
     return total
 
@@ -401,7 +407,7 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _bounds(columns: tuple[Column, ...], grouping: Grouping) -> BoolArray:
+def _bounds(columns: tuple[RegressorColumn, ...], grouping: Grouping) -> BoolArray:
     """Return which base parameters cannot be negative (B,): those of drive and friction that stand alone."""
     alone = [columns[item].group in _NOT_NEGATIVE and grouping.is_alone(item) for item in grouping.base]
     return np.array(alone, dtype=np.bool_)
@@ -599,9 +605,9 @@ def _percentile(values: FloatArray) -> FloatArray:
 
 
 def _base_set(
-    columns: tuple[Column, ...], grouping: Grouping, solution: _Solution, transfer: _Transfer
+    columns: tuple[RegressorColumn, ...], grouping: Grouping, solution: _Solution, transfer: _Transfer
 ) -> BaseParameterSet:
-    inertial = [columns[i].group is Group.INERTIAL for i in grouping.base]
+    inertial = [columns[i].group is ColumnGroup.INERTIAL for i in grouping.base]
     excited = transfer.excitation >= np.where(inertial, _EXCITED_INERTIAL, _EXCITED)
     certain = transfer.uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT)
     trusted = excited & certain & (solution.block_count >= _FEWEST_BLOCKS)
@@ -621,7 +627,7 @@ class _Judge:
 
     runs: Sequence[RobotRun]
     machine: CoupledMachine
-    columns: tuple[Column, ...]
+    columns: tuple[RegressorColumn, ...]
     grouping: Grouping
     base: BaseParameterSet
     transfer: _Transfer
@@ -634,7 +640,7 @@ class _Judge:
         missing: list[NotIdentifiable] = []
         for index in self.grouping.columns:
             column = self.columns[index]
-            if column.group is Group.INERTIAL:
+            if column.group is ColumnGroup.INERTIAL:
                 continue
             found = self._of_joint(index, column)
             if isinstance(found, Estimate):
@@ -644,7 +650,7 @@ class _Judge:
         missing.extend(self._of_set())
         return Identified(tuple(estimates), tuple(missing))
 
-    def _of_joint(self, index: int, column: Column) -> Estimate | NotIdentifiable:
+    def _of_joint(self, index: int, column: RegressorColumn) -> Estimate | NotIdentifiable:
         if not self.grouping.is_alone(index):
             # A link's inertia takes the place of the rotor's in every motion.
             return self._refused(column, (Missing.MOTOR_INERTIA,), {})
@@ -673,10 +679,12 @@ class _Judge:
             column.joint,
         )
 
-    def _refused(self, column: Column, missing: tuple[Missing, ...], numbers: dict[str, float]) -> NotIdentifiable:
+    def _refused(
+        self, column: RegressorColumn, missing: tuple[Missing, ...], numbers: dict[str, float]
+    ) -> NotIdentifiable:
         return NotIdentifiable("machine", column.group.value, missing, numbers, column.joint)
 
-    def _needed(self, column: Column, row: int) -> tuple[Missing, ...]:
+    def _needed(self, column: RegressorColumn, row: int) -> tuple[Missing, ...]:
         if self.base.excitation[row] >= _EXCITED:
             return (Missing.MORE_RECORDINGS,)
         speed = np.concatenate([run.speed[:, column.joint] for run in self.runs])
@@ -684,15 +692,18 @@ class _Judge:
         if len(moving) < _FEWEST_EQUATIONS:
             return (Missing.OTHER_MOTION,)
         forward = float(np.mean(moving > 0.0))
-        if column.group in (Group.COULOMB, Group.CONSTANT) and min(forward, 1.0 - forward) < _OTHER_DIRECTION:
+        if (
+            column.group in (ColumnGroup.COULOMB, ColumnGroup.CONSTANT)
+            and min(forward, 1.0 - forward) < _OTHER_DIRECTION
+        ):
             return (Missing.REVERSALS,)
-        if column.group is Group.DRIVE_INERTIA:
+        if column.group is ColumnGroup.DRIVE_INERTIA:
             return (Missing.ACCELERATION,)
-        return (Missing.SECOND_SPEED,) if column.group is not Group.CONSTANT else (Missing.OTHER_MOTION,)
+        return (Missing.SECOND_SPEED,) if column.group is not ColumnGroup.CONSTANT else (Missing.OTHER_MOTION,)
 
     def _of_set(self) -> list[NotIdentifiable]:
         """Return why the inertial base parameters are no complete set; empty if they are, or are not free."""
-        inertial = [row for row, i in enumerate(self.grouping.base) if self.columns[i].group is Group.INERTIAL]
+        inertial = [row for row, i in enumerate(self.grouping.base) if self.columns[i].group is ColumnGroup.INERTIAL]
         if not inertial:
             return []
         unexcited = [row for row in inertial if not self.base.identifiable[row]]
@@ -720,7 +731,7 @@ def _slides(machine: CoupledMachine, joint: int) -> bool:
     return next(item.prismatic for item in tree.joints if item.name == tree.order[joint])
 
 
-def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> LeftOut:
+def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> LeftOutTorque:
     """Return the residuals of each fold by the fit without it, unweighted."""
     equations = solution.equations
     residual = np.empty(len(equations.torques))
@@ -733,10 +744,10 @@ def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> 
     joints = equations.joints.astype(np.int64)
     scale = 1.0 / solution.weights[joints]
     previous = (equations.torques - equations.rows @ start) * scale
-    return LeftOut(residual * scale, previous, joints, solution.blocks)
+    return LeftOutTorque(residual * scale, previous, joints, solution.blocks)
 
 
-def _torque_error(solution: _Solution, left_out: LeftOut, machine: CoupledMachine) -> TorqueError:
+def _torque_error(solution: _Solution, left_out: LeftOutTorque, machine: CoupledMachine) -> TorqueError:
     equations, count = solution.equations, len(machine.joints)
     explained = (equations.torques - equations.rows @ solution.values) / solution.weights[left_out.joints]
     rest = (explained, left_out.residual, left_out.previous)

@@ -32,7 +32,7 @@ from cdtool.commands.identify.robot.robot_excitation import (
     measure_joint_motion,
     plan_robot_motion,
 )
-from cdtool.commands.identify.robot.robot_regressor import Group, regressor_of
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
 from cdtool.machines.coupled import CoupledMachine
@@ -312,7 +312,7 @@ class _Joint:
         total = (window.rate(momentum) + window.average(gravity - velocity_force))[:, self.joint]
         change = self.fit.parameters - regressor.values
         for column in np.flatnonzero(change).tolist():
-            if regressor.columns[column].group in (Group.INERTIAL, Group.DRIVE_INERTIA):
+            if regressor.columns[column].group in (ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA):
                 total = total + change[column] * window_of_column(run, regressor, window, column)[:, self.joint]
         return np.asarray(total)
 
@@ -321,11 +321,13 @@ class _Joint:
         values = {
             column.group: float(parameters[index])
             for index, column in enumerate(regressor_of(machine).columns)
-            if column.joint == self.joint and column.group is not Group.INERTIAL
+            if column.joint == self.joint and column.group is not ColumnGroup.INERTIAL
         }
         slope = machine.coulomb_slope[self.joint]
         direction = np.tanh(slope * speed) if slope else np.sign(speed)
-        total = values[Group.VISCOUS] * speed + values[Group.COULOMB] * direction + values[Group.CONSTANT]
+        total = (
+            values[ColumnGroup.VISCOUS] * speed + values[ColumnGroup.COULOMB] * direction + values[ColumnGroup.CONSTANT]
+        )
         return np.asarray(total)
 
 

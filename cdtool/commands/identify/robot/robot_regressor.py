@@ -31,7 +31,7 @@ _INERTIA_PLACES = (0, 1, 3, 2, 4, 5)
 _PLANAR = ("M11", "M22", "h", "g1", "g2")
 
 
-class Group(Enum):
+class ColumnGroup(Enum):
     """What a column of the regressor belongs to."""
 
     INERTIAL = "inertial"
@@ -41,14 +41,14 @@ class Group(Enum):
     CONSTANT = "constant_force"
 
 
-PER_JOINT = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.CONSTANT)
+PER_JOINT = (ColumnGroup.DRIVE_INERTIA, ColumnGroup.VISCOUS, ColumnGroup.COULOMB, ColumnGroup.CONSTANT)
 
 
 @dataclass(frozen=True)
-class Column:
+class RegressorColumn:
     """A column: its group, its name, and the index of its joint in the recording's order."""
 
-    group: Group
+    group: ColumnGroup
     name: str
     joint: int
 
@@ -62,7 +62,7 @@ class Regressor(Protocol):
         ...
 
     @property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self) -> tuple[RegressorColumn, ...]:
         """Return the columns, P of them."""
         ...
 
@@ -97,10 +97,12 @@ class _JointColumns:
     Dry friction is Coulomb tanh(slope v), or Coulomb sign(v) above the stick speed without a slope, as in the machine.
     """
 
-    def __init__(self, machine: CoupledMachine, inertial: tuple[Column, ...]) -> None:
+    def __init__(self, machine: CoupledMachine, inertial: tuple[RegressorColumn, ...]) -> None:
         self.machine = machine
         names = tuple(machine.joints)
-        own = tuple(Column(group, f"{group.value} {name}", j) for group in PER_JOINT for j, name in enumerate(names))
+        own = tuple(
+            RegressorColumn(group, f"{group.value} {name}", j) for group in PER_JOINT for j, name in enumerate(names)
+        )
         self.columns = inertial + own
         self._inertial_count = len(inertial)
 
@@ -111,13 +113,13 @@ class _JointColumns:
         coulomb = np.array(self.machine.coulomb_friction) / np.abs(ratio)
         return np.concatenate((viscous, coulomb, np.array(self.machine.constant_force) / ratio))
 
-    def friction(self, column: Column, speed: FloatArray) -> FloatArray:
+    def friction(self, column: RegressorColumn, speed: FloatArray) -> FloatArray:
         """Return the torque (n, J) of a friction of 1."""
         torque, joint = np.zeros_like(speed), column.joint
         v = speed[:, joint]
-        if column.group is Group.VISCOUS:
+        if column.group is ColumnGroup.VISCOUS:
             torque[:, joint] = v
-        elif column.group is Group.CONSTANT:
+        elif column.group is ColumnGroup.CONSTANT:
             torque[:, joint] = np.where(np.isfinite(v), 1.0, np.nan)
         else:
             torque[:, joint] = self._direction(joint, v)
@@ -133,9 +135,9 @@ class _JointColumns:
     def torque(self, column: int, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Return the torque (n, J) of the parameter 1."""
         what = self.columns[column]
-        if what.group is Group.INERTIAL:
+        if what.group is ColumnGroup.INERTIAL:
             return self._inertial_torque(column, position, speed, acceleration)
-        if what.group is not Group.DRIVE_INERTIA:
+        if what.group is not ColumnGroup.DRIVE_INERTIA:
             return self.friction(what, speed)
         torque = np.zeros_like(speed)
         torque[:, what.joint] = acceleration[:, what.joint]
@@ -144,9 +146,9 @@ class _JointColumns:
     def momentum(self, column: int, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return momentum and rest (n, J) of the parameter 1."""
         what = self.columns[column]
-        if what.group is Group.INERTIAL:
+        if what.group is ColumnGroup.INERTIAL:
             return self._inertial_momentum(column, position, speed)
-        if what.group is not Group.DRIVE_INERTIA:
+        if what.group is not ColumnGroup.DRIVE_INERTIA:
             return np.zeros_like(speed), self.friction(what, speed)
         momentum = np.zeros_like(speed)
         momentum[:, what.joint] = speed[:, what.joint]
@@ -168,7 +170,7 @@ class TreeRegressor(_JointColumns):
         self.tree = machine.tree
         places = [self.tree.order.index(joint.name) for joint in self.tree.joints]
         inertial = (
-            Column(Group.INERTIAL, f"{name} {machine.joints[place]}", place)
+            RegressorColumn(ColumnGroup.INERTIAL, f"{name} {machine.joints[place]}", place)
             for place in places
             for name in BODY_PARAMETERS
         )
@@ -211,7 +213,9 @@ class PlanarRegressor(_JointColumns):
     def __init__(self, machine: PlanarArm) -> None:
         self._arm = machine
         joints = (0, 1, 1, 0, 1)
-        super().__init__(machine, tuple(Column(Group.INERTIAL, *item) for item in zip(_PLANAR, joints, strict=True)))
+        super().__init__(
+            machine, tuple(RegressorColumn(ColumnGroup.INERTIAL, *item) for item in zip(_PLANAR, joints, strict=True))
+        )
 
     @property
     def values(self) -> FloatArray:

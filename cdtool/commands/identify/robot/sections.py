@@ -20,7 +20,7 @@ from cdtool.commands.identify.words import (
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, images_of
 from cdtool.report.number_text import NOTHING, number, percent
-from cdtool.report.table import Cell, Column, Table, name_cell, number_cell, tabulate
+from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
 
 _UNSEEN = (
     "Each part, a run or a fifth of the only one, is predicted by a fit to the other parts; shown is the run with the "
@@ -47,7 +47,7 @@ def robot_sections(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -
         robot, robot_plan_of(done, evidence), [joint.joint for joint in done.joints], travel, len(done.runs)
     )
     if lines:
-        table = Table("robot", "The whole robot", (Column("finding"),), [[Cell(visible(line))] for line in lines])
+        table = Table("robot", "The whole robot", (Heading("finding"),), [[Cell(visible(line))] for line in lines])
         sections.append(PageSection("Whole robot", (table,)))
     return sections
 
@@ -74,14 +74,14 @@ def _friction_section(done: IdentifiedMachine, robot: RobotIdentification, panel
 
 def _decision_table(panels: Sequence[JointPanel]) -> Table:
     fields = (
-        (Column("joint"), lambda item: name_cell(visible(item.name))),
-        (Column("unit"), lambda item: Cell(item.units[0])),
-        (Column("torque, RMS", numeric=True), lambda item: number_cell(item.decision.torque)),
-        (Column("old friction", numeric=True), lambda item: number_cell(item.decision.before)),
-        (Column("new friction", numeric=True), lambda item: number_cell(item.decision.after)),
-        (Column("between equal runs", numeric=True), lambda item: number_cell(item.decision.floor)),
+        (Heading("joint"), lambda item: name_cell(visible(item.name))),
+        (Heading("unit"), lambda item: Cell(item.units[0])),
+        (Heading("torque, RMS", numeric=True), lambda item: number_cell(item.decision.torque)),
+        (Heading("old friction", numeric=True), lambda item: number_cell(item.decision.before)),
+        (Heading("new friction", numeric=True), lambda item: number_cell(item.decision.after)),
+        (Heading("between equal runs", numeric=True), lambda item: number_cell(item.decision.floor)),
         (
-            Column("used"),
+            Heading("used"),
             lambda item: Cell(
                 words_of_decision(item.decision), tone="good" if item.decision.answer is FrictionAnswer.NEW else ""
             ),
@@ -96,7 +96,7 @@ def _forms_table(done: IdentifiedMachine, robot: RobotIdentification) -> Table:
         for form, error in joint.errors.items():
             tone = "good" if form is joint.form else ""
             rows.append([name_cell(visible(name.joint)), Cell(form.value, tone=tone), number_cell(error)])
-    columns = (Column("joint"), Column("form of the friction"), Column("RMS error", numeric=True))
+    columns = (Heading("joint"), Heading("form of the friction"), Heading("RMS error", numeric=True))
     return Table("forms", "All forms that were compared", columns, rows)
 
 
@@ -132,7 +132,7 @@ def _motion_section(evidence: Sequence[JointEvidence]) -> PageSection:
         ("moving time [s]", True),
         ("missing for its friction", False),
     )
-    columns = tuple(Column(heading, numeric=numeric) for heading, numeric in headings)
+    columns = tuple(Heading(heading, numeric=numeric) for heading, numeric in headings)
     table = Table("motion", "Logged motion of each joint", columns, rows)
     return PageSection("Excitation, joints", (table,) if rows else ())
 
@@ -151,11 +151,11 @@ def _inertia_section(found: InertiaIdentification) -> PageSection:
         for name, value, error, share, known in fields
     ]
     columns = (
-        Column("base parameter"),
-        Column("value", numeric=True),
-        Column("standard error", numeric=True),
-        Column("excitation", numeric=True),
-        Column("identifiable"),
+        Heading("base parameter"),
+        Heading("value", numeric=True),
+        Heading("standard error", numeric=True),
+        Heading("excitation", numeric=True),
+        Heading("identifiable"),
     )
     note = (
         "Excitation: the part of a parameter's torque that no other parameter explains, relative to random motion of "

@@ -62,7 +62,7 @@ class _Edit:
 
 
 @dataclass
-class _Place:
+class _LinkPlace:
     """Where a link is: the bytes of its start tag, and of its <inertial> (start, end), None without one."""
 
     tag: tuple[int, int]
@@ -96,18 +96,18 @@ def _is_declared(data: bytes) -> bool:
     return data.lstrip().startswith(b"<?xml")
 
 
-def _places(data: bytes) -> dict[str, _Place]:
+def _places(data: bytes) -> dict[str, _LinkPlace]:
     """Return where each link of the robot is; raises ConfigurationError for broken XML and another root."""
     parser = expat.ParserCreate("utf-8")
     path: list[str] = []
-    places: dict[str, _Place] = {}
-    current: list[_Place] = []
+    places: dict[str, _LinkPlace] = {}
+    current: list[_LinkPlace] = []
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         path.append(tag)
         at = parser.CurrentByteIndex
         if path == ["robot", "link"]:
-            current[:] = [_Place((at, _tag_end(data, at)))]
+            current[:] = [_LinkPlace((at, _tag_end(data, at)))]
             places[attributes.get("name", "")] = current[0]
         elif path == ["robot", "link", "inertial"] and current[0].inertial is None:
             current[0].inertial = (at, _tag_end(data, at))

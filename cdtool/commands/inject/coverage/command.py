@@ -26,7 +26,7 @@ from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
     from cdtool.commands.inject.coverage.coverage import Coverage
-    from cdtool.commands.inject.coverage.coverage_map import Cell, TellingCell
+    from cdtool.commands.inject.coverage.coverage_map import MapCell, TellingCell
 
 
 def coverage(
@@ -137,7 +137,7 @@ def _show_telling(done: Coverage) -> None:
         typer.echo(f"  {item.detector} at {where}: {_why(item)}")
 
 
-def _row(cells: Sequence[Cell]) -> tuple[object, ...]:
+def _row(cells: Sequence[MapCell]) -> tuple[object, ...]:
     latencies = [value for cell in cells for value in cell.range_ms if math.isfinite(value)]
     forces = [cell.force_n for cell in cells if math.isfinite(cell.force_n)]
     counts = (sum(cell.contacts for cell in cells), sum(cell.missed for cell in cells))

@@ -119,7 +119,7 @@ def coverage(
     traces: Mapping[str, Trace] = {}
     if with_traces:
         paths = {name: injected.folder / case.file for name, case in names.items()}
-        traces = _traces_of_worst(made, _by_recording(done.traces, names), scored, paths, workers)
+        traces = _traces_of_worst(made, _by_recording(done.traces), scored, paths, workers)
     skipped, findings = tuple(done.results.skipped), tuple(done.results.findings)
     return Coverage(machine.name, made, skipped, findings, traces, (*setup.inputs, *section.logs))
 
@@ -141,14 +141,9 @@ def _mapped(cases: Mapping[str, InjectedCase]) -> dict[str, MappedContact]:
     }
 
 
-def _by_recording(traces: Iterable[Trace], names: Mapping[str, object]) -> dict[str, Trace]:
-    """Return the traces with a contact by the recording; one of several operations of it is named RECORDING#NUMBER."""
-    found = {}
-    for trace in traces:
-        name = trace.recording if trace.recording in names else trace.recording.rpartition("#")[0]
-        if trace.contact >= 0:
-            found[name] = replace(trace, chosen="")
-    return found
+def _by_recording(traces: Iterable[Trace]) -> dict[str, Trace]:
+    """Return the traces with a contact by the recording."""
+    return {trace.log: replace(trace, chosen="") for trace in traces if trace.contact >= 0}
 
 
 def _traces_of_worst(
@@ -171,7 +166,7 @@ def _traces_of_worst(
         }
         impacts = {name: group for name, group in groups.items() if group.logs}
         again = benchmark(replace(scored, impacts=impacts), workers=workers)
-        known = known | _by_recording(again.traces, paths)
+        known = known | _by_recording(again.traces)
     return {name: known[name] for name in wanted if name in known}
 
 

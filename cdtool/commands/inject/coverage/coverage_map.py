@@ -51,7 +51,7 @@ class CellContact:
 
 
 @dataclass(frozen=True)
-class Cell:
+class MapCell:
     """The contacts of one cell: their number, those missed and not assessable, and the outcome of the others.
 
     `latency_ms`: mean of the detected contacts, `standard_error_ms` of it from log to log (NaN below two), `range_ms`:
@@ -127,7 +127,7 @@ class TellingCell:
 
     detector: str
     key: CellKey
-    cell: Cell
+    cell: MapCell
     reason: TellingReason
 
 
@@ -150,7 +150,7 @@ class CoverageMap:
     positions: tuple[float, ...]
     stiffnesses: tuple[float, ...]
     unit: str
-    cells: Mapping[str, Mapping[CellKey, Cell]]
+    cells: Mapping[str, Mapping[CellKey, MapCell]]
     speeds: tuple[SpeedClass, ...] = (SpeedClass(None, math.nan, math.nan),)
     speed_unit: str = "m/s"
 
@@ -168,7 +168,7 @@ class CoverageMap:
         known.sort(key=lambda item: (urgency[item.reason], -np.nan_to_num(item.cell.uncertainty_ms)))
         return known[:count]
 
-    def missed(self) -> list[tuple[str, CellKey, Cell]]:
+    def missed(self) -> list[tuple[str, CellKey, MapCell]]:
         """Return the cells with missed contacts, those with the largest missed share first."""
         known = [(name, key, cell) for name, cells in self.cells.items() for key, cell in cells.items() if cell.missed]
         known.sort(key=lambda item: -item[2].missed / item[2].assessable)
@@ -284,7 +284,7 @@ def _classes(contacts: Mapping[str, MappedContact]) -> tuple[SpeedClass, ...]:
     return tuple(sorted(classes, key=lambda item: item.speed or 0.0))
 
 
-def _cell(rows: Sequence[ContactResult], contacts: Mapping[str, MappedContact], limits: Sequence[LimitRule]) -> Cell:
+def _cell(rows: Sequence[ContactResult], contacts: Mapping[str, MappedContact], limits: Sequence[LimitRule]) -> MapCell:
     recordings = sorted((_contact(row, contacts[row.recording]) for row in rows), key=_badness)
     detected = [item for item in recordings if item.outcome == _DETECTED]
     latencies: dict[str, list[float]] = {}
@@ -298,7 +298,7 @@ def _cell(rows: Sequence[ContactResult], contacts: Mapping[str, MappedContact], 
         spread = sum(float(np.sum((np.array(values) - np.mean(values)) ** 2)) for values in latencies.values())
         error = math.sqrt(spread / (len(every) - len(means)) / len(every))
     missed = sum(item.is_missed for item in recordings)
-    return Cell(
+    return MapCell(
         contacts=len(rows),
         missed=missed,
         not_assessable=len(rows) - missed - len(detected),

@@ -11,7 +11,7 @@ from cdtool.base.files.foreign import FIGURES, Kind, refuse_inputs, refuse_other
 from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.commands.inject.coverage.coverage import Coverage
-from cdtool.commands.inject.coverage.coverage_map import Cell, CellKey, CoverageMap
+from cdtool.commands.inject.coverage.coverage_map import CellKey, CoverageMap, MapCell
 from cdtool.report.number_text import number
 from cdtool.report.output_names import check_output_names
 
@@ -76,7 +76,7 @@ def coverage_summary(done: Coverage) -> dict[str, Any]:
     }
 
 
-def _cell(detector: str, key: CellKey, cell: Cell) -> dict[str, Any]:
+def _cell(detector: str, key: CellKey, cell: MapCell) -> dict[str, Any]:
     telling = cell.telling
     reason = None if telling is None else telling.name.lower()
     return {"detector": detector, **asdict(key), **asdict(cell), "telling": reason}

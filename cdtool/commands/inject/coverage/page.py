@@ -18,7 +18,6 @@ import numpy as np
 
 from cdtool.base.plain_text import counted, digits
 from cdtool.commands.inject.coverage.coverage import Coverage
-from cdtool.commands.inject.coverage.coverage_map import Cell as MapCell
 from cdtool.commands.inject.coverage.coverage_map import (
     CellContact,
     CellKey,
@@ -27,6 +26,7 @@ from cdtool.commands.inject.coverage.coverage_map import (
     TellingCell,
     TellingReason,
 )
+from cdtool.commands.inject.coverage.coverage_map import MapCell as MapCell
 from cdtool.detectors.detection import REASONS
 from cdtool.report.csv_text import csv_lines
 from cdtool.report.html.page_tables import classes, visible
@@ -36,7 +36,7 @@ from cdtool.report.html.traces import HEIGHTS, trace_data
 from cdtool.report.model import AXES, NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number, spoken
 from cdtool.report.plots.style import look_of
-from cdtool.report.table import Cell, Column, Table, count_cell, name_cell, number_cell, tabulate
+from cdtool.report.table import Cell, Heading, Table, count_cell, name_cell, number_cell, tabulate
 from cdtool.results.traces.trace import Trace
 
 _SCRIPTS = ("scales.js", "chart.js", "trace.js", "tables.js", "coverage.js")
@@ -258,27 +258,27 @@ def _spring(stiffness: float) -> str:
     return _short(stiffness / 1e3)
 
 
-def _place_fields(made: CoverageMap) -> list[tuple[Column, Any]]:
+def _place_fields(made: CoverageMap) -> list[tuple[Heading, Any]]:
     """Return the columns that name a cell, for items (detector, key, cell)."""
-    fields: list[tuple[Column, Any]] = [
-        (Column("detector"), lambda item: name_cell(visible(item[0]))),
-        (Column(f"position [{made.unit}]", numeric=True), lambda item: number_cell(item[1].position)),
+    fields: list[tuple[Heading, Any]] = [
+        (Heading("detector"), lambda item: name_cell(visible(item[0]))),
+        (Heading(f"position [{made.unit}]", numeric=True), lambda item: number_cell(item[1].position)),
         (
-            Column("stiffness [N/mm]", numeric=True),
+            Heading("stiffness [N/mm]", numeric=True),
             lambda item: Cell(_spring(item[1].stiffness), key=item[1].stiffness),
         ),
     ]
     if len(made.speeds) > 1:
-        fields.append((Column(f"speed [{made.speed_unit}]", numeric=True), lambda item: number_cell(item[1].speed)))
+        fields.append((Heading(f"speed [{made.speed_unit}]", numeric=True), lambda item: number_cell(item[1].speed)))
     return fields
 
 
 def _missed_table(made: CoverageMap, items: Sequence[tuple[str, CellKey, MapCell]]) -> Table:
     fields = [
         *_place_fields(made),
-        (Column("missed", numeric=True), lambda item: count_cell(item[2].missed, "bad")),
-        (Column("of", numeric=True), lambda item: count_cell(item[2].assessable)),
-        (Column("latency of the others [ms]", numeric=True), lambda item: Cell(_latency_or_nothing(item[2]))),
+        (Heading("missed", numeric=True), lambda item: count_cell(item[2].missed, "bad")),
+        (Heading("of", numeric=True), lambda item: count_cell(item[2].assessable)),
+        (Heading("latency of the others [ms]", numeric=True), lambda item: Cell(_latency_or_nothing(item[2]))),
     ]
     return tabulate("missed", "Cells with missed contacts, the largest share first", fields, items)
 
@@ -290,11 +290,11 @@ def _latency_or_nothing(cell: MapCell) -> str:
 def _telling_table(made: CoverageMap, items: Sequence[TellingCell]) -> Table:
     fields = [
         *_place_fields(made),
-        (Column("why"), lambda item: Cell(_reason(item[3]))),
-        (Column("missed", numeric=True), lambda item: Cell(f"{item[2].missed} of {item[2].assessable}")),
-        (Column("latency [ms]", numeric=True), lambda item: Cell(_latency_or_nothing(item[2]))),
-        (Column("std [ms]", numeric=True), lambda item: number_cell(item[2].standard_deviation_ms)),
-        (Column("size of the test"), lambda item: Cell(_plan(item[3]))),
+        (Heading("why"), lambda item: Cell(_reason(item[3]))),
+        (Heading("missed", numeric=True), lambda item: Cell(f"{item[2].missed} of {item[2].assessable}")),
+        (Heading("latency [ms]", numeric=True), lambda item: Cell(_latency_or_nothing(item[2]))),
+        (Heading("std [ms]", numeric=True), lambda item: number_cell(item[2].standard_deviation_ms)),
+        (Heading("size of the test"), lambda item: Cell(_plan(item[3]))),
     ]
     rows = [(item.detector, item.key, item.cell, item) for item in items]
     return tabulate(
@@ -342,7 +342,7 @@ def _left_out(done: Coverage) -> list[Table]:
         if items:
             counts = Counter((item.recording, item.reason) for item in items)
             rows = [[name_cell(visible(where)), Cell(visible(reason))] for where, reason in counts]
-            tables.append(Table(name, title, (Column("recording"), Column("reason")), rows))
+            tables.append(Table(name, title, (Heading("recording"), Heading("reason")), rows))
     return tables
 
 

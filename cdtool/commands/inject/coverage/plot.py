@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdtool.base.plain_text import digits
-from cdtool.commands.inject.coverage.coverage_map import Cell, CellKey, CoverageMap
+from cdtool.commands.inject.coverage.coverage_map import CellKey, CoverageMap, MapCell
 from cdtool.report.plots.figures import drawing, label, new_figure, save
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def _draw(axes: Axes, coverage: CoverageMap, cells: Any, norm: Any) -> Any:
     return image
 
 
-def _write(axes: Axes, cell: Cell, at: tuple[int, int], norm: Any) -> None:
+def _write(axes: Axes, cell: MapCell, at: tuple[int, int], norm: Any) -> None:
     column, row = at
     if cell.missed:
         from matplotlib.patches import Rectangle

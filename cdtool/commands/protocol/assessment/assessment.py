@@ -2,6 +2,8 @@
 
 Conventions: the repetitions of a point are its recordings' contacts, in the order in which they are given. Pure
 functions: nothing is read here.
+
+Why a repetition was not run as planned: its speed before the contact differs, or is missing in a logged channel.
 """
 
 from __future__ import annotations
@@ -15,14 +17,56 @@ from typing import Literal
 from cdtool.commands.protocol.assessment.plan import Instrument, MeasuringPoint, TestPlan, empty_entries
 from cdtool.commands.protocol.assessment.pressure import PressureAssessment, PressureRecord
 from cdtool.commands.protocol.assessment.pressure_reasons import pressure_reasons
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Value, Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind, Value
 from cdtool.commands.protocol.assessment.same_measurement import hold_same_measurement
 from cdtool.commands.protocol.assessment.sampling import above_between_samples, equal_readings_at_peak, sample_rate
-from cdtool.commands.protocol.assessment.speed_reasons import speed_reasons
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.limits import ForceProfile
 from cdtool.truth.force.quantities import dynamic_time, time_above
 from cdtool.truth.force.verdict import ForceVerdict, PointStep, PointVerdict, StepVerdict, assess_force, averaged
+
+
+def speed_reasons(point: MeasuringPoint, speeds: Sequence[tuple[str, float | None]]) -> Iterator[Reason]:
+    """Yield the repetitions whose speed is not the planned one.
+
+    Parameters
+    ----------
+    point : MeasuringPoint
+        The point of the plan, with its speed [m/s] and tolerance; without a planned speed nothing is compared.
+    speeds : sequence of (str, float or None)
+        The recording of each repetition and the speed just before the contact [m/s]; NaN: its samples are missing,
+        None: it was not measured, which the plan does not require.
+
+    Yields
+    ------
+    Reason
+        With the point, the repetition, and both speeds.
+
+    Examples
+    --------
+    >>> point = MeasuringPoint(name="edge", speed_m_per_s=0.2)
+    >>> speeds = [("1.csv", 0.21), ("2.csv", 0.1), ("3.csv", None)]
+    >>> [reason.values["measured"] for reason in speed_reasons(point, speeds)]
+    [0.1]
+    """
+    planned = point.speed_m_per_s
+    if not planned:
+        return
+    for number, (recording, speed) in enumerate(speeds, 1):
+        if speed is None:
+            continue
+        about: dict[str, Value] = {
+            "point": point.name,
+            "repetition": number,
+            "recording": recording,
+            "planned": planned,
+        }
+        if math.isnan(speed):
+            yield Reason(ReasonKind.SPEED_MISSING, about, due="test_day")
+        elif abs(speed - planned) > point.speed_tolerance * planned * (1.0 + 1e-9):
+            values: dict[str, Value] = {**about, "measured": speed, "tolerance": 100.0 * point.speed_tolerance}
+            yield Reason(ReasonKind.SPEED_DIFFERS, values, due="test_day")
+
 
 # Sample rates are alike within this share: a clock is not exact, and stamps jitter.
 _SAME_RATE = 0.02
@@ -119,7 +163,7 @@ class PointAssessment:
     @property
     def outcome(self) -> str:
         """Return pass, fail or incomplete."""
-        return Verdict(self.reasons).outcome
+        return ProtocolVerdict(self.reasons).outcome
 
 
 def required_record(profile: ForceProfile) -> float:
@@ -266,7 +310,7 @@ def check_point(
     return PointAssessment(point, profile, (), None, tuple(reasons))
 
 
-def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Sequence[Reason] = ()) -> Verdict:
+def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Sequence[Reason] = ()) -> ProtocolVerdict:
     """Return the verdict of a whole protocol.
 
     Parameters
@@ -282,7 +326,7 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
 
     Returns
     -------
-    Verdict
+    ProtocolVerdict
         Fail if a point fails; otherwise incomplete if anything is missing; otherwise pass. All reasons are listed.
 
     Examples
@@ -299,7 +343,7 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
         *([] if plan.points else [Reason(ReasonKind.NO_POINT, {"file": file})]),
         *(Reason(ReasonKind.NO_VALUE, {"key": item.key, "file": file}, due=item.due) for item in empty_entries(plan)),
     ]
-    return Verdict(tuple(sorted(reasons, key=lambda reason: reason.kind.outcome != "fail")))
+    return ProtocolVerdict(tuple(sorted(reasons, key=lambda reason: reason.kind.outcome != "fail")))
 
 
 def _reason(kind: ReasonKind, point: MeasuringPoint, **values: str | float) -> Reason:

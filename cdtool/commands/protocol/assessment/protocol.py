@@ -8,7 +8,7 @@ from typing import Literal
 
 from cdtool.commands.protocol.assessment.assessment import PointAssessment
 from cdtool.commands.protocol.assessment.plan import TestPlan
-from cdtool.commands.protocol.assessment.reasons import Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict
 
 Role = Literal[
     "protocol", "benchmark", "machine", "robot", "limits", "labels", "measured", "excluded", "scored", "learned"
@@ -38,7 +38,7 @@ class Protocol:
 
     plan: TestPlan
     points: tuple[PointAssessment, ...]
-    verdict: Verdict
+    verdict: ProtocolVerdict
     files: tuple[FileDigest, ...]
     excluded: tuple[ExcludedRecording, ...] = ()
     detectors: tuple[str, ...] = ()

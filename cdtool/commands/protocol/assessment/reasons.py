@@ -83,7 +83,7 @@ class Reason:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ProtocolVerdict:
     """The verdict of a protocol, with every reason.
 
     Fail beats incomplete, incomplete beats pass: the reasons for both are listed, those of a fail first.

@@ -9,7 +9,7 @@ Level = Literal[1, 2]
 
 
 @dataclass(frozen=True)
-class Heading:
+class SectionHeading:
     """A heading; `page_break`: it begins a new page; `label`: the name by which a `Reference` refers to it."""
 
     text: str
@@ -68,7 +68,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Grid:
+class HeadedTable:
     """A table with a heading row; `numeric` columns are right-aligned, `strong` rows emphasised.
 
     `widths`: relative widths of the columns, 0 for as wide as the content. `typed`: columns of hashes or file names.
@@ -84,7 +84,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Curves:
+class CurveDrawing:
     """A drawing of force-time curves as SVG, with its caption and a description for readers who do not see it."""
 
     svg: str
@@ -103,7 +103,7 @@ class Signatures:
     kind: Literal["signatures"] = "signatures"
 
 
-Block = Heading | Paragraph | VerdictBox | Items | Reference | Facts | Grid | Curves | Signatures
+Block = SectionHeading | Paragraph | VerdictBox | Items | Reference | Facts | HeadedTable | CurveDrawing | Signatures
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,14 @@ from cdtool.commands.protocol.assessment.plan import Instrument
 from cdtool.commands.protocol.assessment.protocol import Protocol
 from cdtool.commands.protocol.document.blocks import (
     Block,
-    Curves,
+    CurveDrawing,
     Document,
     Facts,
-    Grid,
-    Heading,
+    HeadedTable,
     Items,
     Paragraph,
     Reference,
+    SectionHeading,
     Signatures,
     VerdictBox,
 )
@@ -122,7 +122,7 @@ def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
     )
     yield Facts(tuple((words(f"field.{name}"), plain(words.value(value or None))) for name, value in shown))
     yield from _first_reasons(protocol, words)
-    yield Heading(words("verdict.notices"))
+    yield SectionHeading(words("verdict.notices"))
     yield Items(tuple(map(plain, _notices(protocol, words))))
     yield from _all_reasons(protocol, words)
 
@@ -151,7 +151,7 @@ def _first_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
         most = space if number == len(reasons) else space - _LEFT_LINES
         count = max(1, sum(end <= most for end in ends))
         space -= sum(map(_lines, sentences[:count]))
-        yield Heading(words(f"verdict.why_{outcome}"))
+        yield SectionHeading(words(f"verdict.why_{outcome}"))
         yield Items(tuple(map(plain, sentences[:count])))
         if count < len(sentences):
             more = len(sentences) - count
@@ -167,9 +167,9 @@ def _all_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
     """Yield every reason, if the first page does not hold them."""
     if not any(isinstance(item, Reference) for item in _first_reasons(protocol, words)):
         return
-    yield Heading(words("section.reasons"), page_break=True, label=_ALL_REASONS)
+    yield SectionHeading(words("section.reasons"), page_break=True, label=_ALL_REASONS)
     for outcome, sentences in _reasons(protocol, words):
-        yield Heading(words(f"verdict.why_{outcome}"), level=2)
+        yield SectionHeading(words(f"verdict.why_{outcome}"), level=2)
         yield Items(tuple(map(plain, sentences)))
 
 
@@ -217,7 +217,7 @@ def _unstated(protocol: Protocol, profiles: Iterable[ForceProfile], words: Words
 
 
 def _machine(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.machine"), page_break=True)
+    yield SectionHeading(words("section.machine"), page_break=True)
     plan = protocol.plan
     rows = [
         (words(f"field.{item.name}"), plain(words.value(getattr(part, item.name) or None)))
@@ -232,7 +232,7 @@ def _machine(protocol: Protocol, words: Words) -> Iterator[Block]:
 
 
 def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.instruments"))
+    yield SectionHeading(words("section.instruments"))
     names = ("quantity", "model", "serial_number", "range", "accuracy_class", "sample_rate", "filter")
     columns = tuple(words(f"column.{name}") for name in (*names, "calibrated_on", "calibration_valid_until"))
     rows = []
@@ -252,7 +252,7 @@ def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
 
 
 def _plan(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.plan"))
+    yield SectionHeading(words("section.plan"))
     names = ("point", "position", "region", "obstacle", "stiffness", "area", "speed", "repetitions")
     columns = tuple(words(f"column.{name}") for name in names)
     rows = []
@@ -266,10 +266,10 @@ def _plan(protocol: Protocol, words: Words) -> Iterator[Block]:
 
 
 def _results(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.results"))
+    yield SectionHeading(words("section.results"))
     yield Paragraph(words("text.results"), "note")
     for point in protocol.points:
-        yield Heading(plain(point.point.name), level=2)
+        yield SectionHeading(plain(point.point.name), level=2)
         yield from _matrix(point, words)
 
 
@@ -285,7 +285,9 @@ def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
             yield _forces(point, point.profile, point.verdict, steps[begin : begin + _STEPS_IN_TABLE], words)
 
 
-def _forces(point: PointAssessment, profile: ForceProfile, verdict: PointVerdict, steps: range, words: Words) -> Grid:
+def _forces(
+    point: PointAssessment, profile: ForceProfile, verdict: PointVerdict, steps: range, words: Words
+) -> HeadedTable:
     """Return the table of some steps: a row for each repetition, then their mean and the limits."""
     items = point.repetitions
     kind = "mean" if profile.average_of > 1 else "highest"
@@ -328,21 +330,21 @@ def _curves(protocol: Protocol, words: Words) -> Iterator[Block]:
     shown = [point for point in protocol.points if point.profile and point.repetitions]
     if not shown:
         return
-    yield Heading(words("section.curves"), page_break=True)
+    yield SectionHeading(words("section.curves"), page_break=True)
     for point in shown:
         assert point.profile is not None
-        yield Heading(plain(point.point.name), level=2)
+        yield SectionHeading(plain(point.point.name), level=2)
         names = {"point": plain(point.point.name), "profile": point.profile.name}
         for svg, count in curve_drawings(point, words):
-            yield Curves(svg, words("text.curve_caption", **names), words("text.curve_alt", count=count, **names))
+            yield CurveDrawing(svg, words("text.curve_caption", **names), words("text.curve_alt", count=count, **names))
         if pressures := pressure_curves(point):
             for svg, count in curve_drawings(pressures, words, "curve.pressure"):
                 alt = words("text.pressure_curve_alt", count=count, **names)
-                yield Curves(svg, words("text.pressure_curve_caption", **names), alt)
+                yield CurveDrawing(svg, words("text.pressure_curve_caption", **names), alt)
 
 
 def _latencies(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.latencies"))
+    yield SectionHeading(words("section.latencies"))
     known = [item for point in protocol.points for item in point.repetitions if item.latencies_ms]
     if not known:
         yield Paragraph(words("text.no_latencies"))
@@ -360,7 +362,7 @@ def _latencies(protocol: Protocol, words: Words) -> Iterator[Block]:
 
 
 def _checks(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.checks"))
+    yield SectionHeading(words("section.checks"))
     if protocol.plan.instruments:
         columns = [words(f"column.{name}") for name in ("model", "calibration_valid_until", "valid_on_test_day")]
         rows = [
@@ -378,7 +380,7 @@ def _checks(protocol: Protocol, words: Words) -> Iterator[Block]:
     if rows:
         yield _grid(columns, rows, widths=(5, 2, 5, 5, 3, 3, 5, 3, 2), numeric=(1, 2, 3, 6, 7, 8))
     if pressures := pressure_checks(protocol.points, protocol.plan.pressure_instrument, words):
-        yield Heading(words("section.pressure_checks"), level=2)
+        yield SectionHeading(words("section.pressure_checks"), level=2)
         names = (*names[:6], "largest_pressure", "pressure_rest", "pressure_drift")
         rows = [_row(words, *row) for row in pressures]
         yield _grid(
@@ -423,7 +425,7 @@ def _needed(measured: float, needed: float, words: Words) -> str:
 
 
 def _deviations(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.deviations"))
+    yield SectionHeading(words("section.deviations"))
     rows = [
         _row(words, f"{item.point}: {item.text}" if item.point else item.text, item.reason)
         for item in protocol.plan.deviations
@@ -441,9 +443,9 @@ def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
     profiles = {point.profile.name: point.profile for point in protocol.points if point.profile}
     if not profiles:
         return
-    yield Heading(words("section.limits"))
+    yield SectionHeading(words("section.limits"))
     for profile in profiles.values():
-        yield Heading(plain(profile.name), level=2)
+        yield SectionHeading(plain(profile.name), level=2)
         checked = words("document.yes" if profile.checked else "document.no")
         yield Facts(
             (
@@ -479,7 +481,7 @@ def _measuring(profile: ForceProfile, words: Words) -> Iterator[tuple[str, str]]
 
 
 def _provenance(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.provenance"))
+    yield SectionHeading(words("section.provenance"))
     yield Paragraph(words("text.provenance", version=protocol.tool_version))
     yield Paragraph(plain(protocol.command), "code")
     columns = [words(f"column.{name}") for name in ("file", "role", "sha256")]
@@ -490,7 +492,7 @@ def _provenance(protocol: Protocol, words: Words) -> Iterator[Block]:
 
 
 def _signatures(protocol: Protocol, words: Words) -> Iterator[Block]:
-    yield Heading(words("section.signature"))
+    yield SectionHeading(words("section.signature"))
     yield Paragraph(words("text.signature"))
     people = ((words("sign.tester"), plain(protocol.plan.test.tester)), (words("sign.reviewer"), ""))
     yield Signatures(people, words("sign.place_date"), words("sign.signature"))
@@ -508,6 +510,6 @@ def _grid(
     numeric: Sequence[int] = (),
     strong: Sequence[int] = (),
     typed: Sequence[int] = (),
-) -> Grid:
+) -> HeadedTable:
     is_numeric = tuple(number in numeric for number in range(len(columns)))
-    return Grid(tuple(columns), tuple(rows), is_numeric, tuple(widths), tuple(strong), tuple(typed))
+    return HeadedTable(tuple(columns), tuple(rows), is_numeric, tuple(widths), tuple(strong), tuple(typed))

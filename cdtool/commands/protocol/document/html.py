@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cdtool.commands.protocol.document.blocks import Curves, Document
+from cdtool.commands.protocol.document.blocks import CurveDrawing, Document
 from cdtool.report.html.self_contained import content_policy
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def to_html(document: Document) -> str:
         document=document,
         policy=content_policy(style),
         style=Markup(style),
-        images=[_data_url(block.svg) if isinstance(block, Curves) else "" for block in document.blocks],
+        images=[_data_url(block.svg) if isinstance(block, CurveDrawing) else "" for block in document.blocks],
     )
 
 

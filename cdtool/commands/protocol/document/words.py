@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.base.plain_text import digits_beside
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind
 
 LANGUAGES = ("en", "de")
 _FOLDER = Path(__file__).with_name("texts")
@@ -103,7 +103,7 @@ class Words:
             values["keys"] = values.pop("key")
         return self(f"reason.{reason.kind.value}", **values)
 
-    def reasons(self, verdict: Verdict, outcome: str) -> list[str]:
+    def reasons(self, verdict: ProtocolVerdict, outcome: str) -> list[str]:
         """Return the reasons for an outcome as sentences; values that are not filled in are listed in one."""
         found = [reason for reason in verdict.reasons if reason.kind.outcome == outcome]
         empty = [reason for reason in found if reason.kind is ReasonKind.NO_VALUE]

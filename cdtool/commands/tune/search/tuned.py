@@ -110,7 +110,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class Step:
+class TuningStep:
     """What a part of the search contributed: the share by which the cost fell, the others as they were before."""
 
     name: str
@@ -165,7 +165,7 @@ class TunedDetector:
     default_nested: ChoiceResults | None
     default_reason: str
     sensitivities: tuple[Sensitivity, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[TuningStep, ...]
     pareto: tuple[ParetoPoint, ...]
     candidates: int
     unusable: dict[str, str]
@@ -274,7 +274,7 @@ def _number(value: Any) -> float:
     return float(value[0] if isinstance(value, tuple) else value)
 
 
-def steps_of(searched: Searched, best: Scored) -> tuple[Step, ...]:
+def steps_of(searched: Searched, best: Scored) -> tuple[TuningStep, ...]:
     """Return what debounce, threshold and gains contributed, one after the other; none without a usable default."""
     found = searched.subsets[0]
     if not math.isfinite(found.default.score):
@@ -292,7 +292,7 @@ def steps_of(searched: Searched, best: Scored) -> tuple[Step, ...]:
     scores.append(min(scores[-1], best.score))
     names = ("debounce", "threshold", "gains")
     return tuple(
-        Step(name, 1.0 - math.exp(after - before))
+        TuningStep(name, 1.0 - math.exp(after - before))
         for name, before, after in zip(names, scores[:-1], scores[1:], strict=True)
     )
 

@@ -21,7 +21,7 @@ from cdtool.commands.identify.axis.filtered_regression import filter_run
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisSettings, identify_rigid_axis
 from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.machines.axis_model.axis_run import AxisRun
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 
 PERIOD = 2e-3
@@ -98,7 +98,7 @@ def test_a_speed_for_a_short_time_is_not_held():
 
 # An axis with a screw, as the simulated axis has it; its friction depends on the position, too.
 AXIS = AxisModel(
-    drive=Drive(load_mass=95.0),
+    drive=ElasticDrive(load_mass=95.0),
     friction=Friction(
         coulomb_forward=20.0, coulomb_backward=24.0, static=24.0, stribeck_speed=1e-3, viscous=200.0, offset=-3.0
     ),

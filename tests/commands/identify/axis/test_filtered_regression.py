@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
 from cdtool.commands.identify.axis.filtered_regression import (
-    Loss,
     LowPass,
+    ResidualLoss,
     block_covariance,
     filter_run,
     fit_linear,
@@ -152,7 +152,7 @@ def test_instruments_remove_the_bias_of_noise_in_the_regressors():
     assert cured.coefficients[0] == pytest.approx(3.0, rel=0.01)
 
 
-@pytest.mark.parametrize("loss", [Loss.HUBER, Loss.SOFT_L1])
+@pytest.mark.parametrize("loss", [ResidualLoss.HUBER, ResidualLoss.SOFT_L1])
 def test_outliers_count_less_with_a_robust_loss(loss):
     rng = np.random.default_rng(3)
     regressors = np.column_stack((rng.standard_normal(2000), np.ones(2000)))
@@ -243,7 +243,7 @@ def test_samples_between_those_of_a_jittered_clock_do_not_hide_the_noise():
     assert white_noise(signal) == pytest.approx(1e-4 / math.sqrt(3.0) / math.sqrt(2.0), rel=0.2)
 
 
-@pytest.mark.parametrize("loss", [Loss.HUBER, Loss.SOFT_L1])
+@pytest.mark.parametrize("loss", [ResidualLoss.HUBER, ResidualLoss.SOFT_L1])
 def test_rounding_errors_do_not_choose_the_robust_weights(loss):
     regressors = np.column_stack((np.arange(1.0, 201.0), np.ones(200)))
     exact = regressors @ [3.0, 2.0]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.identify.axis.filtered_regression import Loss
+from cdtool.commands.identify.axis.filtered_regression import ResidualLoss
 from cdtool.commands.identify.axis.friction_curve import FrictionForm
 from cdtool.commands.identify.axis.rigid_axis import (
     RigidAxisFit,
@@ -248,7 +248,7 @@ def test_rotary_units_and_the_joint_are_passed_on():
     assert {item.joint for item in fit.identified.estimates} == {2}
 
 
-@pytest.mark.parametrize("loss", list(Loss))
+@pytest.mark.parametrize("loss", list(ResidualLoss))
 def test_speed_alone_is_enough(loss):
     runs = [
         replace(run, position=None, speed=np.gradient(run.position, run.period)) for run in clean(period=2e-3, count=2)
@@ -275,7 +275,8 @@ def test_a_robust_loss_ignores_bursts_of_wrong_torque():
     for run in runs:
         run.torque[200::300] += 400.0
     plain, robust = (
-        identify_rigid_axis(runs, 0.0, RigidAxisSettings(loss=loss)) for loss in (Loss.SQUARES, Loss.HUBER)
+        identify_rigid_axis(runs, 0.0, RigidAxisSettings(loss=loss))
+        for loss in (ResidualLoss.SQUARES, ResidualLoss.HUBER)
     )
     assert abs(robust.total_mass - 80.0) < 0.5
     assert abs(plain.total_mass - 80.0) > 2.0 * abs(robust.total_mass - 80.0)

@@ -10,7 +10,7 @@ import pytest
 from cdtool.commands.identify.axis.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Missing
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
 from cdtool.machines.axis_model.sensor_filters import first_order_low_pass
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 from tests.synthetic.gate_runs import GATE, free_runs, on_any_track
@@ -128,7 +128,7 @@ def test_missing_samples_do_not_matter() -> None:
 def test_a_rigid_drive_is_not_given_a_stiffness() -> None:
     """The starts of one mass with the motor's part of it stated: an elastic drive would fit noise and friction."""
     model = AxisModel(
-        drive=Drive(load_mass=160.0),
+        drive=ElasticDrive(load_mass=160.0),
         friction=Friction(coulomb_forward=40.0, coulomb_backward=40.0, static=50.0),
         controller=Controller(period=1e-3, speed_gain=4000.0, integral_gain=20_000.0),
     )
@@ -163,7 +163,7 @@ def test_a_damped_drive_keeps_its_one_stiffness(number: int) -> None:
 
 def test_a_stated_low_pass_of_the_torque_is_undone() -> None:
     model = AxisModel(
-        drive=Drive(motor_mass=150.0, load_mass=300.0, stiffness=9e4, damping=150.0),
+        drive=ElasticDrive(motor_mass=150.0, load_mass=300.0, stiffness=9e4, damping=150.0),
         friction=Friction(coulomb_forward=60.0, coulomb_backward=60.0, static=60.0),
         controller=Controller(period=1e-3, speed_gain=4000.0, integral_gain=20_000.0),
     )

@@ -16,7 +16,7 @@ from cdtool.commands.identify.contact.load_cell_contact import LoadCellContact, 
 from cdtool.commands.identify.estimate import IdentificationError, Method, Missing
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
-from cdtool.machines.axis_model.parameters import AxisModel, Drive
+from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.recordings.recording import Contact, Recording, Series
 from tests.machines.axis_model.gate_as_model import gate_as_model, stiff_obstacle
@@ -32,7 +32,7 @@ MODEL = replace(
         coulomb_backward=GATE.coulomb_friction + GATE.motor_friction,
         static=GATE.static_friction + GATE.motor_friction,
     ),
-    drive=Drive(
+    drive=ElasticDrive(
         motor_mass=GATE.motor_mass,
         load_mass=600.0,
         stiffness=GATE.take_up_stiffness,
@@ -222,7 +222,7 @@ def test_a_torque_that_does_not_belong_to_the_contact_is_refused() -> None:
 def test_without_contacts_or_stiffness_nothing_is_identified() -> None:
     with pytest.raises(IdentificationError, match="no contact with a load cell"):
         identify_contacts([], MODEL)
-    rigid = replace(MODEL, drive=Drive(load_mass=1000.0))
+    rigid = replace(MODEL, drive=ElasticDrive(load_mass=1000.0))
     with pytest.raises(IdentificationError, match="first stiffness"):
         identify_contacts(prepared(contacts(count=1)), rigid)
 

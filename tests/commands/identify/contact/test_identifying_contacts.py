@@ -14,7 +14,7 @@ from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.inject.assumption import Assumption, assumptions_of
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.machines.axis_model.model_table import axis_model
-from cdtool.machines.axis_model.parameters import AxisModel, Controller, Drive, Friction
+from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 from tests.command import cdtool as command
 from tests.commands.identify.axis.test_torque_constant import SCALE, pressed
@@ -69,7 +69,7 @@ def write_free(path: Path, seed: int) -> None:
     controller = Controller(period=1e-3, speed_gain=8000.0, integral_gain=40_000.0)
     friction = Friction(coulomb_forward=30.0, coulomb_backward=30.0, viscous=40.0)
     motion = simulate_axis(
-        AxisModel(drive=Drive(load_mass=MASS), friction=friction, controller=controller), AxisInputs(speed)
+        AxisModel(drive=ElasticDrive(load_mass=MASS), friction=friction, controller=controller), AxisInputs(speed)
     )
     noise = np.random.default_rng(seed).standard_normal(len(time))
     write(path, time, (motion["drive_force"] + noise) / SCALE, motion["motor_speed"], np.zeros(len(time)))

@@ -16,7 +16,7 @@ from cdtool.commands.identify.robot.base_parameters import (
     independent_norms,
     random_rows,
 )
-from cdtool.commands.identify.robot.robot_regressor import Group, Regressor, regressor_of, stacked_torque
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, Regressor, regressor_of, stacked_torque
 from cdtool.machines.coupled import CoupledMachine
 from tests.commands.identify.robot_motion import PANDA_JOINTS, panda, panda_urdf, planar_arm
 from tests.synthetic.robots import six_joint_robot
@@ -35,8 +35,8 @@ def states(joints: int, count: int = 30) -> FloatArray:
     return np.random.default_rng(5).normal(size=(3, count, joints))
 
 
-def inertial(regressor: Regressor, *groups: Group) -> tuple[int, ...]:
-    wanted = groups or (Group.INERTIAL,)
+def inertial(regressor: Regressor, *groups: ColumnGroup) -> tuple[int, ...]:
+    wanted = groups or (ColumnGroup.INERTIAL,)
     return tuple(i for i, column in enumerate(regressor.columns) if column.group in wanted)
 
 
@@ -54,7 +54,10 @@ def test_momentum_and_rest_are_linear_in_the_same_parameters(name: str, tmp_path
     machine = machine_of(name, tmp_path)
     regressor = regressor_of(machine)
     position, speed, _ = states(len(machine.joints))
-    parts = [regressor.momentum(i, position, speed) for i in inertial(regressor, Group.INERTIAL, Group.DRIVE_INERTIA)]
+    parts = [
+        regressor.momentum(i, position, speed)
+        for i in inertial(regressor, ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA)
+    ]
     values = regressor.values[: len(parts)]
     momentum, velocity_force, gravity = machine.momentum_terms(position, speed)
     np.testing.assert_allclose(sum(v * p for v, (p, _) in zip(values, parts, strict=True)), momentum, atol=1e-11)
@@ -92,7 +95,7 @@ def test_a_panda_has_43_base_parameters_and_grouped_inertias(tmp_path: Path) -> 
 def test_base_parameters_explain_every_motion_as_all_parameters_do(name: str, tmp_path: Path) -> None:
     machine = machine_of(name, tmp_path)
     regressor = regressor_of(machine)
-    columns = inertial(regressor, Group.INERTIAL, Group.DRIVE_INERTIA)
+    columns = inertial(regressor, ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA)
     grouping = group_columns(regressor, columns)
     values = np.random.default_rng(8).normal(size=len(columns))
     motion = states(len(machine.joints))
@@ -105,8 +108,8 @@ def test_base_parameters_explain_every_motion_as_all_parameters_do(name: str, tm
 def test_a_drive_on_a_vertical_axis_cannot_be_told_from_its_link(tmp_path: Path) -> None:
     pytest.importorskip("pinocchio")
     regressor = regressor_of(panda(tmp_path))
-    grouping = group_columns(regressor, inertial(regressor, Group.INERTIAL, Group.DRIVE_INERTIA))
-    drives = inertial(regressor, Group.DRIVE_INERTIA)
+    grouping = group_columns(regressor, inertial(regressor, ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA))
+    drives = inertial(regressor, ColumnGroup.DRIVE_INERTIA)
     assert not grouping.is_alone(drives[0])
     assert grouping.is_alone(drives[6])
 
@@ -147,7 +150,7 @@ def test_the_condition_number_does_not_depend_on_units() -> None:
 
 def test_random_rows_stay_within_the_limits() -> None:
     regressor = regressor_of(planar_arm())
-    viscous = inertial(regressor, Group.VISCOUS)
+    viscous = inertial(regressor, ColumnGroup.VISCOUS)
     rows = random_rows(regressor, viscous, Range((0.5, 2.0), (1.0, 1.0)))
     assert 0.45 < np.abs(rows[:, 0]).max() <= 0.5
     assert 1.9 < np.abs(rows[:, 1]).max() <= 2.0

@@ -21,7 +21,7 @@ from cdtool.commands.identify.robot.consistent_inertia import (
     pseudo_inertia,
 )
 from cdtool.commands.identify.robot.robot_dynamics import RobotFit, RobotParameters, identify_robot
-from cdtool.commands.identify.robot.robot_regressor import Group, body_parameters, regressor_of, with_bodies
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, body_parameters, regressor_of, with_bodies
 from cdtool.machines.urdf_robot import UrdfRobot
 from tests.commands.identify.robot_motion import coloured, fourier, planar_arm
 from tests.synthetic.robots import six_joint_robot
@@ -98,7 +98,7 @@ def base_of(fit: RobotFit) -> FloatArray:
 
 
 def links(fit: RobotFit) -> FloatArray:
-    inertial = [i for i, column in enumerate(fit.columns) if column.group is Group.INERTIAL]
+    inertial = [i for i, column in enumerate(fit.columns) if column.group is ColumnGroup.INERTIAL]
     return fit.parameters[inertial].reshape(-1, 10)
 
 

@@ -12,7 +12,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Missing
 from cdtool.commands.identify.robot.robot_dynamics import RobotFit, RobotParameters, fitted_robot, identify_robot
-from cdtool.commands.identify.robot.robot_regressor import Group, regressor_of
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from tests.commands.identify.robot_motion import (
@@ -278,5 +278,7 @@ def test_a_log_at_rest_identifies_nothing(arm) -> None:
 def test_every_free_column_is_answered_once() -> None:
     fit = identify_robot([fourier(17, 2).run(PLANAR, 0.1 * coloured(17, (4000, 2), 5.0))], PLANAR, EVERYTHING)
     keys = [(item.key, item.joint) for item in (*fit.identified.estimates, *fit.identified.not_identifiable)]
-    wanted = {(group.value, j) for group in (Group.VISCOUS, Group.COULOMB, Group.CONSTANT) for j in (0, 1)}
+    wanted = {
+        (group.value, j) for group in (ColumnGroup.VISCOUS, ColumnGroup.COULOMB, ColumnGroup.CONSTANT) for j in (0, 1)
+    }
     assert sorted(keys) == sorted(wanted)

@@ -19,7 +19,7 @@ from cdtool.commands.protocol.assessment.plan import (
     TestPlan,
     empty_entries,
 )
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.limits import read_force_limits
 from cdtool.truth.force.verdict import averaged
@@ -282,7 +282,7 @@ def test_a_contact_that_never_ends_has_an_infinite_dynamic_and_total_time():
 
 def test_fail_beats_incomplete_and_incomplete_beats_pass_and_all_reasons_stay():
     fail, open_item = Reason(ReasonKind.POINT_EXCEEDS), Reason(ReasonKind.NO_VALUE)
-    assert [Verdict(reasons).outcome for reasons in ((), (open_item,), (open_item, fail))] == [
+    assert [ProtocolVerdict(reasons).outcome for reasons in ((), (open_item,), (open_item, fail))] == [
         "pass",
         "incomplete",
         "fail",
@@ -298,7 +298,7 @@ def test_fail_beats_incomplete_and_incomplete_beats_pass_and_all_reasons_stay():
 
 @given(st.lists(st.sampled_from(list(ReasonKind)), max_size=6))
 def test_no_reason_is_ever_outvoted(kinds):
-    verdict = Verdict(tuple(Reason(kind) for kind in kinds))
+    verdict = ProtocolVerdict(tuple(Reason(kind) for kind in kinds))
     assert (verdict.outcome == "pass") == (not kinds)
     assert (verdict.outcome == "fail") == bool(FAILING & set(kinds))
     assert len(verdict.of("fail")) + len(verdict.of("incomplete")) == len(kinds)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
 from cdtool.base.findings import Finding
+from cdtool.commands.protocol.assessment.assessment import speed_reasons
 from cdtool.commands.protocol.assessment.plan import MeasuringPoint
 from cdtool.commands.protocol.assessment.speed import speed_before
-from cdtool.commands.protocol.assessment.speed_reasons import speed_reasons
 from cdtool.recordings.clock import differentiate
 from cdtool.recordings.recording import Contact, Recording, Series
 

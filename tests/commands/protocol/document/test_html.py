@@ -12,7 +12,7 @@ import pytest
 from cdtool.commands.protocol.assessment.assessment import Repetition, assess_point, judge
 from cdtool.commands.protocol.assessment.plan import MachineParticulars
 from cdtool.commands.protocol.assessment.protocol import Protocol
-from cdtool.commands.protocol.document.blocks import Grid
+from cdtool.commands.protocol.document.blocks import HeadedTable
 from cdtool.commands.protocol.document.document import protocol_document
 from cdtool.commands.protocol.document.html import to_html
 from cdtool.commands.protocol.document.words import words_of
@@ -66,10 +66,10 @@ def with_profile(protocol: Protocol, profile: ForceProfile) -> Protocol:
     return replace(protocol, points=points, verdict=judge(protocol.plan, points, "protocol.toml"))
 
 
-def forces(protocol: Protocol) -> list[Grid]:
+def forces(protocol: Protocol) -> list[HeadedTable]:
     """Return the tables of forces."""
     blocks = protocol_document(protocol).blocks
-    return [item for item in blocks if isinstance(item, Grid) and item.columns[:2] == ("No.", "Recording")]
+    return [item for item in blocks if isinstance(item, HeadedTable) and item.columns[:2] == ("No.", "Recording")]
 
 
 @pytest.mark.parametrize(("count", "tables"), [(1, 1), (2, 1), (4, 1), (9, 2)])

@@ -11,8 +11,8 @@ import pytest
 
 from cdtool.base.errors import UsageError
 from cdtool.commands.protocol.assessment.protocol import Protocol
-from cdtool.commands.protocol.assessment.reasons import Reason, Verdict
-from cdtool.commands.protocol.document.blocks import Grid, Heading, Items
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason
+from cdtool.commands.protocol.document.blocks import HeadedTable, Items, SectionHeading
 from cdtool.commands.protocol.document.document import protocol_document
 from cdtool.commands.protocol.document.pdf import to_pdf
 from cdtool.commands.protocol.document.words import words_of
@@ -61,7 +61,7 @@ def test_headings_tables_lists_and_figures_are_tagged_as_such(documents, pypdf):
     root = pypdf.PdfReader(io.BytesIO(to_pdf(document))).trailer["/Root"]
     kinds = structure(root["/StructTreeRoot"])
     assert kinds.count("/H1") == 1
-    assert kinds.count("/H2") == sum(isinstance(item, Heading) and item.level == 1 for item in document.blocks)
+    assert kinds.count("/H2") == sum(isinstance(item, SectionHeading) and item.level == 1 for item in document.blocks)
     assert kinds.count("/Figure") == 1 and {"/L", "/LI", "/Table", "/TR", "/TH", "/TD"} <= set(kinds)
 
 
@@ -105,7 +105,7 @@ def test_the_text_holds_every_cell_of_the_document(name, documents, pypdf):
     document = documents[name]
     reader = pypdf.PdfReader(io.BytesIO(to_pdf(document)))
     text = squeezed("".join(page.extract_text() for page in reader.pages))
-    cells = [cell for block in document.blocks if isinstance(block, Grid) for row in block.rows for cell in row]
+    cells = [cell for block in document.blocks if isinstance(block, HeadedTable) for row in block.rows for cell in row]
     assert len(cells) > 60
     assert [cell for cell in cells if squeezed(cell) not in text] == []
 
@@ -123,7 +123,7 @@ def test_names_and_numbers_can_be_searched_and_copied_unless_a_name_is_longer_th
 @pytest.mark.parametrize("times", [1, 2, 4])
 def test_no_heading_is_the_last_text_of_a_page(times, protocols, pypdf):
     document = protocol_document(many(protocols["fail"], times))
-    headings = {squeezed(item.text) for item in document.blocks if isinstance(item, Heading)}
+    headings = {squeezed(item.text) for item in document.blocks if isinstance(item, SectionHeading)}
     for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages:
         lines = [squeezed(line) for line in page.extract_text().splitlines() if line.strip()]
         footer = next(n for n, line in enumerate(lines) if line.startswith("Daten(SHA256)"))
@@ -145,7 +145,7 @@ def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, p
         for item in point.reasons
     )
     plan = replace(made.plan, language="en", points=tuple(item.point for item in points))
-    document = protocol_document(replace(made, plan=plan, points=points, verdict=Verdict(reasons)))
+    document = protocol_document(replace(made, plan=plan, points=points, verdict=ProtocolVerdict(reasons)))
     pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages]
     first = " ".join(pages[0].split())
     assert first.index("Nebenschließkante 0") < first.index("To be observed")
@@ -158,7 +158,7 @@ def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, p
 
 
 def test_a_few_reasons_are_listed_once(documents):
-    headings = [item.text for item in documents["incomplete"].blocks if isinstance(item, Heading)]
+    headings = [item.text for item in documents["incomplete"].blocks if isinstance(item, SectionHeading)]
     assert "All reasons" not in headings and "What is incomplete" in headings
 
 

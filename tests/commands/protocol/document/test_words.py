@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Verdict
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind
 from cdtool.commands.protocol.document.words import LANGUAGES, words_of
 from cdtool.truth.force.limits import read_force_limits
 from cdtool.truth.force.verdict import CauseKind, StepCause
@@ -82,7 +82,7 @@ def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
 
 def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():
     reasons = tuple(Reason(ReasonKind.NO_VALUE, {"key": key, "file": "p.toml"}) for key in ("a", "b"))
-    assert words_of("en").reasons(Verdict(reasons), "incomplete") == ["Missing in p.toml: a, b"]
+    assert words_of("en").reasons(ProtocolVerdict(reasons), "incomplete") == ["Missing in p.toml: a, b"]
 
 
 def test_no_value_of_a_reason_is_rounded_across_its_limit():

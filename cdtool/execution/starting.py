@@ -1,4 +1,4 @@
-"""Ctrl-C while processes start: it waits, and does not reach them before they ignore it.
+"""How processes start: whether they share memory, and Ctrl-C, which does not reach them before they ignore it.
 
 A terminal sends it to all processes. Python prints where it interrupted a process that has not finished its start.
 """
@@ -6,8 +6,18 @@ A terminal sends it to all processes. Python prints where it interrupted a proce
 from __future__ import annotations
 
 import signal
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+
+def shares_memory() -> bool:
+    """Return whether processes that are started now are forked and share the memory of this one.
+
+    A fork with other threads could keep a lock for ever.
+    """
+    return sys.platform == "linux" and threading.active_count() == 1
 
 
 @contextmanager
@@ -31,3 +41,8 @@ def ignore_interruption() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def dask_setup(_: object) -> None:
+    """Ignore Ctrl-C in a worker process of `--cluster local`; called by Dask's `preload`."""
+    ignore_interruption()
