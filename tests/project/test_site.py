@@ -112,7 +112,14 @@ def test_every_function_and_field_is_on_a_generated_page(pages):
             continue
         assert f".. autofunction:: cdtool.{name}\n" in pages["reference/python/functions"]
         assert re.search(rf"\[`cdtool\.{name}`\]\([^)]*\) \| \w", pages["reference/python/index"]), name
-    for name in ("BenchmarkResult", "BenchmarkPlots", "DetectionResult", "DetectionResults", "Learned", "Recording"):
+    for name in (
+        "BenchmarkResult",
+        "BenchmarkPlots",
+        "DetectionResult",
+        "DetectionResults",
+        "LearnedSignature",
+        "Recording",
+    ):
         assert re.search(rf"^## {name}$", pages["reference/python/results"], re.MULTILINE), name
     assert not re.search(r"^## (Benchmark|Score|DetectedRuns)$", pages["reference/python/results"], re.MULTILINE)
     schema = json.loads((DOCS / "results.schema.json").read_text(encoding="utf-8"))

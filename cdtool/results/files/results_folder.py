@@ -253,8 +253,8 @@ def _hints(kind: Any) -> dict[str, Any]:
 def _encodable(value: Any) -> Any:
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode("utf-8")
-    if isinstance(value, list | tuple):
-        return [_encodable(item) for item in value]
+    if isinstance(value, list | tuple):  # the pairs of a map are tuples
+        return type(value)(map(_encodable, value))
     if isinstance(value, dict):
         return {_encodable(name): _encodable(item) for name, item in value.items()}
     return value

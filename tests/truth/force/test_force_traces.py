@@ -86,7 +86,7 @@ def test_a_contact_ends_where_the_next_begins_and_each_has_its_verdict(hit, cont
 
 
 def test_an_operation_of_a_cut_log_finds_the_logs_verdict(hit, contacts):
-    trace = replace(traced(hit, contacts), recording=f"{hit.name}#1")
+    trace = replace(traced(hit, contacts), recording=f"{hit.name}#1", operation=1)
     assert len(traced_forces(scored(hit, contacts), [trace])) == 1
 
 
