@@ -82,7 +82,7 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except CdtoolError as fault:
-        if not fault.message.startswith(str(path)):
+        if not fault.message.startswith((f"{path}: ", f"{path}#", f"{path}/")):
             fault.message = f"{path}: {fault.message}"
         raise
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import shutil
 import signal
 import socket
 import tempfile
@@ -119,7 +120,7 @@ def serve(
         inherited.close()
     ignore_interruption()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_end_with, args=(first,), daemon=True).start()
+    threading.Thread(target=_end_with, args=(first, folder), daemon=True).start()
     tempfile.tempdir = folder
     keep_freed_memory()
     items = pipe.makefile("rb")
@@ -134,7 +135,9 @@ def _send(pipe: socket.socket, content: bytes) -> None:
     pipe.sendall(len(content).to_bytes(HEADER) + content)
 
 
-def _end_with(first: Connection) -> None:
+def _end_with(first: Connection, folder: str) -> None:
+    """End with the first process, and remove the folder for temporary files."""
     with suppress(EOFError, OSError):
         first.recv_bytes()
+    shutil.rmtree(folder, ignore_errors=True)
     os._exit(1)

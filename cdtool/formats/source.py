@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -70,3 +71,12 @@ class Format(Protocol):
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError."""
         ...
+
+
+def stated_origin(text: str | bytes) -> float:
+    """Return the origin [s] that a file states; 0 for anything else, as after an edit by hand."""
+    try:
+        origin = float(text)
+    except ValueError:
+        return 0.0
+    return origin if math.isfinite(origin) else 0.0

@@ -30,14 +30,14 @@ _PAUSE_SECONDS = 0.01
 _LOCKED_BYTE = 1 << 40
 # Two names of one error on Linux, of two on macOS.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EINVAL)
-_NAME = re.compile(r"\.cdtool-(?P<key>[0-9a-f]{16})(-[0-9a-f]{16}\.tmp|\.lock)")
+_NAME = re.compile(r"\.cdtool-(?P<key>[0-9a-f]{16})(-[0-9a-f]{16}\.(tmp|old)|\.lock)")
 # The locks of this process: lock file -> its handle, which is None before the file is open.
 _handles: dict[tuple[Path, int], int | None] = {}
 
 
-def temporary_name(target: Path, folder: Path) -> Path:
-    """Return an unused name in `folder` for a file that will become `target`."""
-    return folder / f".cdtool-{_key(target)}-{secrets.token_hex(8)}.tmp"
+def temporary_name(target: Path, folder: Path, suffix: str = ".tmp") -> Path:
+    """Return an unused name in `folder` for a file that will become `target`, or with ".old" for what it was before."""
+    return folder / f".cdtool-{_key(target)}-{secrets.token_hex(8)}{suffix}"
 
 
 def is_temporary(name: str) -> bool:
@@ -167,7 +167,10 @@ def _release(mine: tuple[Path, int]) -> None:
 
 
 def _remove_left_behind(folder: Path, own: tuple[Path, int]) -> None:
-    """Remove temporary files and locks of dead writers: those whose lock is free, and those of the lock held."""
+    """Remove temporary files and locks of dead writers: those whose lock is free, and those of the lock held.
+
+    What a file was before is only removed by a writer of that file.
+    """
     found: dict[Path, list[Path]] = {}
     for path in folder.iterdir():
         if match := _NAME.fullmatch(path.name):
@@ -179,7 +182,7 @@ def _remove_left_behind(folder: Path, own: tuple[Path, int]) -> None:
         other = (lock, -own[1])
         try:
             if _try(other):
-                _remove(path for path in paths if path != lock)
+                _remove(path for path in paths if path.suffix == ".tmp")
         except OSError:
             continue  # unknown: leave it
         finally:

@@ -298,28 +298,31 @@ def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
     """Rename each file to its target; if one fails, undo the others.
 
     Killed meanwhile, the process leaves no old file beside a new one: all but the first are set aside before that is
-    replaced.
+    replaced. What cannot be put back, because the file system refuses that too, stays under its hidden name.
     """
-    old = {target: temporary_name(target, part.parent) for part, target in pairs if target.exists()}
-    _temporaries.update(old.values())
+    existing = [target for _, target in pairs if target.exists()]
+    old = {target: temporary_name(target, pairs[0][0].parent, ".old") for target in existing if len(pairs) > 1}
     try:
-        for _, target in pairs[1:]:
-            if target in old:
-                target.rename(old[target])
+        for target in (target for _, target in pairs[1:] if target in old):
+            target.rename(old[target])
         for part, target in pairs:
-            if target in old and len(pairs) > 1:
-                with suppress(OSError):  # it is set aside; a file system without hard links
+            if target in old and not old[target].exists():
+                try:
                     os.link(target, old[target])
+                except OSError:  # a file system without hard links, or a folder
+                    target.rename(old[target])
             part.replace(target)
     except BaseException:
         for part, target in reversed(pairs):
-            if target in old and old[target].exists():
-                old[target].replace(target)
-            elif target not in old and not part.exists():
-                _remove(target)
+            with suppress(OSError):
+                if target in old and part.exists() and target.exists():
+                    _remove(old[target])
+                elif target in old:
+                    old[target].replace(target)
+                elif target not in existing and not part.exists():
+                    _remove(target)
         raise
-    finally:
-        _discard(list(old.values()))
+    _discard(list(old.values()))
 
 
 def _put_whole(part: Path, target: Path) -> bool:

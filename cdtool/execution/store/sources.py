@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cdtool.base.remote.remote_path import is_remote, version_of
+from cdtool.base.remote.remote_path import is_remote, relative_name, version_of
 
 # Read at a time [bytes].
 _PIECE = 1 << 20
@@ -20,18 +20,30 @@ State = tuple[tuple[int, int], ...] | None
 class SourceFile:
     """One file of a log: its size [bytes], when it was last changed [ns], and the SHA-256 of its content.
 
-    Of a file at a URL the digest is that of its ETag and size, so that its content need not be read.
+    Of a file at a URL the digest is that of its ETag and size, so that its content need not be read. `name`: if the log
+    has several files, by which its part is known; relative to the first one's folder.
     """
 
     size: int
     modified: int
     digest: str
+    name: str = ""
+
+    @property
+    def content(self) -> str:
+        """Return what of it determines what is read."""
+        return f"{self.digest} {self.name}"
 
 
 def files_of(log: Path, beside: Iterable[Path]) -> list[Path]:
     """Return the files of a log, a file or a folder, and those beside it that exist, in a fixed order."""
     own = sorted(item for item in log.iterdir() if item.is_file()) if log.is_dir() else [log]
     return [*own, *(path for path in beside if path.is_file())]
+
+
+def names_of(files: Sequence[Path]) -> list[str]:
+    """Return the name of each file of a log; empty for the only one."""
+    return [relative_name(path, files[0].parent) for path in files] if len(files) > 1 else [""] * len(files)
 
 
 def state_of(files: Sequence[Path]) -> State:
@@ -54,7 +66,7 @@ def read_sources(files: Sequence[Path]) -> tuple[SourceFile, ...] | None:
         return None
     if state_of(files) != before:
         return None
-    return tuple(SourceFile(*state, digest) for state, digest in zip(before, digests, strict=True))
+    return tuple(SourceFile(*state, *known) for state, *known in zip(before, digests, names_of(files), strict=True))
 
 
 def file_sha256(path: Path) -> str:

@@ -22,11 +22,12 @@ from typing import Any, Literal, get_args
 
 from cdtool.base.errors import ConfigurationError, OutputError
 from cdtool.base.files.bounded_loading import parse_json, read_bytes
+from cdtool.base.files.locks import is_temporary
 from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.base.files.writing import write_bytes, write_text
 from cdtool.base.remote.remote_path import is_remote
 from cdtool.execution.store.digest import digest_of
-from cdtool.execution.store.sources import SourceFile, read_sources, state_of
+from cdtool.execution.store.sources import SourceFile, names_of, read_sources, state_of
 
 Kind = Literal["logs", "traces", "learned", "sources"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -55,7 +56,7 @@ class Store:
     @property
     def exists(self) -> bool:
         """Whether the folder exists and is not empty."""
-        return self.folder.is_dir() and any(True for _ in self.folder.iterdir())
+        return self.folder.is_dir() and any(not is_temporary(item.name) for item in self.folder.iterdir())
 
     @property
     def is_remote(self) -> bool:
@@ -70,7 +71,8 @@ class Store:
     def create(self) -> None:
         """Create the store, unless it exists; raises ConfigurationError for a folder with other content."""
         if not self.mark.is_file():
-            if self.folder.exists() and (not self.folder.is_dir() or self.exists):
+            has_content = self.folder.exists() and (not self.folder.is_dir() or self.exists)
+            if has_content and not self.mark.is_file():  # another process may just have created it
                 raise ConfigurationError(
                     f"{self.folder}: is neither a store nor an empty folder", "give another folder"
                 )
@@ -116,6 +118,8 @@ class Store:
             part.write_bytes(packed)
             part.replace(path)
         except OSError as fault:
+            with suppress(OSError):
+                part.unlink()
             raise OutputError(f"{self.folder}: cannot be written: {fault.strerror or fault}") from fault
 
     def _path(self, kind: Kind, key: str) -> Path:
@@ -123,8 +127,8 @@ class Store:
 
     def files(self, kind: Kind) -> Iterator[Path]:
         """Yield the files of a kind, those that were not completed included."""
-        for folder in (self.folder / kind).glob("*"):
-            yield from folder.iterdir()
+        for folder in (self.folder / kind).glob("[0-9a-f][0-9a-f]"):
+            yield from (path for path in folder.glob("*") if path.is_file())
 
     def last_sources(self, name: str) -> _Sources | None:
         """Return the files from which a recording was last read; None if it is not known, and at a URL."""
@@ -141,7 +145,8 @@ class Store:
     def sources_of(self, name: str, files: Sequence[Path]) -> _Sources | None:
         """Return the files of a recording as they are now; None if one of them cannot be read, or changes meanwhile."""
         before = self.last_sources(name) if self.trust_times else None
-        if before is not None and state_of(files) == tuple((item.size, item.modified) for item in before):
+        unchanged = before is not None and state_of(files) == tuple((item.size, item.modified) for item in before)
+        if before is not None and unchanged and names_of(files) == [item.name for item in before]:
             return before
         return read_sources(files)
 

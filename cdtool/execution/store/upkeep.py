@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.base.errors import UsageError
 from cdtool.base.remote.remote_path import location
-from cdtool.execution.store.store import KINDS, Store
+from cdtool.execution.store.store import KINDS, Kind, Store
 
 _DAY = 86_400.0
 
@@ -37,7 +39,7 @@ def store_status(folder: str | Path) -> StoreStatus:
     """Return what a store contains; raises ConfigurationError if the folder is not a store."""
     store = Store(location(folder), writes=False)
     store.check()
-    sizes = {kind: [path.stat().st_size for path in store.files(kind)] for kind in KINDS}
+    sizes = {kind: [state.st_size for _, state in _states(store, kind)] for kind in KINDS}
     return StoreStatus(store.folder, {kind: len(each) for kind, each in sizes.items()}, sum(map(sum, sizes.values())))
 
 
@@ -70,12 +72,19 @@ def collect_garbage(folder: str | Path, *, older_than_days: float = 30.0) -> Col
     store.check()
     oldest = time.time() - _DAY * older_than_days
     kept = removed = before = after = 0
-    for path in [path for kind in KINDS for path in store.files(kind)]:
-        state = path.stat()
+    for path, state in [found for kind in KINDS for found in _states(store, kind)]:
         before += state.st_size
-        if state.st_mtime < oldest:
+        # One that is not complete may be under way.
+        if state.st_mtime < (min(oldest, time.time() - _DAY) if path.name.startswith(".") else oldest):
             path.unlink(missing_ok=True)
             removed += 1
         else:
             kept, after = kept + 1, after + state.st_size
     return Collected(kept, removed, before, after)
+
+
+def _states(store: Store, kind: Kind) -> Iterator[tuple[Path, os.stat_result]]:
+    """Yield the files of a kind with their states; another process may remove or complete one meanwhile."""
+    for path in store.files(kind):
+        with suppress(FileNotFoundError):
+            yield path, path.stat()

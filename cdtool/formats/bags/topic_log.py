@@ -66,7 +66,9 @@ class SequenceJumps:
 
     def findings(self) -> list[Finding]:
         """Return warnings on missing messages, after the last piece; empty if the numbers are not a count."""
-        counts = [self._all] if self._shared and len(self._counts) > 1 else list(self._counts.values())
+        counts = list(self._counts.values())
+        if self._shared and len(counts) > 1 and not all(count.is_count for count in counts):
+            counts = [self._all]
         return [finding for count in counts for finding in count.findings()]
 
 
@@ -97,15 +99,19 @@ class _SequenceCount:
             self._jump_time = (int(times[jumps[0]]) - origin) / 1e9
         self._last, self._last_time = known[-1:].copy(), times[-1:].copy()
 
+    @property
+    def is_count(self) -> bool:
+        """Whether most steps are by one, and hardly any goes back."""
+        return self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
+
     def findings(self) -> list[Finding]:
-        is_count = self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
         fact = {
             "jumps": self._jumps,
             "missing": self._missing,
             "after": self._jump_time,
             "of_topic": bool(self._topic),
         }
-        return [Finding("missing_messages", self._topic, fact)] if self._jumps and is_count else []
+        return [Finding("missing_messages", self._topic, fact)] if self._jumps and self.is_count else []
 
 
 IsWanted = Callable[[str], bool]

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Generator, Mapping
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -23,7 +22,7 @@ from cdtool.formats.columns import Column, Piece
 from cdtool.formats.csv.gzipped import open_text
 from cdtool.formats.groups import PREFIX
 from cdtool.formats.pieces import Pieces, join_pieces
-from cdtool.formats.source import Source
+from cdtool.formats.source import Source, stated_origin
 
 if TYPE_CHECKING:
     from cdtool.formats.csv.several_clocks import Clocks
@@ -188,9 +187,4 @@ def written_origin(path: Path) -> float:
             return 0.0
         head += file.read(_HEAD - len(_MARK)) or b""
     lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())
-    written = next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0")
-    try:
-        origin = float(written)
-    except ValueError:  # edited by hand
-        return 0.0
-    return origin if math.isfinite(origin) else 0.0
+    return stated_origin(next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0"))

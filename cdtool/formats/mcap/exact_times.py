@@ -9,6 +9,7 @@ from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.records import LARGEST, PREFIX, DamageError, Opcode, parse
 from cdtool.formats.mcap.summary import McapSummary
 from cdtool.formats.pieces import PieceRun, Pieces
+from cdtool.formats.source import stated_origin
 
 # The metadata record of such a file, the package of its message types, and the field with a message's time [s].
 METADATA = "cdtool.converted"
@@ -26,7 +27,7 @@ def exact_origin(file: FileBytes, summary: McapSummary, after_header: int) -> fl
             except DamageError:
                 continue
             if record.name == METADATA:
-                return float(record.metadata.get("cdtool.origin_s", "0"))
+                return stated_origin(record.metadata.get("cdtool.origin_s", "0"))
     return None
 
 

@@ -131,6 +131,47 @@ def test_of_several_files_all_are_replaced_or_none(tmp_path, monkeypatch, failin
     assert {(tmp_path / name).read_text() for name in ("a.md", "b.md")} == {"old"}
 
 
+def test_what_cannot_be_put_back_is_not_removed(tmp_path, monkeypatch):
+    paths = [tmp_path / name for name in ("a.md", "b.md", "c.md")]
+    for path in paths:
+        path.write_text("old")
+
+    def refused(self: Path, target: Path) -> Path:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(Path, "replace", refused)
+    with pytest.raises(OutputError), replaced(*paths):
+        pass
+    clean_up()
+    monkeypatch.undo()
+    write_text(tmp_path / "d.md", "another command")
+    left = [path for path in tmp_path.iterdir() if path.name != "d.md"]
+    assert [path.read_text() for path in left] == ["old"] * 3 and (tmp_path / "a.md") in left
+
+
+def test_without_hard_links_all_are_put_back(tmp_path, monkeypatch):
+    paths = [tmp_path / name for name in ("a.md", "b.md")]
+    for path in paths:
+        path.write_text("old")
+    real, done = Path.replace, []
+
+    def replace(self: Path, target: Path) -> Path:
+        done.append(self)
+        if len(done) == 2:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return real(self, target)
+
+    def no_links(*_: object) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", no_links)
+    monkeypatch.setattr(Path, "replace", replace)
+    with pytest.raises(OutputError), replaced(*paths) as parts:
+        for part in parts:
+            part.write_text("new")
+    assert names(tmp_path) == {"a.md", "b.md"} and {path.read_text() for path in paths} == {"old"}
+
+
 KILLED = """
 import os, sys
 from pathlib import Path

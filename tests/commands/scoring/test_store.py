@@ -16,6 +16,8 @@ from cdtool.commands.scoring import pieces
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file, with_detectors
 from cdtool.commands.scoring.dry_run import dry_run
 from cdtool.commands.scoring.learned import Learned, Teaching
+from cdtool.commands.scoring.store.determinants import Determinants
+from cdtool.execution.store.sources import read_sources
 from cdtool.execution.store.store import Store
 from cdtool.execution.store.upkeep import collect_garbage, store_status
 from cdtool.execution.workers import Workers
@@ -334,6 +336,38 @@ def test_runs_in_one_file(gate, tmp_path):
 
 def logs_in(store: Path) -> list[Path]:
     return [path for path in (store / "logs").rglob("*") if path.is_file()]
+
+
+def test_a_detector_refused_in_a_group_is_not_found_under_the_key_of_one_that_is_not(gate):
+    setup = read_benchmark_file(write(gate))
+    teaching = Teaching(setup, Workers())
+    groups = {name: replace(item, refused={"momentum": "no stiffness"}) for name, item in setup.impacts.items()}
+    one, other = (Determinants(each, teaching.learned, {}, {}) for each in (setup, replace(setup, impacts=groups)))
+    group, item = next(iter(setup.impacts.items()))
+    assert one.log_key(group, item.logs[0], ()) != other.log_key(group, item.logs[0], ())
+
+
+def test_a_renamed_part_of_a_log_is_another_log(tmp_path):
+    for name in ("a.mcap", "b.mcap"):
+        (tmp_path / name).write_bytes(b"x")
+    before = read_sources(sorted(tmp_path.iterdir()))
+    (tmp_path / "a.mcap").rename(tmp_path / "c.mcap")
+    after = read_sources(sorted(tmp_path.iterdir()))
+    assert before is not None and after is not None
+    assert {item.digest for item in before} == {item.digest for item in after}
+    assert [item.content for item in before] != [item.content for item in after]
+
+
+def test_a_store_that_is_being_created_and_stray_files_in_it_do_no_harm(gate, filled):
+    (filled / "logs" / ".DS_Store").touch()
+    (next((filled / "logs").glob("[0-9a-f]*")) / "folder").mkdir()
+    before = store_status(filled).entries
+    assert collect_garbage(filled).removed == 0 and store_status(filled).entries == before
+    new = gate / "new"
+    new.mkdir()
+    (new / ".cdtool-0123456789abcdef-0123456789abcdef.tmp").touch()
+    Store(new).create()
+    assert Store(new).mark.is_file()
 
 
 def test_a_damaged_or_missing_file_is_computed_again(gate, tmp_path):

@@ -45,7 +45,7 @@ class Determinants:
         """Return the key of the rows of a log that do not depend on the detectors."""
         own = json.dumps(self._of_log(path))
         labels = "" if self.setup.labels is None else digest_of(labels_of_log(self.setup, path))
-        return combined("log", self._common, self._groups[group], own, labels, *(item.digest for item in sources))
+        return combined("log", self._common, self._groups[group], own, labels, *(item.content for item in sources))
 
     def detector_key(self, detector: str, path: Path, log_key: str) -> str:
         """Return the key of the outcome of a detector on a log."""
@@ -83,7 +83,9 @@ class Determinants:
     def _groups(self) -> dict[str, str]:
         """Return the digest of the settings of each group."""
         return {
-            name: digest_of(name, group.is_impact_free, group.window, group.force, group.labels, _own_channels(group))
+            name: digest_of(
+                name, group.is_impact_free, group.window, group.force, group.labels, group.refused, _own_channels(group)
+            )
             for name, group in self.setup.impacts.items()
         }
 
@@ -189,7 +191,7 @@ def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources], detectors
             str(setup.learned_sections.get(path, LogSection())),
             labels_of_log(setup, path),
             setup.is_scored_too(path) if setup.both else False,
-            [item.digest for item in sources[path]],
+            [item.content for item in sources[path]],
         ]
         for path in setup.learn
     ]
