@@ -81,7 +81,7 @@ def dry_run(
 
 
 def _dry_run(work: BenchmarkWork, workers: Workers, store: Store | None) -> DryRun:
-    if store is None or not store.exists:
+    if store is None or not (store.exists or store.folder.is_file()):
         names = work.setup.detectors
         logs = [(group, path, names) for group, item in work.setup.impacts.items() for path in item.logs]
         learn = [path for path in work.setup.learn if not is_remote(path)]

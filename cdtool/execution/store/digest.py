@@ -15,9 +15,6 @@ import numpy as np
 
 from cdtool.base.remote.remote_path import is_remote
 
-# Rooms of the code that do not determine the outcome of a recording.
-_ONLY_SHOWN = ("cli", "report", "simulation")
-
 
 def digest_of(*values: Any) -> str:
     """Return the SHA-256 of values: numbers, texts, arrays, and collections and instances of classes of them.
@@ -66,7 +63,7 @@ def _inner(value: Any) -> Any:
 
 @cache
 def code_version() -> str:
-    """Return the digest of the code that determines outcomes, and of the libraries that it computes with."""
+    """Return the digest of the code, and of the libraries that it computes with."""
     from importlib.metadata import version
 
     from cdtool.base.registry import plugin_packages
@@ -74,8 +71,7 @@ def code_version() -> str:
     digest = hashlib.sha256()
     root = Path(__file__).parents[2]
     for path in sorted(root.rglob("*.py")):
-        if path.relative_to(root).parts[0] not in _ONLY_SHOWN:
-            digest.update(path.read_bytes())
+        digest.update(path.read_bytes())
     libraries = {name: version(name) for name in ("numpy", "scipy", "numba")}  # numba takes long to import
     digest.update(json.dumps([libraries, plugin_packages()], sort_keys=True).encode())
     return digest.hexdigest()

@@ -11,12 +11,13 @@ from pathlib import Path
 import pytest
 
 import cdtool
-from cdtool.base.errors import OutputError, RecordingError
+from cdtool.base.errors import ConfigurationError, OutputError, RecordingError
 from cdtool.commands.scoring import pieces
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file, with_detectors
 from cdtool.commands.scoring.dry_run import dry_run
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.store.determinants import Determinants
+from cdtool.commands.scoring.store.stored_learned import learned_with_store
 from cdtool.execution.store.sources import read_sources
 from cdtool.execution.store.store import Store
 from cdtool.execution.store.upkeep import collect_garbage, store_status
@@ -457,6 +458,31 @@ def test_a_folder_that_is_not_a_store_is_refused(gate):
     with pytest.raises(cdtool.base.errors.ConfigurationError, match="neither a store nor an empty folder"):
         run(gate, gate)
     assert not (gate / "logs").exists()
+
+
+def test_a_dry_run_refuses_a_file_in_place_of_a_store_as_a_run_does(gate, tmp_path):
+    (tmp_path / "store").touch()
+    with pytest.raises(ConfigurationError, match="is not a store"):
+        dry_run(write(gate), store=Store(tmp_path / "store"))
+
+
+def test_a_run_to_learn_from_that_could_not_be_read_is_retried(gate, tmp_path):
+    bad = gate / "free" / "99.csv"
+    bad.write_text("no table")
+    run(gate, tmp_path / "store")
+    setup = read_benchmark_file(write(gate))
+    asked = []
+
+    class Asked(Teaching):
+        @property
+        def learned(self) -> Learned:
+            asked.append(1)
+            return super().learned
+
+    for retried, count in ((False, 0), (True, 1)):
+        store = Store(tmp_path / "store", retry_failed=retried, writes=False)
+        learned, _ = learned_with_store(store, Asked(setup, Workers()))
+        assert len(asked) == count and [item.recording for item in learned.about.skipped] == ["free/99.csv"]
 
 
 def test_a_dry_run_writes_nothing(gate, tmp_path):

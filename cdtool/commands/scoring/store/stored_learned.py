@@ -31,7 +31,9 @@ def learned_with_store(store: Store, teaching: Teaching) -> tuple[Learned, Mappi
     key = digest_of(learned_key(setup, runs, setup.detectors), teaching.every_detector)
     try:
         if (text := store.known("learned", key)) is not None:
-            return Learned.of_text(text, setup.rule), runs
+            known = Learned.of_text(text, setup.rule)
+            if not (store.retry_failed and known.about.skipped):
+                return known, runs
     except ValueError:  # damaged
         pass
     learned = teaching.learned
