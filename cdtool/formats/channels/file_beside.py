@@ -16,7 +16,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding, Severity
-from cdtool.base.remote.remote_path import location
+from cdtool.base.remote.remote_path import location, relative_name
 from cdtool.formats.channels.channel_assembly import assemble_recording
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, OwnFile
 from cdtool.formats.source import Source
@@ -45,23 +45,24 @@ def add_files_beside(
         own = item.own_file
         assert own is not None
         path = own.path_for(log)
+        name = relative_name(path, log.parent)  # results do not depend on the current folder
         if path.resolve() == log.resolve():
             reason = "it is the log itself: map its column without 'file'"
-            recording = _without(recording, item, path, reason)
+            recording = _without(recording, item, name, reason)
             continue
         if not path.exists():
-            recording = _without(recording, item, path)
+            recording = _without(recording, item, name)
             continue
         try:
             recording = _with_file(recording, item, own, _read(path, item, own, channels, machine, read), trigger)
         except RecordingError as fault:
             reason = str(fault).removeprefix(f"{path}: ")
-            recording = _without(recording, item, path, reason)
+            recording = _without(recording, item, name, reason)
     return recording
 
 
-def _without(recording: Recording, item: ChannelSource, path: Path, reason: str = "") -> Recording:
-    numbers = {"name": path.as_posix(), "reason": reason}
+def _without(recording: Recording, item: ChannelSource, name: str, reason: str = "") -> Recording:
+    numbers = {"name": name, "reason": reason}
     finding = Finding("absent_file", item.channel, numbers, "loss" if reason else "note")
     return replace(recording, findings=(*recording.findings, finding))
 

@@ -169,12 +169,12 @@ def test_a_clock_that_does_not_count_from_1970_leaves_the_cell_out(tmp_path, log
     assert f"the {which} clock does not count from 1970" in facts(recording, "absent_file")[0].numbers["reason"]
 
 
-def test_a_missing_file_is_a_note_with_the_path(tmp_path):
+def test_a_missing_file_is_a_note_with_the_path_from_the_log(tmp_path):
     write_log(tmp_path)
     recording = read(tmp_path, TRIGGER)
     (absent,) = [item for item in recording.findings if item.kind == "absent_file"]
     assert absent.severity == "note" and absent.channel == "force"
-    assert (tmp_path / "cell_03.csv").as_posix() in str(absent)
+    assert "'cell_03.csv'" in str(absent)
     assert "force" not in recording and recording.beside == ()
 
 
