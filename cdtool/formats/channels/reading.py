@@ -205,7 +205,11 @@ def _part_pieces(folder: Path, keys: Collection[str] | None, read: ReadFile) -> 
     start: float | None = None
     parts: list[tuple[Source, Mapping[str, Span]]] = []
     for part in (*log.filled, *log.empty):
-        run = PieceRun(read(choose_format(part), part, keys))
+        if not has_topics(chosen := choose_format(part)):
+            raise RecordingError(
+                f"{part}: is not a log of topics, as a part of a log has to be", "remove it or its suffix"
+            )
+        run = PieceRun(read(chosen, part, keys))
         spans: dict[str, Span] = {}
         for piece in run:
             start = piece.origin if start is None else start

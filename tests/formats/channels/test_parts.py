@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool import convert
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.parts import missing_part_findings
@@ -228,3 +229,12 @@ def test_a_pause_between_two_parts_is_reported(tmp_path, pause):
         assert not gaps
     else:
         assert gaps == [Finding("part_gap", "", {"gap": pytest.approx(5.01), "channels": ()}, file="bag_2.mcap")]
+
+
+def test_a_table_with_the_suffix_of_a_part_is_one_line(tmp_path):
+    folder = tmp_path / "log"
+    folder.mkdir()
+    (folder / "bag_0.mcap").write_text("t,x\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"bag_0\.mcap: is not a log of topics"):
+        convert(folder, tmp_path / "out.csv")
+    assert not (tmp_path / "out.csv").exists()
