@@ -100,7 +100,7 @@ def test_a_channel_is_read_if_another_one_of_its_topic_cannot_be_decoded(tmp_pat
     assert Mcap().element_names(path, "/a") == ("x",)
 
 
-def test_channels_counted_apart_whose_numbers_are_apart_miss_nothing(tmp_path):
+def test_channels_counted_separately_miss_nothing_if_their_numbers_do_not_meet(tmp_path):
     """As of a part of a log: no number repeats, but each channel counts by itself."""
     messages = [("/a", i, 201 + i) for i in range(100)] + [("/b", 2 * i, 101 + i) for i in range(50)]
     path = write(tmp_path / "log.mcap", sorted(messages, key=lambda item: item[1]), chunk_size=1 << 20)
