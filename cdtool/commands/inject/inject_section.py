@@ -86,11 +86,11 @@ def read_obstacle(table: Table, known: Mapping[str, Obstacle]) -> Obstacle:
 def _curve(table: Table, damping: float, series: float) -> Obstacle:
     force = table.raw("force_n")
     if not isinstance(force, list) or len(force) < 2:
-        raise table.fault("force_n", "is no list of two or more forces", "give force_n and deflection_mm, both from 0")
+        raise table.fault("force_n", "must be two or more forces", "give force_n and deflection_mm, both from 0")
     forces = table.numbers("force_n", len(force), minimum=0.0)
     deflections = table.numbers("deflection_mm", len(force), minimum=0.0)
     if not isinstance(table.raw("deflection_mm"), list):
-        raise table.fault("deflection_mm", "is no list", f"give {len(force)} deflections, one per force")
+        raise table.fault("deflection_mm", "must be a list", f"give {len(force)} deflections, one per force")
     try:
         return Obstacle(tuple(item / _PER_MM for item in deflections), forces, damping, series)
     except ConfigurationError as fault:

@@ -192,7 +192,7 @@ def plain_rows(
         return None
     if separator != b" " and b'"' in block:
         block = without_quotes(block, separator)
-    # A repeated header is no row, even if its words are in columns that are not read.
+    # A repeated header is not a row, even if its words are in columns that are not read.
     encoding = dialect.text.stream_encoding
     odd = (text.strip().encode(encoding, "replace") for text in (dialect.comment, *dialect.header_text))
     if any(mark in block for mark in (b'"', b"\0", *odd) if mark):
@@ -214,7 +214,7 @@ def plain_rows(
     if {*map(len, numbers.values()), *map(len, words.values())} != {count}:  # line ends are mixed
         return None
     if np.isnan(numbers.get(width - 1, np.nan)).any() and (
-        width == 1  # a blank line is no row
+        width == 1  # a blank line is not a row
         or (seem_full and not _have_cells(dialect, data, ended))
     ):
         return None
