@@ -5,20 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypedDict
+from typing import Annotated, Any, Literal, TypedDict
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Meta
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.errors import UsageError
 from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.base.settings import NotNegative, check, setting
 from cdtool.detectors.detection import Alarm, Band, Signal, Status, StatusArray
 from cdtool.recordings.clock.recent_steps import usual_steps
 
 # Default time outside the band before an alarm [s]: 9 samples at 1 kHz.
 DEBOUNCE_TIME = 9e-3
+#: More samples than any recording has.
 _MOST_DEBOUNCE = 1_000_000_000
+
+Debounce = Annotated[int, Meta(ge=1, le=_MOST_DEBOUNCE)]
+ShareBelowOne = Annotated[float, Meta(ge=0.0, lt=1.0)]
 
 
 class ActivationSettings(TypedDict, total=False):
@@ -41,24 +46,31 @@ class Activation:
     one.
     """
 
-    debounce: int | None = None
-    rearm: float = 0.5
-    hysteresis: float = 0.0
-    latch: bool = False
+    debounce: Annotated[
+        Debounce | None, setting("consecutive samples outside the limits that raise the alarm; default: 9 ms")
+    ] = None
+    rearm: Annotated[
+        NotNegative,
+        setting(
+            "time inside the limits after which the alarm re-arms",
+            key="rearm_s",
+            unit="s",
+            hint="give seconds, at least 0; with latch an alarm is never re-armed",
+        ),
+    ] = 0.5
+    hysteresis: Annotated[
+        ShareBelowOne,
+        setting(
+            "to count as inside, the signal must be within the limits for (1 - hysteresis) times the safety factor: "
+            "a signal that dwells at its limit is one alarm"
+        ),
+    ] = 0.0
+    latch: Annotated[
+        bool, setting("a joint's alarm remains active until the operation ends: at most one false alarm")
+    ] = False
 
     def __post_init__(self) -> None:
-        if self.debounce is not None and not 1 <= self.debounce <= _MOST_DEBOUNCE:
-            raise UsageError(
-                f"debounce is {self.debounce}", f"give a whole number of samples from 1 to {_MOST_DEBOUNCE}"
-            )
-        if not 0.0 <= self.rearm < math.inf:
-            raise UsageError(
-                f"rearm is {self.rearm:g}", "give seconds, at least 0; with latch an alarm is never re-armed"
-            )
-        if not 0.0 <= self.hysteresis < 1.0:
-            raise UsageError(
-                f"hysteresis is {self.hysteresis:g}", "give a share of the safety factor, from 0 to below 1"
-            )
+        check(self)
 
     @property
     def wait(self) -> float:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
 
 class CdtoolError(Exception):
@@ -50,7 +50,17 @@ class UsageError(CdtoolError):
 
 
 class ConfigurationError(CdtoolError):
-    """A machine file or benchmark file is wrong; the message names the key."""
+    """A machine file or benchmark file is wrong; the message names the key, which is `key` where it is known."""
+
+    key = ""
+
+
+class MistakesError(ConfigurationError):
+    """Several mistakes of a file: `mistakes`, in its order."""
+
+    def __init__(self, mistakes: Sequence[ConfigurationError]) -> None:
+        super().__init__("\n".join(map(str, mistakes)))
+        self.mistakes = tuple(mistakes)
 
 
 class RecordingError(CdtoolError):

@@ -341,8 +341,7 @@ def drive_of(detector: Detector, recording: Recording, machine: Machine) -> Driv
     >>> from cdtool.detectors.momentum import Momentum
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Recording, Series
-    >>> from cdtool.base.tables import Table
-    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> axis = LinearAxis.of({"coordinates": "load", "load_mass": 600.0})
     >>> torque, speed = Series([0.0, 0.3], [5.0, 7.0], "N"), Series([0.1, 0.2, 0.3], [0.2, 0.2, 0.2], "m/s")
     >>> drive = drive_of(Momentum(), Recording("run", "", ("axis",), {"torque": torque, "speed": speed}), axis)
     >>> drive.time.tolist(), drive.torque[:, 0].tolist()

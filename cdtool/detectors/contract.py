@@ -47,8 +47,7 @@ def checked_signal(detector: Detector, recording: Recording, machine: Machine) -
     >>> from cdtool.detectors.pure_torque import PureTorque
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Recording, Series
-    >>> from cdtool.base.tables import Table
-    >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
+    >>> axis = LinearAxis.of({"coordinates": "load"})
     >>> recording = Recording("run.csv", "run.csv", ("axis",), {"torque": Series([0.0, 0.1], [5.0, 6.0], "N")})
     >>> checked_signal(PureTorque(), recording, axis).values[:, 0].tolist()
     [5.0, 6.0]

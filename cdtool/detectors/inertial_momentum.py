@@ -75,8 +75,7 @@ class InertialMomentum:
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Recording, Series
-    >>> from cdtool.base.tables import Table
-    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> axis = LinearAxis.of({"coordinates": "load", "load_mass": 600.0})
     >>> time = np.arange(2001) * 1e-3
     >>> torque, speed = Series(time, np.where(time < 1.0, 0.0, 30.0), "N"), Series(time, np.full(2001, 0.2), "m/s")
     >>> bias = Series(time, np.full(2001, 0.03), "m/s2")

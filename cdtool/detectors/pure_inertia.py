@@ -33,8 +33,7 @@ class PureInertia:
     >>> import numpy as np
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Recording, Series
-    >>> from cdtool.base.tables import Table
-    >>> axis = LinearAxis.from_table(Table({"coordinates": "load", "load_mass": 600.0}, "machine.toml"))
+    >>> axis = LinearAxis.of({"coordinates": "load", "load_mass": 600.0})
     >>> time = np.arange(2001) * 1e-3
     >>> acceleration = Series(time, np.where(time < 1.0, 0.5, -1.5), "m/s2")
     >>> signal = PureInertia().signal(Recording("run", "", ("axis",), {"acceleration": acceleration}), axis)

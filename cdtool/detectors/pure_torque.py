@@ -35,8 +35,7 @@ class PureTorque:
 
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Recording, Series
-    >>> from cdtool.base.tables import Table
-    >>> axis = LinearAxis.from_table(Table({"transmission_ratio": 0.01}, "machine.toml"))
+    >>> axis = LinearAxis.of({"transmission_ratio": 0.01})
     >>> logged = Recording("run", "", ("axis",), {"torque": Series([0.0, 0.001], [0.4, 0.4], "N m")})
     >>> signal = PureTorque().signal(axis.referred_to_load(logged), axis)
     >>> signal.values[:, 0].tolist(), signal.unit

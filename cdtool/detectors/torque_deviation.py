@@ -37,8 +37,7 @@ class TorqueDeviation:
 
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Series
-    >>> from cdtool.base.tables import Table
-    >>> axis = LinearAxis.from_table(Table({"transmission_ratio": 0.01}, "machine.toml"))
+    >>> axis = LinearAxis.of({"transmission_ratio": 0.01})
     >>> torque, expected = (Series([0.0, 0.001], values, "N m") for values in ([0.4, 0.5], [0.4, 0.4]))
     >>> logged = Recording("run", "", ("axis",), {"torque": torque, "reference_torque": expected})
     >>> TorqueDeviation().signal(axis.referred_to_load(logged), axis).values[:, 0].round(9).tolist()

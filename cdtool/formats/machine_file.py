@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,12 @@ from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import location
+from cdtool.base.settings import Place, read
 from cdtool.base.tables import Table, read_toml
-from cdtool.formats.channels.channel_map import ChannelMap, TablePins, read_channel_map
+from cdtool.base.value_words import value_in_words
+from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource, read_channel_map
 from cdtool.machines.dynamics import Gain, Machine
+from cdtool.machines.joint_machine import per_joint
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,30 +110,47 @@ def read_machine_file(path: str | Path) -> MachineFile:
     """
     file = location(path)
     values = read_toml(file, "a machine file")
-    root = Table(values, str(file))
     if isinstance(values.get("machine"), str):
         raise ConfigurationError(f"{file}: is a benchmark file, not a machine file", f"give {values['machine']}")
-    table = root.table("machine", required=True)
-    for part in (root, table):
-        if "operations" in part.values:
-            raise part.fault(
-                "operations", "is a key of the benchmark file", "set it there, or give detect --operations motion"
-            )
-    machines = _registry("cdtool.machines", "MACHINES")
-    kind = table.choice("type", machines.names_for(table.values.get("type")))
-    machine = machines.load(kind).from_table(table)
-    table.finish()
+    place = Place(str(file))
+    machine = place.tried(None, _machine, values, place)
+    root = Table({name: value for name, value in values.items() if name != "machine"}, str(file))
+    joints = machine.joints if machine else ()
+    columns = topics = ChannelMap(TimeSource(), (), joints)
     channels = root.table("channels")
-    columns = read_channel_map(channels, machine.joints, machine.accepted_units, topics=False)
-    columns = replace(columns, pins=_read_pins(root.table("csv")))
-    topics = read_channel_map(channels.table("mcap"), machine.joints, machine.accepted_units, topics=True)
-    if len(machine.joints) == 1 and "joints" not in table:
-        topics = replace(topics, named=False)
-    gains = _read_gains(root.table("detectors"), len(machine.joints))
-    model = _read_model(root, len(machine.joints))
-    root.finish()
+    if machine is not None:
+        columns = place.tried(columns, read_channel_map, channels, joints, machine.accepted_units, False)
+        topics = place.tried(topics, read_channel_map, channels.table("mcap"), joints, machine.accepted_units, True)
+        topics = replace(topics, named=len(joints) > 1 or "joints" in values["machine"])
+    columns = replace(columns, pins=place.tried(TablePins(), _read_pins, root.table("csv")))
+    gains = _read_gains(root.table("detectors").values, len(joints), place.below("detectors"))
+    model = _read_model(root.table("model").values if "model" in root else None, len(joints), place.below("model"))
+    with place.noting():
+        root.finish()
+    place.finish()
+    assert machine is not None
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
     return MachineFile(file, machine, columns, topics, gains, digest, model)
+
+
+def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:
+    """Return the machine of [machine], with the mistakes in `place`; None if it cannot be made."""
+    table = values.get("machine")
+    if not isinstance(table, dict):
+        problem = "is missing" if table is None else f"is {value_in_words(table)}"
+        raise place.fault("machine", problem, "add a table [machine]")
+    for part, at in ((values, place), (table, place.below("machine"))):
+        if "operations" in part:
+            hint = "set it there, or give detect --operations motion"
+            raise at.fault("operations", "is a key of the benchmark file", hint)
+    machines = _registry("cdtool.machines", "MACHINES")
+    kind = table.get("type")
+    known = machines.names_for(kind)
+    if kind not in known:
+        problem = "is missing" if kind is None else f"is {value_in_words(kind)}"
+        raise place.below("machine").fault("type", problem, nearest(str(kind), known))
+    machine: Machine | None = machines.load(kind).read(table, place.below("machine"))
+    return machine
 
 
 def fingerprint(machine: Machine) -> str:
@@ -149,38 +169,29 @@ def _parameters_text(machine: Machine) -> str:
     return json.dumps({"type": type(machine).__name__, **asdict(machine)}, sort_keys=True)
 
 
-def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
+def _read_gains(table: Mapping[str, Any], joints: int, place: Place) -> dict[str, dict[str, Gain]]:
+    """Return the gains of [detectors] by the detectors' full names, with the mistakes in `place`."""
     registry = _registry("cdtool.detectors", "DETECTORS")
     gains: dict[str, dict[str, Gain]] = {}
-    for name in table.values:
-        try:
+    for name, values in table.items():
+        with place.noting(), place.at(name):
             full = registry.canonical(name)
-        except UsageError as fault:
-            raise table.fault(name, fault.message, fault.hint) from fault
-        part, detector = table.table(name), registry.load(full)
-        allowed = [item.name for item in fields(detector)]
-        for key in part.values:
-            if key not in allowed:
-                raise part.fault(key, "unknown gain", nearest(key, allowed))
-        given = {
-            key: part.numbers(key, joints) if isinstance(value, list) else part.number(key)
-            for key, value in part.values.items()
-        }
-        try:
-            detector(**given)
-        except ConfigurationError as fault:
-            raise ConfigurationError(f"{table.key(name)}: {fault.message}", fault.hint) from fault
-        if full in gains:
-            raise table.fault(name, f"repeats {full}", "give a detector's gains once, under one of its names")
-        gains[full] = given
+            if full in gains:
+                raise UsageError(f"repeats {full}", "give a detector's gains once, under one of its names")
+            gains[full] = {}
+            detector = read(registry.load(full), values, place.below(name))
+            keys = [key for key in values if hasattr(detector, key)]
+            for key in keys:
+                if joints and isinstance(getattr(detector, key), tuple):
+                    per_joint(detector, key, joints, place.below(name))
+            gains[full] = {key: getattr(detector, key) for key in keys}
     return gains
 
 
-def _read_model(root: Table, joints: int) -> Any:
-    if "model" not in root:
-        return None
+def _read_model(table: Mapping[str, Any] | None, joints: int, place: Place) -> Any:
     # By name: only few commands use it.
-    return import_module("cdtool.machines.axis_model.model_table").ModelTable.read(root.table("model"), joints)
+    part = "cdtool.machines.axis_model.model_table"
+    return None if table is None else import_module(part).ModelTable.read(table, joints, place)
 
 
 def _read_pins(table: Table) -> TablePins:

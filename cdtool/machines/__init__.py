@@ -12,5 +12,5 @@ MACHINES = Registry(
         "planar_arm": "cdtool.machines.planar_arm:PlanarArm",
         "urdf_robot": "cdtool.machines.urdf_robot:UrdfRobot",
     },
-    contract=("from_table", "default_sides", "accepted_units", "referred_to_load"),
+    contract=("of", "read", "default_sides", "accepted_units", "referred_to_load"),
 )

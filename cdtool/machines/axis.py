@@ -11,15 +11,15 @@ with F_c positive when it opposes positive travel.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place
 from cdtool.machines.dynamics import JointEquation
-from cdtool.machines.joint_machine import JointMachine
+from cdtool.machines.joint_machine import JointMachine, per_joint
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class Axis(JointMachine):
     coupled: ClassVar[bool] = False
 
     @classmethod
-    def from_table(cls, table: Table) -> Axis:
-        """Build from the [machine] table; raises ConfigurationError naming the key."""
-        keys = cls.drive_keys(table)
-        return cls(**keys, load_inertia=table.numbers(cls.inertia_key, len(keys["joints"]), 0.0, minimum=0.0))
+    def parameters(cls, table: Any, place: Place) -> dict[str, Any]:
+        """Return the parameters of the machine, one per joint; raises ConfigurationError naming the key."""
+        found = super().parameters(table, place)
+        return {**found, "load_inertia": per_joint(table, cls.inertia_key, len(found["joints"]), place)}
 
     @property
     def nominal_inertia(self) -> FloatArray:

@@ -7,7 +7,7 @@ exerts tau_c on the obstacle; every residual tends to +tau_c. Positions q [rad, 
 from __future__ import annotations
 
 from dataclasses import Field, dataclass
-from typing import Any, ClassVar, Protocol, TypeGuard
+from typing import Any, ClassVar, Literal, Protocol, TypeGuard
 
 from cdtool.base.arrays import FloatArray
 from cdtool.recordings.recording import Recording
@@ -79,7 +79,7 @@ class Machine(Protocol):
         ...
 
     @property
-    def default_sides(self) -> str:
+    def default_sides(self) -> Literal["one", "two"]:
         """Return the sides of its band, "one" or "two", on which a threshold raises alarms by default."""
         ...
 

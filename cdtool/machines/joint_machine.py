@@ -7,21 +7,99 @@ and the motor's inertia J_m is J_m / r^2 there; position = r theta + offset.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
-from cdtool.base.tables import Table
+from cdtool.base.settings import NotNegative, Place, Positive, read, setting
 from cdtool.recordings.clock import differentiate, integrate, previous_value
 from cdtool.recordings.recording import RIG_UNITS, UNITLESS, Recording, Series
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
 ROTARY_UNITS = {"torque": "N m", "speed": "rad/s", "position": "rad", "acceleration": "rad/s2"}
 _MOTOR_UNITS = {"torque": "N m", "speed": "rad/s", "position": "rad"}
-_COORDINATES = ("motor", "load")
+
+
+PerJoint = tuple[float, ...]
+PerJointNotNegative = tuple[NotNegative, ...]
+_ZERO = (0.0,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTable:
+    """The keys of [machine] that every type has; a number is that of all joints, or a list has one for each."""
+
+    type: Annotated[str, setting("linear_axis, rotary_axis, planar_arm or urdf_robot")] = ""
+    name: Annotated[str, setting("shown in messages and stored in signatures")] = "axis"
+    joints: Annotated[
+        tuple[str, ...],
+        setting(
+            "joint names, in the order of the columns; default: the name, of a planar_arm arm and forearm; required "
+            "for a urdf_robot"
+        ),
+    ] = ()
+    coordinates: Annotated[
+        Literal["motor", "load"] | None,
+        setting(
+            "motor: logs hold motor torque, speed and angle; load: force, speed and position of the load, or the "
+            "joints' own; default: motor, of a urdf_robot load"
+        ),
+    ] = None
+    motor_inertia: Annotated[PerJointNotNegative, setting("at the motor shaft", unit="kg m2")] = ()
+    transmission_ratio: Annotated[
+        PerJoint,
+        setting(
+            "load travel per motor angle, not 0; negative where a positive motor angle moves the load backward; "
+            "required in motor coordinates",
+            unit="m/rad or rad/rad",
+        ),
+    ] = ()
+    position_offset: Annotated[
+        PerJoint,
+        setting(
+            "added to the load's position: load position = ratio x motor angle + offset; a robot's pose must be the "
+            "model's, so its encoders' zeros matter",
+            unit="m or rad",
+        ),
+    ] = _ZERO
+    viscous_friction: Annotated[
+        PerJointNotNegative,
+        setting("at the motor; with load coordinates at the load, N s/m or N m s/rad", unit="N m s/rad"),
+    ] = _ZERO
+    coulomb_friction: Annotated[
+        PerJointNotNegative, setting("at the motor; with load coordinates N or N m", unit="N m")
+    ] = _ZERO
+    coulomb_slope: Annotated[
+        PerJointNotNegative,
+        setting(
+            "above 0: Coulomb friction is coulomb_friction * tanh(coulomb_slope * load speed), without sticking; 0: it "
+            "has the sign of the speed, and at rest it balances the drive up to its magnitude",
+            unit="s/m or s/rad",
+        ),
+    ] = _ZERO
+    constant_force: Annotated[
+        PerJoint,
+        setting(
+            "a constant drive effort, such as an axis's weight or an offset of the torque; at the motor; with load "
+            "coordinates N or N m",
+            unit="N m",
+        ),
+    ] = _ZERO
+    stick_speed: Annotated[
+        tuple[Positive, ...],
+        setting("load speed below which Coulomb friction counts as sticking", unit="m/s or rad/s"),
+    ] = (1e-3,)
+
+
+def per_joint(table: Any, key: str, count: int, place: Place) -> tuple[float, ...]:
+    """Return the values of a key, one for each joint; raises ConfigurationError for another number of them."""
+    values: tuple[float, ...] = getattr(table, key)
+    if len(values) not in (1, count) and values:
+        raise place.fault(key, f"has {len(values)} values", f"give one number, or {count}: one per joint")
+    return values * count if len(values) == 1 else values
 
 
 @dataclass(frozen=True)
@@ -43,44 +121,63 @@ class JointMachine:
     constant_force: tuple[float, ...]
     stick_speed: tuple[float, ...]
 
+    table: ClassVar[type[Any]] = JointTable
+    joints_by_default: ClassVar[tuple[str, ...]] = ()
     coordinates_by_default: ClassVar[str] = "motor"
     derives_position: ClassVar[bool] = True
     ratio_unit: ClassVar[str] = "rad/rad"
 
     @classmethod
-    def drive_keys(cls, table: Table, default_joints: tuple[str, ...] = ()) -> dict[str, Any]:
-        """Return the keys of [machine] that every machine has; raises ConfigurationError naming the key."""
-        joints = table.texts("joints", default_joints or (table.text("name", "axis"),))
+    def of(cls, values: Mapping[str, Any], where: str = "machine.toml") -> Self:
+        """Return the machine that the keys of [machine] describe; raises ConfigurationError with every mistake.
+
+        `where` is the machine file, beside which other files are.
+
+        >>> from cdtool.machines.linear_axis import LinearAxis
+        >>> LinearAxis.of({"coordinates": "load", "load_mass": 600.0}).nominal_inertia.tolist()
+        [600.0]
+        """
+        place = Place(where, "machine.")
+        found = cls.read(values, place)
+        place.finish()
+        assert found is not None
+        return found
+
+    @classmethod
+    def read(cls, values: Mapping[str, Any], place: Place) -> Self | None:
+        """Return the machine, with the mistakes in `place`; None if it cannot be made."""
+        if (table := read(cls.table, values, place)) is None:
+            return None
+        with place.noting():
+            return cls(**cls.parameters(table, place))
+        return None
+
+    @classmethod
+    def parameters(cls, table: Any, place: Place) -> dict[str, Any]:
+        """Return the parameters that every machine has, one per joint; raises ConfigurationError naming the key."""
+        joints = table.joints or cls.joints_by_default or (table.name,)
         if len(set(joints)) != len(joints):
-            raise table.fault("joints", "names a joint twice", "joint names must differ")
-        count = len(joints)
-        coordinates = table.choice("coordinates", _COORDINATES, cls.coordinates_by_default)
+            raise place.fault("joints", "names a joint twice", "joint names must differ")
+        coordinates = table.coordinates or cls.coordinates_by_default
         if coordinates == "load":
             for key in ("motor_inertia", "transmission_ratio"):
-                if key in table:
-                    raise table.fault(key, "has no meaning with coordinates = 'load'", "remove the key or coordinates")
-            motor = ratio = None
-        else:
-            motor = table.numbers("motor_inertia", count, 0.0, minimum=0.0)
-            ratio = table.numbers("transmission_ratio", count)
-            if any(item == 0.0 for item in ratio):
-                raise table.fault("transmission_ratio", "is 0", f"load travel per motor angle [{cls.ratio_unit}]")
-        return {
-            "name": table.text("name", "axis"),
-            "joints": joints,
-            "coordinates": coordinates,
-            "motor_inertia": motor or (0.0,) * count,
-            "transmission_ratio": ratio or (1.0,) * count,
-            "position_offset": table.numbers("position_offset", count, 0.0),
-            "viscous_friction": table.numbers("viscous_friction", count, 0.0, minimum=0.0),
-            "coulomb_friction": table.numbers("coulomb_friction", count, 0.0, minimum=0.0),
-            "coulomb_slope": table.numbers("coulomb_slope", count, 0.0, minimum=0.0),
-            "constant_force": table.numbers("constant_force", count, 0.0),
-            "stick_speed": table.numbers("stick_speed", count, 1e-3, above=0.0),
+                if getattr(table, key):
+                    raise place.fault(key, "has no meaning with coordinates = 'load'", "remove the key or coordinates")
+        elif not table.transmission_ratio:
+            raise place.fault("transmission_ratio", "is missing", "give a number")
+        if 0.0 in table.transmission_ratio:
+            raise place.fault("transmission_ratio", "is 0", f"load travel per motor angle [{cls.ratio_unit}]")
+        every = {
+            item.name: per_joint(table, item.name, len(joints), place)
+            for item in fields(JointMachine)
+            if item.name not in ("name", "joints", "coordinates")
         }
+        every["transmission_ratio"] = every["transmission_ratio"] or (1.0,) * len(joints)
+        every["motor_inertia"] = every["motor_inertia"] or _ZERO * len(joints)
+        return {"name": table.name, "joints": joints, "coordinates": coordinates, **every}
 
     @property
-    def default_sides(self) -> str:
+    def default_sides(self) -> Literal["one", "two"]:
         """ "two" for several joints: the leading one's direction is not that in which the others meet an obstacle."""
         return "one" if len(self.joints) == 1 else "two"
 

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from cdtool.base.settings import setting
 from cdtool.machines.axis import Axis
-from cdtool.machines.joint_machine import LINEAR_UNITS
+from cdtool.machines.joint_machine import LINEAR_UNITS, JointTable, PerJointNotNegative
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearAxisTable(JointTable):
+    """The keys of a linear axis."""
+
+    load_mass: Annotated[PerJointNotNegative, setting("moved mass", unit="kg")] = (0.0,)
 
 
 @dataclass(frozen=True)
@@ -17,6 +25,7 @@ class LinearAxis(Axis):
     coordinates = "load" friction is given at the load [N s/m, N].
     """
 
+    table: ClassVar[type[JointTable]] = LinearAxisTable
     inertia_key: ClassVar[str] = "load_mass"
     ratio_unit: ClassVar[str] = "m/rad"
 

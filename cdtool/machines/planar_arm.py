@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError, nearest
 from cdtool.base.findings import Finding
-from cdtool.base.tables import Table
+from cdtool.base.settings import NotNegative, Place, Positive, setting
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.dynamics import JointEquation, Pendulum
+from cdtool.machines.joint_machine import JointTable, PerJoint, PerJointNotNegative, per_joint
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.recording import Recording, Series
 
 _LINKS = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanarArmTable(JointTable):
+    """The keys of a planar arm."""
+
+    link_mass: Annotated[tuple[Positive, ...], setting("of arm and forearm, each with what is fixed to it", unit="kg")]
+    link_length: Annotated[Positive, setting("of the first link: shoulder to elbow", unit="m")]
+    centre_of_mass: Annotated[PerJoint, setting("distance from the link's joint, along the link", unit="m")]
+    link_inertia: Annotated[PerJointNotNegative, setting("about the centre of mass", unit="kg m2")] = (0.0,)
+    imu_position: Annotated[
+        PerJointNotNegative, setting("distance of the inertial sensor from the link's joint", unit="m")
+    ] = (0.0,)
+    gravity: Annotated[NotNegative, setting("0: the arm moves in a horizontal plane", unit="m/s2")] = 9.81
 
 
 @dataclass(frozen=True)
@@ -40,27 +55,25 @@ class PlanarArm(CoupledMachine):
     imu_position: tuple[float, ...]
     gravity_acceleration: float
 
-    link_names: ClassVar[tuple[str, str]] = ("arm", "forearm")
+    table: ClassVar[type[JointTable]] = PlanarArmTable
+    joints_by_default: ClassVar[tuple[str, ...]] = ("arm", "forearm")
+    link_names: ClassVar[tuple[str, ...]] = joints_by_default
 
     @classmethod
-    def from_table(cls, table: Table) -> PlanarArm:
-        """Return the machine of the [machine] table; raises ConfigurationError naming the key."""
-        keys = cls.drive_keys(table, cls.link_names)
-        if len(keys["joints"]) != _LINKS:
-            raise table.fault("joints", f"names {len(keys['joints'])} joints", "a planar arm has 2: arm and forearm")
-        arm = cls(
-            **keys,
-            link_mass=table.numbers("link_mass", _LINKS, above=0.0),
-            link_length=table.number("link_length", above=0.0),
-            centre_of_mass=table.numbers("centre_of_mass", _LINKS),
-            link_inertia=table.numbers("link_inertia", _LINKS, 0.0, minimum=0.0),
-            imu_position=table.numbers("imu_position", _LINKS, 0.0, minimum=0.0),
-            gravity_acceleration=table.number("gravity", 9.81, minimum=0.0),
-        )
-        if not arm.nominal_inertia[1] > 0.0:
-            problem = f"joint '{arm.joints[1]}' moves no inertia"
-            raise table.fault("link_inertia", problem, "give it, its centre_of_mass, or motor_inertia")
-        return arm
+    def parameters(cls, table: PlanarArmTable, place: Place) -> dict[str, Any]:
+        """Return the parameters of the arm; raises ConfigurationError naming the key."""
+        found = super().parameters(table, place)
+        if len(found["joints"]) != _LINKS:
+            raise place.fault("joints", f"names {len(found['joints'])} joints", "a planar arm has 2: arm and forearm")
+        found |= {
+            key: per_joint(table, key, _LINKS, place)
+            for key in ("link_mass", "centre_of_mass", "link_inertia", "imu_position")
+        }
+        found |= {"link_length": table.link_length, "gravity_acceleration": table.gravity}
+        if not cls(**found).nominal_inertia[1] > 0.0:
+            problem = f"joint '{found['joints'][1]}' moves no inertia"
+            raise place.fault("link_inertia", problem, "give it, its centre_of_mass, or motor_inertia")
+        return found
 
     @property
     def nominal_inertia(self) -> FloatArray:

@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from cdtool.base.settings import setting
 from cdtool.machines.axis import Axis
+from cdtool.machines.joint_machine import JointTable, PerJointNotNegative
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotaryAxisTable(JointTable):
+    """The keys of a rotary axis."""
+
+    load_inertia: Annotated[PerJointNotNegative, setting("inertia of the load", unit="kg m2")] = (0.0,)
 
 
 @dataclass(frozen=True)
@@ -16,4 +25,5 @@ class RotaryAxis(Axis):
     joints are treated as uncoupled: on a robot only detectors without a model (pure_torque) are meaningful.
     """
 
+    table: ClassVar[type[JointTable]] = RotaryAxisTable
     inertia_key: ClassVar[str] = "load_inertia"

@@ -2,23 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import nearest
 from cdtool.base.remote.remote_path import joined, location
-from cdtool.base.tables import Table
+from cdtool.base.settings import NotNegative, Place, setting
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS
+from cdtool.machines.joint_machine import (
+    LINEAR_UNITS,
+    ROTARY_UNITS,
+    JointTable,
+    PerJoint,
+    PerJointNotNegative,
+    per_joint,
+)
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_reader import read_urdf
 
 # Joints of both kinds: a channel has one unit for all of them, so that each is in its own SI unit.
 _MIXED_UNITS = dict.fromkeys(ROTARY_UNITS, "SI")
+
+
+@dataclass(frozen=True, kw_only=True)
+class UrdfRobotTable(JointTable):
+    """The keys of a robot from a URDF."""
+
+    urdf: Annotated[str, setting("the URDF file, relative to the machine file")]
+    joint_map: Annotated[
+        dict[str, str], setting("if log and URDF name a joint differently: log's name = \"URDF's name\"")
+    ] = field(default_factory=dict)
+    locked: Annotated[
+        dict[str, float],
+        setting(
+            "joints of the URDF that are not in the log, and the position at which they are fixed", unit="m or rad"
+        ),
+    ] = field(default_factory=dict)
+    drive_inertia: Annotated[
+        PerJointNotNegative,
+        setting(
+            "of rotor and gear, referred to the joint; motor_inertia / transmission_ratio^2 is added to it",
+            unit="kg m2 or kg",
+        ),
+    ] = (0.0,)
+    home: Annotated[PerJoint, setting("a usual pose; some gains refer to the inertia there", unit="rad or m")] = (0.0,)
+    gravity: Annotated[
+        NotNegative | tuple[float, float, float],
+        setting("a number points along -z of the URDF's root link; three are a vector in its axes", unit="m/s2"),
+    ] = 9.81
 
 
 @dataclass(frozen=True)
@@ -34,20 +68,26 @@ class UrdfRobot(CoupledMachine):
     tree: KinematicTree
     home: tuple[float, ...]
 
+    table: ClassVar[type[JointTable]] = UrdfRobotTable
     coordinates_by_default: ClassVar[str] = "load"
 
     @classmethod
-    def from_table(cls, table: Table) -> UrdfRobot:
-        """Return the machine of the [machine] table and its URDF; raises ConfigurationError naming key or joint."""
-        table.texts("joints")  # the joints of a robot must be named
-        keys = cls.drive_keys(table)
-        count = len(keys["joints"])
-        drives = np.array(table.numbers("drive_inertia", count, 0.0, minimum=0.0))
-        drives += np.array(keys["motor_inertia"]) / np.array(keys["transmission_ratio"]) ** 2
-        path = joined(location(table.where).parent, table.text("urdf"))
-        names = _urdf_names(table, keys["joints"])
-        tree = read_urdf(path, names, _values(table, "locked"), drives.tolist(), _gravity(table))
-        return cls(**keys, tree=tree, home=table.numbers("home", count, 0.0))
+    def parameters(cls, table: UrdfRobotTable, place: Place) -> dict[str, Any]:
+        """Return the parameters of the robot and its URDF; raises ConfigurationError naming key or joint."""
+        if not table.joints:
+            raise place.fault("joints", "is missing", "give a list of texts")
+        found = super().parameters(table, place)
+        joints = found["joints"]
+        drives = np.array(per_joint(table, "drive_inertia", len(joints), place))
+        drives = drives + np.array(found["motor_inertia"]) / np.array(found["transmission_ratio"]) ** 2
+        for name in table.joint_map:
+            if name not in joints:
+                raise place.below("joint_map").fault(name, "is not a joint of the log", nearest(name, joints))
+        names = [table.joint_map.get(name, name) for name in joints]
+        gravity = table.gravity if isinstance(table.gravity, tuple) else (0.0, 0.0, -table.gravity)
+        path = joined(location(place.where).parent, table.urdf)
+        tree = read_urdf(path, names, table.locked, drives.tolist(), gravity)
+        return {**found, "tree": tree, "home": per_joint(table, "home", len(joints), place)}
 
     @property
     def load_units(self) -> dict[str, str]:
@@ -107,26 +147,3 @@ class UrdfRobot(CoupledMachine):
     def contact_jacobian(self, position: FloatArray, link: str, point: tuple[float, float, float]) -> FloatArray:
         """J_c (n, 6, J) of a point of a link of the URDF, in the link's frame [m]; raises ConfigurationError."""
         return self.tree.contact_jacobian(position, link, point)
-
-
-def _urdf_names(table: Table, joints: tuple[str, ...]) -> list[str]:
-    """Return the URDF's name of each joint of the log: by joint_map, else the same."""
-    part = table.table("joint_map")
-    renamed: Mapping[str, Any] = part.values
-    for name in renamed:
-        if name not in joints:
-            raise part.fault(name, "is no joint of the log", nearest(name, joints))
-    return [part.text(name) if name in renamed else name for name in joints]
-
-
-def _values(table: Table, key: str) -> dict[str, float]:
-    part = table.table(key)
-    return {name: part.number(name) for name in part.values}
-
-
-def _gravity(table: Table) -> tuple[float, float, float]:
-    """Return gravity along -z of the base for a number; a vector if the base is mounted in another way."""
-    if isinstance(table.raw("gravity"), list):
-        x, y, z = table.numbers("gravity", 3)
-        return x, y, z
-    return 0.0, 0.0, -table.number("gravity", 9.81, minimum=0.0)

@@ -7,13 +7,13 @@ violated, or not assessable, which does not count as met: nothing passes because
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-from cdtool.base.errors import ConfigurationError, nearest
+from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.findings import Finding
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place, setting
 from cdtool.results.results import LimitResult, RecordingFinding
 from cdtool.results.summary import COUNTED_ALWAYS, FIGURES, Summary, kind_group
 
@@ -32,15 +32,35 @@ class LimitRule:
     largest: float = math.inf
 
 
-def read_limits(
-    table: Table, detectors: Sequence[tuple[str, str]], groups: Sequence[str], kinds: Sequence[str] = ()
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """What a metric may be; at least one of the two is given."""
+
+    min: Annotated[float | None, setting("the smallest value that is allowed")] = None
+    max: Annotated[float | None, setting("the largest value that is allowed")] = None
+
+    def __post_init__(self) -> None:
+        if self.min is None and self.max is None:
+            raise UsageError("has no bound", "give { max = 50 }, { min = 1 } or both")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise UsageError(f"has min {self.min:g} above max {self.max:g}", "exchange them")
+
+
+def limit_rules(
+    limits: Mapping[str, Bounds],
+    place: Place,
+    detectors: Sequence[tuple[str, str]],
+    groups: Sequence[str],
+    kinds: Sequence[str] = (),
 ) -> tuple[LimitRule, ...]:
-    """Read the rules of [limits].
+    """Return the rules of [limits], with the mistakes in `place`.
 
     Parameters
     ----------
-    table : Table
+    limits : mapping of str to Bounds
         The table [limits] of a benchmark file.
+    place : Place
+        Where in the file it stands; gets a mistake for each key that names nothing.
     detectors : sequence of (str, str)
         Full and short names of the detectors.
     groups : sequence of str
@@ -53,31 +73,32 @@ def read_limits(
     tuple of LimitRule
         The rules in the order of the file.
 
-    Raises
-    ------
-    ConfigurationError
-        A key or a value is wrong; the message names the key.
-
     Examples
     --------
-    >>> table = Table({"*.stiff.p95_ms": {"max": 50}}, "benchmark.toml", "limits.")
-    >>> [(rule.detector, rule.group, rule.largest) for rule in read_limits(table, [("momentum", "gm")], ["stiff"])]
-    [('*', 'stiff', 50.0)]
+    >>> limits, place = {"*.stiff.p95_ms": Bounds(max=50.0)}, Place("benchmark.toml", "limits.")
+    >>> limit_rules(limits, place, [("momentum", "gm")], ["stiff"])
+    (LimitRule(key='*.stiff.p95_ms', detector='*', group='stiff', figure='p95_ms', least=-inf, largest=50.0),)
     """
     full = {name: name for name, _ in detectors} | {short: name for name, short in detectors} | {ALL: ALL}
     rules = []
-    for key in table.values:
-        detector, group, figure = _split(table, key)
-        if detector not in full:
-            raise table.fault(key, f"unknown detector '{detector}'", nearest(detector, full))
-        if group != ALL and group not in (*groups, *kinds):
-            raise table.fault(key, f"unknown group '{group}'", nearest(group, [ALL, *groups, *kinds]))
-        if figure not in FIGURES:
-            raise table.fault(key, f"unknown metric '{figure}'", nearest(figure, FIGURES))
-        if group in kinds and group not in groups and figure in COUNTED_ALWAYS:
-            raise table.fault(key, f"{figure} of one kind of contacts", "set this limit for the whole group")
-        least, largest = _bounds(table, key)
-        rules.append(LimitRule(key, full[detector], group, figure, least, largest))
+    for key, bounds in limits.items():
+        detector, _, rest = key.partition(".")
+        group, _, figure = rest.rpartition(".")  # the name of a group may contain dots
+        group = group or ALL
+        if not rest:
+            place.note(key, "does not name a metric", 'give "detector.group.metric", e.g. "*.stiff.p95_ms"')
+        elif detector not in full:
+            place.note(key, f"unknown detector '{detector}'", nearest(detector, full))
+        elif group != ALL and group not in (*groups, *kinds):
+            place.note(key, f"unknown group '{group}'", nearest(group, [ALL, *groups, *kinds]))
+        elif figure not in FIGURES:
+            place.note(key, f"unknown metric '{figure}'", nearest(figure, FIGURES))
+        elif group in kinds and group not in groups and figure in COUNTED_ALWAYS:
+            place.note(key, f"{figure} of one kind of contacts", "set this limit for the whole group")
+        else:
+            least = -math.inf if bounds.min is None else bounds.min
+            largest = math.inf if bounds.max is None else bounds.max
+            rules.append(LimitRule(key, full[detector], group, figure, least, largest))
     return tuple(rules)
 
 
@@ -214,25 +235,3 @@ def _crossed(rule: LimitRule, value: float) -> float:
 
 def _text(value: float) -> str:
     return "not reached (too many missed)" if value == math.inf else f"{value:.6g}"
-
-
-def _split(table: Table, key: str) -> tuple[str, str, str]:
-    """Return detector, group and metric; the name of a group may contain dots."""
-    parts = key.split(".")
-    if len(parts) == 2:
-        return parts[0], ALL, parts[1]
-    if len(parts) < 2:
-        raise table.fault(key, "does not name a metric", 'give "detector.group.metric", e.g. "*.stiff.p95_ms"')
-    return parts[0], ".".join(parts[1:-1]), parts[-1]
-
-
-def _bounds(table: Table, key: str) -> tuple[float, float]:
-    part = table.table(key)
-    if "min" not in part and "max" not in part:
-        raise table.fault(key, "has no bound", "give { max = 50 }, { min = 1 } or both")
-    least = part.number("min") if "min" in part else -math.inf
-    largest = part.number("max") if "max" in part else math.inf
-    part.finish()
-    if least > largest:
-        raise table.fault(key, f"has min {least:g} above max {largest:g}", "exchange them")
-    return least, largest

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import NothingValidError, SignatureError, UsageError
+from cdtool.base.settings import Positive, check, setting
 from cdtool.detectors.detection import Band, Signal
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.first_order import filtered_slope, low_passed
 from cdtool.thresholds.sections import sections
-from cdtool.thresholds.settings import check_above, check_sides
+from cdtool.thresholds.settings import SafetyFactor, SidesOfMachine
 
 # Never a measured torque: the controller's response to a contact would raise the limit.
 _INPUTS = ("reference_speed", "reference_torque")
@@ -89,17 +90,6 @@ class FittedAdaptive:
 class Adaptive:
     """Limits -+ (c + sum g_j LP{|HP{u_j}|} + `safety_factor` s) on the signal, u_j the references.
 
-    Parameters
-    ----------
-    safety_factor : float
-        k: number of standard deviations s of what the references do not explain.
-    sides : {"one", "two"}, optional
-        "one" monitors the side that opposes the reference speed; None: both.
-    high_pass : float
-        Time constant T1 of HP = s T1 / (1 + s T1) [s].
-    low_pass : float
-        Time constant T2 of LP = 1 / (1 + s T2) [s].
-
     Raises
     ------
     UsageError
@@ -127,19 +117,17 @@ class Adaptive:
     (-5.0, 5.0)
     """
 
-    safety_factor: float = 5.5
-    sides: str | None = None
-    high_pass: float = 0.1
-    low_pass: float = 0.1
+    safety_factor: SafetyFactor = 5.5
+    sides: SidesOfMachine = None
+    high_pass: Annotated[Positive, setting("time constant T1 of HP = s T1 / (1 + s T1)", unit="s")] = 0.1
+    low_pass: Annotated[Positive, setting("time constant T2 of LP = 1 / (1 + s T2)", unit="s")] = 0.1
 
     name: ClassVar[str] = "adaptive"
     needs: ClassVar[tuple[str, ...]] = ("reference_speed",)
     fitted: ClassVar[tuple[type, ...]] = (FittedAdaptive,)
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        check_above(self.high_pass, 0.0, "high_pass")
-        check_above(self.low_pass, 0.0, "low_pass")
+        check(self)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedAdaptive:
         """Learn the gains from at least 2 impact-free runs of any class; see `Threshold.fit`."""

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.errors import UsageError
 from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.base.settings import Positive, check, setting
 from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.recordings.motion.evident_motion import evident_speed
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.settings import check_above, check_sides
+from cdtool.thresholds.settings import SafetyFactor, SidesOfMachine
 
 # Below this share of the highest speed so far, a joint rests or starts: that is not its motion.
 _SHARE = 0.1
@@ -115,20 +115,6 @@ class FittedBaseline:
 class Baseline:
     """Constant limits per run and joint, from the run's own first seconds in motion; nothing is learned before.
 
-    Parameters
-    ----------
-    safety_factor : float
-        Number of spreads from the median to the limit; the spread is half the distance between the quantiles of
-        15.9 % and 84.1 %, which is the standard deviation of normally distributed samples.
-    warm_up : float
-        How long a joint has to move before its limits are known [s]. Until then it is not assessable. At 30 to 60 Hz,
-        1 s has too few samples for the spread of noise that is correlated.
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the present motion; None: both.
-    widen : bool
-        Multiply the spread by sqrt(1 + time since the warm-up / `warm_up`), as the deviation of a random walk grows:
-        fewer false alarms of a signal that wanders, and later alarms.
-
     Raises
     ------
     UsageError
@@ -149,10 +135,19 @@ class Baseline:
     FittedBaseline(warm_up=0.5, safety_factor=10.0, sides='two', widen=False)
     """
 
-    safety_factor: float = 10.0
-    warm_up: float = 1.5
-    sides: str | None = None
-    widen: bool = False
+    safety_factor: SafetyFactor = 10.0
+    warm_up: Annotated[
+        Positive,
+        setting("how long a joint has to move before its limits are known", unit="s"),
+    ] = 1.5
+    sides: SidesOfMachine = None
+    widen: Annotated[
+        bool,
+        setting(
+            "multiply the spread by sqrt(1 + time since the warm-up / `warm_up`), as a random walk grows: fewer false "
+            "alarms of a signal that wanders, and later alarms"
+        ),
+    ] = False
 
     name: ClassVar[str] = "baseline"
     needs: ClassVar[tuple[str, ...]] = ("speed",)
@@ -160,12 +155,7 @@ class Baseline:
     per_run: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        check_above(self.warm_up, 0.0, "warm-up")
-        if not math.isfinite(self.safety_factor * self.warm_up):
-            raise UsageError(
-                f"warm-up is {self.warm_up:g} s, safety factor {self.safety_factor:g}", "give finite numbers"
-            )
+        check(self)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedBaseline:  # noqa: ARG002  the contract's
         """Return the threshold; it needs no runs."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 
 from cdtool.base.errors import UsageError
+from cdtool.base.settings import NOT_A_KEY, Positive, check, setting
 from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.recording import Recording
@@ -21,7 +22,7 @@ from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.limit_and_trend import LimitAndTrend
 from cdtool.thresholds.predicted_limit import PredictedLimit
-from cdtool.thresholds.settings import check_sides, with_context
+from cdtool.thresholds.settings import SidesOfMachine, with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.trend import Trend
 
@@ -90,20 +91,6 @@ class FittedCombined:
 class Combined:
     """Several thresholds as one: an alarm if any of them is exceeded, or if all are.
 
-    Parameters
-    ----------
-    safety_factor : float
-        Multiplies the members' safety factors k_m: 1 leaves them unchanged, 2 moves all their limits to twice their
-        k_m.
-    sides : {"one", "two"}, optional
-        Passed to the members that have this setting.
-    members : tuple of str
-        Names of two thresholds or more, each with its default settings.
-    activation : {"any", "all"}
-        Whether one member or all of them must be exceeded.
-    signature : Signature, optional
-        Passed to the members that have this setting.
-
     Raises
     ------
     UsageError
@@ -128,19 +115,21 @@ class Combined:
     (1.0, 1.0)
     """
 
-    safety_factor: float = 1.0
-    sides: str | None = None
-    members: tuple[str, ...] = ("limit", "trend")
-    activation: str = "any"
-    signature: Signature | None = None
+    safety_factor: Annotated[Positive, setting("multiplies the members' safety factors")] = 1.0
+    sides: SidesOfMachine = None
+    members: Annotated[tuple[str, ...], setting("two thresholds or more, each with its defaults")] = (
+        "limit",
+        "trend",
+    )
+    activation: Annotated[Literal["any", "all"], setting("whether one member or all of them must be exceeded")] = "any"
+    signature: Annotated[Signature | None, NOT_A_KEY] = None
 
     name: ClassVar[str] = "combined"
     needs: ClassVar[tuple[str, ...]] = ()
     fitted: ClassVar[tuple[type, ...]] = (FittedCombined,)
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        known("activation", self.activation, ACTIVATIONS)
+        check(self)
         if len(self.members) < 2:
             raise UsageError(f"members are {list(self.members)}", "two or more thresholds are needed")
         for name in self.members:

@@ -4,36 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
+from cdtool.base.settings import NOT_A_KEY, Positive, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.innovation import check_order
 from cdtool.thresholds.sections import filtered, section_bounds
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential
-from cdtool.thresholds.settings import check_above, check_sides
+from cdtool.thresholds.settings import Order, SafetyFactor, SidesOfMachine
 from cdtool.thresholds.signature import Signature
 
 
 @dataclass(frozen=True)
 class Cusum:
     """Limits -+ `safety_factor` on the cumulative sum of the innovations beyond a drift.
-
-    Parameters
-    ----------
-    safety_factor : float
-        The limit, in standard deviations of the innovation.
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the motion; None: both.
-    order : int
-        Order p of the autoregressive model, 1 to 20.
-    drift : float
-        Half the shift to be detected, in standard deviations of the innovation.
-    signature : Signature, optional
-        How mean and spread are learned; by default `Signature()`.
 
     Raises
     ------
@@ -61,11 +48,11 @@ class Cusum:
     [0.0, 0.0, 2.0, 4.0, 6.0]
     """
 
-    safety_factor: float = 15.0
-    sides: str | None = None
-    order: int = 4
-    drift: float = 1.0
-    signature: Signature | None = None
+    safety_factor: SafetyFactor = 15.0
+    sides: SidesOfMachine = None
+    order: Order = 4
+    drift: Annotated[Positive, setting("what each sample takes off the sum, in standard deviations")] = 1.0
+    signature: Annotated[Signature | None, NOT_A_KEY] = None
 
     name: ClassVar[str] = "cusum"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
@@ -74,9 +61,7 @@ class Cusum:
     searched: ClassVar[Mapping[str, tuple[float, ...]]] = {"order": (4, 12), "drift": (0.25, 0.5, 1.0, 2.0)}
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        check_order(self.order)
-        check_above(self.drift, 0.0, "drift")
+        check(self)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
         """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -44,8 +44,10 @@ class Grids(NamedTuple):
     travel_step: float
 
 
-RULES = ("pooled", "thesis")
-SIDES = ("one", "two")
+Rule = Literal["pooled", "thesis"]
+Sides = Literal["one", "two"]
+RULES: tuple[Rule, ...] = get_args(Rule)
+SIDES: tuple[Sides, ...] = get_args(Sides)
 
 
 @dataclass(frozen=True)

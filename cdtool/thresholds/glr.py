@@ -4,37 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
+from cdtool.base.settings import NOT_A_KEY, Count, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.innovation import check_order
 from cdtool.thresholds.sections import filtered, section_bounds
 from cdtool.thresholds.sequential import FittedSequential, fit_sequential
-from cdtool.thresholds.settings import check_sides
+from cdtool.thresholds.settings import Order, SafetyFactor, SidesOfMachine
 from cdtool.thresholds.signature import Signature
+
+#: A shift in octaves of samples: each finds shifts that grew in about so many.
+_WINDOWS = (4, 8, 16, 32, 64, 128)
 
 
 @dataclass(frozen=True)
 class Glr:
     """Limits -+ `safety_factor` on the window-limited likelihood ratio for a shift of the innovations.
-
-    Parameters
-    ----------
-    safety_factor : float
-        The limit, in standard deviations.
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the motion; None: both.
-    order : int
-        Order p of the autoregressive model, 1 to 20.
-    windows : tuple of int
-        Numbers L of last samples over which a shift is sought.
-    signature : Signature, optional
-        How mean and spread are learned; by default `Signature()`.
 
     Raises
     ------
@@ -62,11 +52,11 @@ class Glr:
     [0.0, 0.0, 2.0, 2.0, 3.0, 4.0]
     """
 
-    safety_factor: float = 9.0
-    sides: str | None = None
-    order: int = 4
-    windows: tuple[int, ...] = (4, 8, 16, 32, 64, 128)
-    signature: Signature | None = None
+    safety_factor: SafetyFactor = 9.0
+    sides: SidesOfMachine = None
+    order: Order = 4
+    windows: Annotated[tuple[Count, ...], setting("numbers of last samples in which a shift is sought")] = _WINDOWS
+    signature: Annotated[Signature | None, NOT_A_KEY] = None
 
     name: ClassVar[str] = "glr"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
@@ -75,10 +65,9 @@ class Glr:
     searched: ClassVar[Mapping[str, tuple[int, ...]]] = {"order": (4, 12)}
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        check_order(self.order)
-        if not self.windows or min(self.windows) < 1:
-            raise UsageError(f"windows are {list(self.windows)}", "numbers of samples, each at least 1")
+        check(self)
+        if not self.windows:
+            raise UsageError("windows are empty", "give numbers of samples, each at least 1")
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
         """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""

@@ -4,30 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from cdtool.base.errors import UsageError
+from cdtool.base.settings import NOT_A_KEY, check
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.sequential import LARGEST_ORDER, FittedSequential, fit_sequential
-from cdtool.thresholds.settings import check_sides
+from cdtool.thresholds.sequential import FittedSequential, fit_sequential
+from cdtool.thresholds.settings import Order, SafetyFactor, SidesOfMachine
 from cdtool.thresholds.signature import Signature
 
 
 @dataclass(frozen=True)
 class Innovation:
     """Limits -+ `safety_factor` on the innovation: the part of a sample that the previous ones do not predict.
-
-    Parameters
-    ----------
-    safety_factor : float
-        The limit, in standard deviations of the innovation.
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the motion; None: both.
-    order : int
-        Order p of the autoregressive model, 1 to 20.
-    signature : Signature, optional
-        How mean and spread are learned; by default `Signature()`.
 
     Raises
     ------
@@ -62,10 +51,10 @@ class Innovation:
     (1.0, 5.5)
     """
 
-    safety_factor: float = 5.5
-    sides: str | None = None
-    order: int = 4
-    signature: Signature | None = None
+    safety_factor: SafetyFactor = 5.5
+    sides: SidesOfMachine = None
+    order: Order = 4
+    signature: Annotated[Signature | None, NOT_A_KEY] = None
 
     name: ClassVar[str] = "innovation"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
@@ -74,8 +63,7 @@ class Innovation:
     searched: ClassVar[Mapping[str, tuple[int, ...]]] = {"order": (4, 12)}
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        check_order(self.order)
+        check(self)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
         """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""
@@ -84,9 +72,3 @@ class Innovation:
     def statistic(self, innovations: Signal, side: int, longest_gap: float) -> Signal:  # noqa: ARG002 - both signs serve
         """Return the innovations unchanged."""
         return innovations
-
-
-def check_order(order: int) -> None:
-    """Raise UsageError for an order outside 1 to `LARGEST_ORDER`."""
-    if not 1 <= order <= LARGEST_ORDER:
-        raise UsageError(f"order is {order}", f"a whole number from 1 to {LARGEST_ORDER}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
 from cdtool.base.errors import NothingValidError, SignatureError, UsageError
+from cdtool.base.settings import Positive, check, setting
 from cdtool.detectors.detection import Band, Signal
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import with_limits
@@ -86,14 +87,6 @@ class FittedLimit:
 class Limit:
     """Constant limits: the mean of the runs' extremes, `safety_factor` of their standard deviations further out.
 
-    Parameters
-    ----------
-    safety_factor : float
-        Number of standard deviations (n - 1) from the mean extreme to the limit.
-    limits : tuple of float
-        Fixed limits |i| < limit in the signal's unit, one for all joints or one per joint, in place of learned ones;
-        infinite: the joint is not monitored.
-
     Raises
     ------
     UsageError
@@ -117,16 +110,24 @@ class Limit:
     [0.0, 15.0]
     """
 
-    safety_factor: float = 5.5
-    limits: tuple[float, ...] = ()
+    safety_factor: Annotated[Positive, setting("spreads from the mean extreme of the runs to the limit")] = 5.5
+    limits: Annotated[
+        tuple[Positive, ...],
+        setting(
+            "fixed limits of |signal| in its unit in place of learned ones, one for all joints or one each; "
+            "inf: not monitored",
+            infinite=True,
+        ),
+    ] = ()
 
     name: ClassVar[str] = "limit"
     needs: ClassVar[tuple[str, ...]] = ()
     fitted: ClassVar[tuple[type, ...]] = (FittedLimit,)
 
     def __post_init__(self) -> None:
+        check(self)
         if self.limits:
-            self.given(self.limits)  # raises UsageError for values that are not limits
+            self.given(self.limits)  # raises UsageError if they leave no joint
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedLimit:
         """Learn limits from at least 2 impact-free runs; see `Threshold.fit`."""

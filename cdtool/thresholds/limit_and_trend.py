@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
+from msgspec import Meta
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import UsageError
+from cdtool.base.settings import Positive, check, setting
 from cdtool.detectors.detection import Band, Signal
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.common_class import common_class
-from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.limit import FittedLimit, Limit
-from cdtool.thresholds.settings import check_above, check_sides, on_side, watched_side
+from cdtool.thresholds.settings import SafetyFactor, SidesOfMachine, on_side, watched_side
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
 from cdtool.thresholds.trend import trend_of
 
@@ -89,23 +90,6 @@ class FittedTrendTable:
 class LimitAndTrend:
     """Limits on the value that depend on its trend: early for a fast rise, wide otherwise.
 
-    Parameters
-    ----------
-    safety_factor : float
-        Number of standard deviations (n - 1) from the mean extreme of the runs to the limit.
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the motion; None: both.
-    shape : {"line", "table"}
-        "line": statistic = i + `lead` di/dt, a straight line in the plane of value and trend. "table": I_max =
-        f(di/dt), a limit on i for each of `steps` levels of the trend.
-    lead : float
-        How far ahead the line extrapolates [s].
-    time_constant : float
-        Time constant of the low-pass of the trend [s].
-    steps : int
-        Number of levels of the table; at each, the limit is learned from the runs' extremes of i where the trend is at
-        or above it.
-
     Raises
     ------
     UsageError
@@ -128,12 +112,23 @@ class LimitAndTrend:
     51.9
     """
 
-    safety_factor: float = 5.5
-    sides: str | None = None
-    shape: str = "line"
-    lead: float = 0.02
-    time_constant: float = 0.02
-    steps: int = 5
+    safety_factor: SafetyFactor = 5.5
+    sides: SidesOfMachine = None
+    shape: Annotated[
+        Literal["line", "table"],
+        setting(
+            "line: i + `lead` di/dt, a straight line in the plane of value and trend; table: a limit on i for each of "
+            "`steps` levels of the trend"
+        ),
+    ] = "line"
+    lead: Annotated[Positive, setting("how far ahead the line extrapolates", unit="s")] = 0.02
+    time_constant: Annotated[Positive, setting("of the low-pass of the trend", unit="s")] = 0.02
+    steps: Annotated[
+        Annotated[int, Meta(ge=2)],
+        setting(
+            "levels of the table; the limit at each is learned from the extremes of i where the trend is at least that"
+        ),
+    ] = 5
 
     name: ClassVar[str] = "limit_and_trend"
     needs: ClassVar[tuple[str, ...]] = ()
@@ -141,11 +136,7 @@ class LimitAndTrend:
     searched: ClassVar[Mapping[str, tuple[float, ...]]] = {"time_constant": (0.005, 0.01, 0.02, 0.04)}
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        known("shape", self.shape, SHAPES)
-        check_above(self.lead, 0.0, "lead")
-        check_above(self.time_constant, 0.0, "time_constant")
-        check_above(self.steps, 1, "steps")
+        check(self)
 
     @property
     def by_class(self) -> bool:

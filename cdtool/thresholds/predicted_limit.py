@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from msgspec import Meta
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import UsageError
 from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.base.settings import NotNegative, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.sections import filtered
-from cdtool.thresholds.settings import check_sides
+from cdtool.thresholds.settings import SafetyFactor, SidesOfMachine
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
 
 # What is left of the first samples' weight when the prediction is trusted.
@@ -25,19 +26,6 @@ _SETTLED = 0.01
 @dataclass(frozen=True)
 class PredictedLimit:
     """Constant limits on the prediction of the signal, by a polynomial fitted recursively.
-
-    Parameters
-    ----------
-    safety_factor : float
-        Number of standard deviations (n - 1) from the mean extreme of the runs to the limit.
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the motion; None: both.
-    order : {1, 2}
-        A line or a parabola.
-    forgetting : float
-        Weight of a sample relative to the next one, 0.5 to below 1; the memory is 1 / (1 - forgetting) samples.
-    ahead : float
-        How far ahead the signal is predicted, in sample periods of the runs learned from.
 
     Raises
     ------
@@ -64,24 +52,21 @@ class PredictedLimit:
     50.9
     """
 
-    safety_factor: float = 5.5
-    sides: str | None = None
-    order: int = 1
-    forgetting: float = 0.95
-    ahead: float = 10.0
+    safety_factor: SafetyFactor = 5.5
+    sides: SidesOfMachine = None
+    order: Annotated[Literal[1, 2], setting("1: a line, 2: a parabola")] = 1
+    forgetting: Annotated[
+        Annotated[float, Meta(ge=0.5, lt=1.0)],
+        setting("weight of a sample relative to the next one; the memory is 1 / (1 - forgetting) samples"),
+    ] = 0.95
+    ahead: Annotated[NotNegative, setting("how far ahead the signal is predicted", unit="sample periods")] = 10.0
 
     name: ClassVar[str] = "predicted_limit"
     needs: ClassVar[tuple[str, ...]] = ()
     fitted: ClassVar[tuple[type, ...]] = (FittedStatisticLimit,)
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        if self.order not in (1, 2):
-            raise UsageError(f"order is {self.order}", "1 (a line) or 2 (a parabola)")
-        if not 0.5 <= self.forgetting < 1.0:
-            raise UsageError(f"forgetting is {self.forgetting:g}", "at least 0.5 and below 1, e.g. 0.95")
-        if not self.ahead >= 0.0:
-            raise UsageError(f"ahead is {self.ahead:g}", "a number of samples, at least 0")
+        check(self)
 
     @property
     def by_class(self) -> bool:

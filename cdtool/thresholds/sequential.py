@@ -16,9 +16,6 @@ from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.stored import rule_from_dict, rule_to_dict
 from cdtool.thresholds.whitening import Whitening
 
-# No model of a higher order is learned from a few runs.
-LARGEST_ORDER = 20
-
 
 class SequentialRule(Threshold, Protocol):
     """A threshold that derives a statistic from innovations."""

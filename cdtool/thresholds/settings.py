@@ -1,30 +1,30 @@
-"""Checks of a rule's settings, and the side that it monitors."""
+"""Settings that several rules have, and the side that a rule monitors."""
 
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
-from cdtool.base.errors import UsageError
+from msgspec import Meta
+
+from cdtool.base.settings import Positive, setting
 from cdtool.recordings.motion import MotionClass
 from cdtool.thresholds.base import Threshold
-from cdtool.thresholds.fitted_signature import SIDES, known
+from cdtool.thresholds.fitted_signature import Sides
 from cdtool.thresholds.limit import FittedLimit
 
 Rule = TypeVar("Rule", bound=Threshold)
 
-
-def check_above(value: float, least: float, what: str) -> None:
-    """Raise UsageError if a setting is not above `least`."""
-    if not value > least:
-        raise UsageError(f"{what} is {value:g}", f"a number above {least:g} is needed")
-
-
-def check_sides(safety_factor: float, sides: str | None) -> None:
-    """Raise UsageError for a wrong safety factor or an unknown side."""
-    check_above(safety_factor, 0.0, "safety factor")
-    if sides is not None:
-        known("sides", sides, SIDES)
+SafetyFactor = Annotated[Positive, setting("k: spreads from the learned mean, or from 0, to the limit")]
+SidesOfMachine = Annotated[
+    Sides | None,
+    setting("the side that opposes the motion, or both; default: one for a single joint, two for several"),
+]
+#: A differential of a higher order amplifies noise more than it whitens.
+LARGEST_ORDER = 20
+Order = Annotated[
+    Annotated[int, Meta(ge=1, le=LARGEST_ORDER)], setting("order of the model that predicts the next sample")
+]
 
 
 def watched_side(sides: str | None, motion: MotionClass | None, signed: bool) -> int:

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import NothingValidError, SignatureError, UsageError
+from cdtool.base.settings import NotNegative, Positive, check, setting
 from cdtool.detectors.detection import Signal
-from cdtool.recordings.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
+from cdtool.recordings.motion.progress import RUNNING_SHARE, START_SHARE, Alignment, Progress, progress
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
-    RULES,
-    SIDES,
     FittedSignature,
+    Rule,
     axes_of,
-    known,
 )
+from cdtool.thresholds.settings import SidesOfMachine
 from cdtool.thresholds.signature_curve import Curve, resample
 
 ENOUGH_RUNS = 10
@@ -37,30 +36,6 @@ MOST_PLACES = 20_000
 @dataclass(frozen=True)
 class Signature:
     """The normal band along the stroke: mean -+ `safety_factor` * pooled spread of at least 10 impact-free runs.
-
-    Parameters
-    ----------
-    safety_factor : float, optional
-        k; by default 5.5, or 1 with the rule "thesis".
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the motion; by default that of the machine: one for an
-        axis, two for a robot.
-    alignment : {"time_then_position", "time", "position"}
-        The location along the stroke: time since the motion began while accelerating, then travel; or only one of them.
-    rule : {"pooled", "thesis"}
-        "pooled": spread over neighbours within the window, including the deviation of the mean from its smoothed curve.
-        "thesis": mean + 1 standard deviation at each point, which raises an alarm in almost every run.
-    position_step : float
-        Grid step in load units [m, rad].
-    position_window : float
-        Neighbours within this distance are pooled, in load units [m, rad].
-    adaptive_level : float
-        The band follows the slow change of a run by at most this many spreads: other friction, temperature, an offset.
-        0: it stays where it was learned.
-    speed_range : bool
-        At speeds between two learned ones the band is interpolated; see `thresholds.speed_range`.
-    force : bool
-        Learn from fewer than 10 runs, but at least 2.
 
     Raises
     ------
@@ -89,15 +64,39 @@ class Signature:
     (25.8, -inf)
     """
 
-    safety_factor: float | None = None
-    sides: str | None = None
-    alignment: str = "time_then_position"
-    rule: str = "pooled"
-    position_step: float = 2e-3
-    position_window: float = 20e-3
-    force: bool = False
-    adaptive_level: float = 0.0
-    speed_range: bool = False
+    safety_factor: Annotated[
+        Positive | None, setting('k, standard deviations from mean to limit; default: 5.5, or 1 with the rule "thesis"')
+    ] = None
+    sides: SidesOfMachine = None
+    alignment: Annotated[
+        Alignment,
+        setting("location along the stroke: time while accelerating, then travel; or one of them"),
+    ] = "time_then_position"
+    rule: Annotated[
+        Rule,
+        setting(
+            "pooled: spread over neighbours within the window, with the deviation of the mean from its smoothed curve; "
+            "thesis: mean + 1 standard deviation at each point, which raises an alarm in almost every run"
+        ),
+    ] = "pooled"
+    position_step: Annotated[Positive, setting("grid along the travel", unit="m or rad")] = 2e-3
+    position_window: Annotated[
+        Positive, setting("neighbours pooled to either side; at least the step", unit="m or rad")
+    ] = 20e-3
+    force: Annotated[bool, setting("learn from fewer than 10 runs, but at least 2")] = False
+    adaptive_level: Annotated[
+        NotNegative,
+        setting(
+            "the band follows the slow change of a run by at most this many spreads (temperature, an offset); "
+            "0: it stays; only with the threshold `signature`"
+        ),
+    ] = 0.0
+    speed_range: Annotated[
+        bool,
+        setting(
+            'between two learned speeds the band is interpolated; only with the threshold `signature`, not with "time"'
+        ),
+    ] = False
 
     name: ClassVar[str] = "signature"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
@@ -105,16 +104,9 @@ class Signature:
     by_class: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        known("rule", self.rule, RULES)
-        if self.sides is not None:
-            known("sides", self.sides, SIDES)
-        known("alignment", self.alignment, ALIGNMENTS)
-        if self.safety_factor is not None and not self.safety_factor > 0.0:
-            raise UsageError(f"safety factor is {self.safety_factor}", "a number above 0 is needed")
-        if not (0.0 < self.position_step <= self.position_window):
-            raise UsageError("the grid step must be above 0 and at most the window", "see docs/signature.md")
-        if not 0.0 <= self.adaptive_level < math.inf:
-            raise UsageError(f"adaptive_level is {self.adaptive_level}", "give a number of spreads; 0: the band stays")
+        check(self)
+        if self.position_step > self.position_window:
+            raise UsageError("the grid step must be at most the window", "see docs/signature.md")
         if self.speed_range and self.alignment == "time":
             raise UsageError(
                 "speed_range cannot be combined with alignment 'time': at another speed a time is another location",

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from cdtool.base.arrays import FloatArray
+from cdtool.base.settings import Positive, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.first_order import filtered_slope
 from cdtool.thresholds.sections import filtered
-from cdtool.thresholds.settings import check_above, check_sides
+from cdtool.thresholds.settings import SafetyFactor, SidesOfMachine
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
 
 # Time constants until a first-order filter has settled to 5 %.
@@ -21,15 +22,6 @@ SETTLE = 3.0
 @dataclass(frozen=True)
 class Trend:
     """Constant limits on the trend of the signal, s / (1 + s `time_constant`) i.
-
-    Parameters
-    ----------
-    safety_factor : float
-        Number of standard deviations (n - 1) from the mean extreme of the runs to the limit.
-    sides : {"one", "two"}, optional
-        "one" monitors the side on which an obstacle opposes the motion; None: both.
-    time_constant : float
-        Time constant of the low-pass [s]; 0.01 to 0.03 is usual.
 
     Raises
     ------
@@ -52,9 +44,9 @@ class Trend:
     (100.0, 'N/s')
     """
 
-    safety_factor: float = 5.5
-    sides: str | None = None
-    time_constant: float = 0.02
+    safety_factor: SafetyFactor = 5.5
+    sides: SidesOfMachine = None
+    time_constant: Annotated[Positive, setting("of the low-pass of the derivative", unit="s")] = 0.02
 
     name: ClassVar[str] = "trend"
     needs: ClassVar[tuple[str, ...]] = ()
@@ -62,8 +54,7 @@ class Trend:
     searched: ClassVar[Mapping[str, tuple[float, ...]]] = {"time_constant": (0.005, 0.01, 0.02, 0.04)}
 
     def __post_init__(self) -> None:
-        check_sides(self.safety_factor, self.sides)
-        check_above(self.time_constant, 0.0, "time_constant")
+        check(self)
 
     @property
     def by_class(self) -> bool:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
 
 from cdtool.base.errors import UsageError
+from cdtool.base.settings import Positive, check, setting
 
 # The longest hold [s]: later the rest level would rest on the contact itself.
 LONGEST_HOLD = 0.1
-# A setting in samples means those of a load cell of 1 kHz: so many seconds each.
-SAMPLE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -42,21 +43,35 @@ class OnsetRule:
     'load cell above 20 N for 3 ms, followed back to 8 N'
     """
 
-    above: float | None = None
-    back_to: float | None = None
-    hold: float = 0.003
-    sigmas: float = 8.0
-    separation: float = 1.0
+    above: Annotated[
+        Positive | None,
+        setting(
+            "upper level over the rest level before the contact; default: `sigmas` standard deviations of the noise",
+            key="above_n",
+            unit="N",
+        ),
+    ] = None
+    back_to: Annotated[
+        Positive | None,
+        setting("lower level over the rest level, at most `above_n`; default: half of it", key="back_to_n", unit="N"),
+    ] = None
+    hold: Annotated[
+        Annotated[float, Meta(ge=0.0, le=LONGEST_HOLD)],
+        setting(
+            "how long the force must stay above the upper level; with a slower cell one sample is enough",
+            key="hold_s",
+            unit="s",
+        ),
+    ] = 0.003
+    sigmas: Annotated[Positive, setting("standard deviations of the noise, if `above_n` is not given")] = 8.0
+    separation: Annotated[
+        Positive, setting("contacts closer than this are one, with a rebound", key="separation_s", unit="s")
+    ] = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("above", "back_to", "sigmas", "separation"):
-            value = getattr(self, name)
-            if value is not None and not (value > 0.0 and math.isfinite(value)):
-                raise UsageError(f"onset: {name} is {value:g}", "give a finite number above 0")
-        if not 0.0 <= self.hold <= LONGEST_HOLD:
-            raise UsageError(f"onset: hold is {self.hold:g} s", f"give 0 to {LONGEST_HOLD:g} s")
+        check(self)
         if self.above is not None and self.back_to is not None and self.back_to > self.above:
-            raise UsageError(f"onset: back_to is {self.back_to:g}, more than above", "give at most the value of above")
+            raise UsageError(f"back_to_n is {self.back_to:g}, more than above_n", "give at most above_n")
 
     @property
     def described(self) -> str:

@@ -22,7 +22,6 @@ import numpy as np
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection, detect_operations, run_detector_on_each
 from cdtool.base.errors import CdtoolError
-from cdtool.base.tables import Table
 from cdtool.commands.learning.fitting import Fitted, fitting, for_machine
 from cdtool.detectors import DETECTORS
 from cdtool.machines.linear_axis import LinearAxis
@@ -52,7 +51,7 @@ def machine_of(name: str) -> Any:
     """The machine of that name: one, two or six joints."""
     if name == "axis":
         values = {"motor_inertia": 9.5e-4, "load_mass": 620.0, "transmission_ratio": 1.333e-3, "viscous_friction": 2e-4}
-        return LinearAxis.from_table(Table(values, "machine.toml", "machine."))
+        return LinearAxis.of(values)
     if name == "arm":
         keys = {
             "coordinates": "motor",
@@ -64,7 +63,7 @@ def machine_of(name: str) -> Any:
             "transmission_ratio": 1.0 / 60.0,
             "imu_position": [0.22, 0.20],
         }
-        return PlanarArm.from_table(Table(keys, "machine.toml", "machine."))
+        return PlanarArm.of(keys)
     return six_joint_robot(Path(tempfile.mkdtemp()))
 
 

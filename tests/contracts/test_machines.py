@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdtool.base.tables import Table
 from cdtool.commands.simulate.arm_model import simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters
 from cdtool.commands.simulate.arm_recordings import as_recording
@@ -31,7 +30,7 @@ def machine(request, tmp_path_factory) -> Any:
     if request.param == "rotary_axis":
         friction = {"coulomb_friction": 0.02, "coulomb_slope": 50.0}  # smooth: nothing sticks
         values = {"motor_inertia": 1e-3, "load_inertia": 2.0, "transmission_ratio": 0.01, **friction}
-        return RotaryAxis.from_table(Table(values, "machine.toml", "machine."))
+        return RotaryAxis.of(values)
     if request.param == "planar_arm":
         return arm_of(ARM)
     if request.param == "urdf_robot":

@@ -43,7 +43,7 @@ def test_joint_map_gives_the_urdfs_names_of_the_logs_joints(tmp_path):
 
 def test_joint_map_may_name_joints_of_the_log_only(tmp_path):
     fault = refused(tmp_path, joint_map={"shoulder": "pan"})
-    assert "machine.joint_map.shoulder: is no joint of the log" in fault.message
+    assert "machine.joint_map.shoulder: is not a joint of the log" in fault.message
     assert "pan" in fault.hint
 
 

@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from cdtool.base.tables import Table
-from cdtool.results.limits import read_limits
+from cdtool.base.settings import Place
+from cdtool.results.limits import Bounds, limit_rules
 from cdtool.results.summary import FIGURES
 
 yaml = pytest.importorskip("yaml")
@@ -173,6 +173,7 @@ def test_the_page_names_every_quantity_and_its_limits_are_valid():
     table = [line for line in section.splitlines() if line.startswith("| `")]
     assert set(re.findall(r"`(\w+)`", "".join(line.split("|")[1] for line in table))) == set(FIGURES)
     (block,) = re.findall(r"```toml\n(.*?)```", section, re.DOTALL)
-    limits = Table(tomllib.loads(block)["limits"], "ci.md", "limits.")
+    limits = {key: Bounds(**value) for key, value in tomllib.loads(block)["limits"].items()}
+    place = Place("ci.md", "limits.")
     known = [("friction_ekf", "feekf"), ("momentum", "gm")]
-    assert len(read_limits(limits, known, ("stiff", "soft"))) == len(block.strip().splitlines()) - 1
+    assert len(limit_rules(limits, place, known, ("stiff", "soft"))) == len(block.strip().splitlines()) - 1

@@ -32,6 +32,7 @@ from typing import Any
 import pytest
 
 import cdtool
+from cdtool.base.settings import keys_of
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
 from cdtool.thresholds import THRESHOLDS
@@ -152,7 +153,11 @@ def faults_of_function(function: Callable[..., Any], contract: bool = False) -> 
 
 def faults_of_class(rule: type) -> list[str]:
     found = sections(inspect.getdoc(rule) or "")
-    entries, fields = described(found.get("Parameters", "")), {item.name: item for item in dataclasses.fields(rule)}
+    fields = {item.name: item for item in dataclasses.fields(rule)}
+    entries = described(found.get("Parameters", ""))
+    # A field of settings is described by its annotation.
+    keys = {key.attribute: key.meaning for key in keys_of(rule).values()}
+    entries |= {name: keys.get(name) or "filled in" for name in fields if name not in entries and found and keys}
     faults = [f"does not describe {name}" for name in fields if not entries.get(name)]
     faults += [f"describes {name}, which is not a field" for name in entries if name not in fields]
     units = {name: item.metadata.get("unit", "1") for name, item in fields.items()}

@@ -35,6 +35,7 @@ SHOWN_BY = {
     "console": {"benchmark"},
     # They declare the options of these commands.
     "options": {"detect"},
+    "settings": {"learn-signature"},
     "log_options": {"detect"},
 }
 # Names of a user's own in examples.

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place
 from cdtool.commands.compare.comparison import compare_builds
 from cdtool.report.markdown.report import to_markdown
 from cdtool.report.model import report_model
@@ -17,7 +17,7 @@ from cdtool.report.writers.junit import to_junit
 from cdtool.results.changed_conditions import condition_rows
 from cdtool.results.evaluated import evaluate
 from cdtool.results.files.results_file import read_results, to_json
-from cdtool.results.limits import read_limits
+from cdtool.results.limits import Bounds, limit_rules
 from cdtool.results.results import (
     ConditionResult,
     ContactResult,
@@ -130,7 +130,10 @@ def test_a_condition_without_its_counterpart_stands_alone():
 
 def limits(text: str, largest: float):
     groups = (*BOTH.groups, *(item.group for item in WINTER))
-    return read_limits(Table({text: {"max": largest}}, "b.toml", "limits."), [(name, name) for name in NAMES], groups)
+    place = Place("b.toml", "limits.")
+    found = limit_rules({text: Bounds(max=largest)}, place, [(name, name) for name in NAMES], groups)
+    place.finish()
+    return found
 
 
 def test_a_limit_is_about_a_condition_only_if_it_names_it():

@@ -9,14 +9,14 @@ from dataclasses import replace
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place
 from cdtool.report.markdown.report import to_markdown
 from cdtool.report.model import report_model
 from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
 from cdtool.results.evaluated import evaluate
 from cdtool.results.files.results_file import read_results, to_json
-from cdtool.results.limits import read_limits
+from cdtool.results.limits import Bounds, limit_rules
 from cdtool.results.results import ContactResult, ExposureResult, Results
 from cdtool.results.summary import FIGURES, kind_group, summarise, summarise_kinds
 
@@ -84,8 +84,11 @@ def test_without_a_kind_there_is_nothing_by_kind():
 
 
 def limits(text: str, known: tuple[str, ...] = KINDS):
-    table = Table(tomllib.loads(text), "b.toml", "limits.")
-    return read_limits(table, [("momentum", "gm"), ("pure_torque", "pt")], ("stiff", "holdout"), known)
+    place = Place("b.toml", "limits.")
+    bounds = {key: Bounds(**value) for key, value in tomllib.loads(text).items()}
+    found = limit_rules(bounds, place, [("momentum", "gm"), ("pure_torque", "pt")], ("stiff", "holdout"), known)
+    place.finish()
+    return found
 
 
 def test_a_limit_may_name_a_kind_and_a_star_does_not():

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.tables import Table
-from cdtool.results.limits import check_limits, not_met, read_limits
+from cdtool.base.settings import Place, read
+from cdtool.results.limits import Bounds, check_limits, limit_rules, not_met
 from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, Results
 from cdtool.results.summary import FIGURES, summarise
 from cdtool.statistics.rates import poisson_at_most
@@ -49,8 +49,17 @@ def results() -> Results:
 SUMMARIES = summarise(results())
 
 
+@dataclass(frozen=True)
+class Limits:
+    limits: dict[str, Bounds]
+
+
 def rules(text: str):
-    return read_limits(Table(tomllib.loads(text), "b.toml", "limits."), DETECTORS, GROUPS)
+    place = Place("b.toml")
+    file = read(Limits, {"limits": tomllib.loads(text)}, place)
+    found = limit_rules(file.limits, place.below("limits"), DETECTORS, GROUPS)
+    place.finish()
+    return found
 
 
 def check(text: str):

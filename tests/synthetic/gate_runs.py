@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 
-from cdtool.base.tables import Table
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
@@ -15,9 +14,7 @@ from cdtool.machines.linear_axis import LinearAxis
 from cdtool.recordings.recording import Recording
 
 GATE = GateParameters()
-ON_LOAD_SIDE = LinearAxis.from_table(
-    Table({"name": "gate", "coordinates": "load", "load_mass": GATE.leaf_mass + GATE.motor_mass}, "machine.toml")
-)
+ON_LOAD_SIDE = LinearAxis.of({"name": "gate", "coordinates": "load", "load_mass": GATE.leaf_mass + GATE.motor_mass})
 
 
 def on_any_track(gate: GateParameters, seed: int) -> GateParameters:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from cdtool.base.tables import Table
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.machines.planar_arm import PlanarArm
 
@@ -16,7 +15,7 @@ GATE = {
 
 def machine_of(values: dict[str, object]) -> LinearAxis:
     """Return a linear axis from the keys of its [machine] table."""
-    machine = LinearAxis.from_table(Table(values, "machine.toml", "machine."))
+    machine = LinearAxis.of(values)
     assert isinstance(machine, LinearAxis)
     return machine
 
@@ -36,4 +35,4 @@ ARM = {
 
 def arm_of(values: dict[str, object]) -> PlanarArm:
     """Return a planar arm from the keys of its [machine] table."""
-    return PlanarArm.from_table(Table(values, "machine.toml", "machine."))
+    return PlanarArm.of(values)

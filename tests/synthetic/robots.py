@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cdtool.base.tables import Table
 from cdtool.machines.urdf_robot import UrdfRobot
 
 _LINK = """<link name="{name}"><inertial><origin xyz="{com}" rpy="0 0 0"/><mass value="{mass}"/>
@@ -49,13 +48,10 @@ def six_joint_robot(folder: Path, joints: Sequence[str] = JOINTS, **keys: object
         "coulomb_slope": 50.0,
         **keys,
     }
-    return UrdfRobot.from_table(Table(values, str(folder / "machine.toml"), "machine."))
+    return UrdfRobot.of(values, str(folder / "machine.toml"))
 
 
 def urdf_robot(folder: Path, urdf: str, values: Mapping[str, object]) -> UrdfRobot:
     """Return a machine from the text of a URDF and the keys of its [machine] table; requires pinocchio."""
     (folder / "robot.urdf").write_text(urdf, encoding="utf-8")
-    table = Table({"urdf": "robot.urdf", **values}, str(folder / "machine.toml"), "machine.")
-    robot = UrdfRobot.from_table(table)
-    table.finish()
-    return robot
+    return UrdfRobot.of({"urdf": "robot.urdf", **values}, str(folder / "machine.toml"))

@@ -63,5 +63,5 @@ def test_members_that_are_not_known_or_too_few_are_refused():
         Combined(members=("limit", "trent"))
     with pytest.raises(UsageError, match="two or more"):
         Combined(members=("limit",))
-    with pytest.raises(UsageError, match="unknown activation"):
+    with pytest.raises(UsageError, match="activation is 'some'"):
         Combined(activation="some")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cdtool.base.errors import CdtoolError
+from cdtool.base.errors import CdtoolError, MistakesError
 from cdtool.base.exit_status import Fact, status_of
 from cdtool.base.files.strict_json import strict_json
 from cdtool.base.plain_text import LINE_LENGTH, counted, one_line, reason_line, shorten_names, shorten_paths
@@ -45,7 +45,14 @@ _REDRAWN = 0.1
 
 
 def print_error(fault: CdtoolError) -> None:
-    """Print an error in one line of at most 300 characters: the problem, then the next step; before it, its notes."""
+    """Print an error in one line of at most 300 characters: the problem, then the next step; before it, its notes.
+
+    Several mistakes of a file have one line each.
+    """
+    if isinstance(fault, MistakesError):
+        for mistake in fault.mistakes:
+            print_error(mistake)
+        return
     for note in getattr(fault, "__notes__", ()):
         typer.echo(one_line(note), err=True)
     message, hint = plain(fault.message), plain(fault.hint)

@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+from msgspec import Meta
 
 from cdtool.base.errors import ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import joined
-from cdtool.base.tables import Table, read_toml
+from cdtool.base.settings import Count, CountFromZero, NotNegative, Place, Positive, read, setting
+from cdtool.base.tables import read_toml
 from cdtool.commands.inject.assumption import Assumption
 from cdtool.commands.inject.robot_contact import StruckPoint
 from cdtool.commands.judging.named_logs import LogsOf
@@ -33,6 +36,35 @@ _SHIPPED = Path(__file__).with_name("obstacles.toml")
 _PER_MM = 1e3  # N/mm in N/m
 
 
+@dataclass(frozen=True, kw_only=True)
+class ObstacleTable:
+    """[inject.obstacles.NAME], or an obstacle of a file: one of a profile, a spring or a force curve."""
+
+    profile: Annotated[str, setting("name of an obstacle of the obstacle file")] = ""
+    stiffness_n_per_mm: Annotated[Positive | None, setting("of a spring", unit="N/mm")] = None
+    force_n: Annotated[tuple[NotNegative, ...], setting("forces of a curve, from 0", unit="N")] = ()
+    deflection_mm: Annotated[tuple[NotNegative, ...], setting("deflections of a curve, from 0", unit="mm")] = ()
+    damping_s_per_m: Annotated[
+        NotNegative | None, setting("T (1 + damping * speed); default: that of the profile, or 0", unit="s/m")
+    ] = None
+    in_series_n_per_mm: Annotated[
+        Positive,
+        setting("in series, such as a load cell; adds to that of a profile", unit="N/mm", infinite=True),
+    ] = math.inf
+    compare_with: Annotated[str, setting("a group of real impacts")] = ""
+    title: Annotated[str, setting("what it is, in a file of obstacles")] = ""
+    checked: Annotated[bool, setting("whether someone has checked the values against their source")] = False
+
+    def __post_init__(self) -> None:
+        names = ("profile", "stiffness_n_per_mm", "force_n")
+        forms = [name for name in names if getattr(self, name)]
+        if len(forms) != 1:
+            given = " and ".join(forms) or f"none of {', '.join(names)}"
+            raise UsageError(f"{given} is given", f"give one of {', '.join(names)}")
+        if self.force_n and (len(self.force_n) < 2 or len(self.force_n) != len(self.deflection_mm)):
+            raise UsageError("force_n and deflection_mm do not fit", "give two or more of each, both from 0")
+
+
 def shipped_obstacles(path: Path | None = None) -> dict[str, Obstacle]:
     """Return the obstacles of a file by name; by default those that ship with cdtool.
 
@@ -41,60 +73,34 @@ def shipped_obstacles(path: Path | None = None) -> dict[str, Obstacle]:
     >>> round(shipped_obstacles()["en_12453_force_meter"].steepest)
     500000
     """
-    where = str(path) if path else "the shipped obstacles.toml"
-    root = Table(read_toml(path or _SHIPPED, "a file of obstacles"), where)
-    found = {}
-    for name in root.values:
-        table = root.table(name)
-        table.text("title", "")
-        table.flag("checked", False)
-        found[name] = read_obstacle(table, {})
-    if not found:
-        raise ConfigurationError(f"{where}: contains no obstacle", "write one table per obstacle")
-    return found
+    place = Place(str(path) if path else "the shipped obstacles.toml")
+    values = read_toml(path or _SHIPPED, "a file of obstacles")
+    tables = {name: read(ObstacleTable, table, place.below(name)) for name, table in values.items()}
+    if not tables:
+        raise ConfigurationError(f"{place.where}: contains no obstacle", "write one table per obstacle")
+    place.finish()
+    return {name: _obstacle(table, {}, place.below(name)) for name, table in tables.items() if table}
 
 
-def read_obstacle(table: Table, known: Mapping[str, Obstacle]) -> Obstacle:
-    """Return the obstacle that a table describes: `profile`, `stiffness_n_per_mm`, or a force curve.
+def _obstacle(table: ObstacleTable, known: Mapping[str, Obstacle], place: Place) -> Obstacle:
+    """Return the obstacle that a table describes; raises ConfigurationError.
 
-    A curve has `deflection_mm` and `force_n`, from 0. `damping_s_per_m` is that of T (1 + damping * speed),
-    `in_series_n_per_mm` what is in series, such as a load cell. A given damping replaces a profile's, a given series
-    stiffness adds to its. Raises ConfigurationError naming the key.
+    A given damping replaces that of a profile, a given series stiffness adds to its.
     """
-    forms = [key for key in ("profile", "stiffness_n_per_mm", "force_n") if key in table]
-    if len(forms) != 1:
-        given = " and ".join(forms) or "nothing of it"
-        raise table.fault("stiffness_n_per_mm", f"{given} is given", "give one of profile, stiffness_n_per_mm, force_n")
-    damping = table.number("damping_s_per_m", 0.0, minimum=0.0)
-    series = table.number("in_series_n_per_mm", math.inf, above=0.0) * _PER_MM
-    if forms == ["profile"]:
-        name = table.text("profile")
-        if name not in known:
-            raise table.fault("profile", f"is '{name}'", nearest(name, known))
-        spring = known[name]
-        damping = damping if "damping_s_per_m" in table else spring.damping
+    damping, series = table.damping_s_per_m or 0.0, table.in_series_n_per_mm * _PER_MM
+    if table.profile:
+        if table.profile not in known:
+            raise place.fault("profile", f"is '{table.profile}'", nearest(table.profile, known))
+        spring = known[table.profile]
+        damping = spring.damping if table.damping_s_per_m is None else damping
         compliance = 1.0 / series + 1.0 / spring.series_stiffness
-        obstacle = Obstacle(spring.deflection, spring.force, damping, 1.0 / compliance if compliance else math.inf)
-    elif forms == ["stiffness_n_per_mm"]:
-        obstacle = Obstacle.spring(table.number("stiffness_n_per_mm", above=0.0) * _PER_MM, damping, series)
-    else:
-        obstacle = _curve(table, damping, series)
-    table.finish()
-    return obstacle
-
-
-def _curve(table: Table, damping: float, series: float) -> Obstacle:
-    force = table.raw("force_n")
-    if not isinstance(force, list) or len(force) < 2:
-        raise table.fault("force_n", "must be two or more forces", "give force_n and deflection_mm, both from 0")
-    forces = table.numbers("force_n", len(force), minimum=0.0)
-    deflections = table.numbers("deflection_mm", len(force), minimum=0.0)
-    if not isinstance(table.raw("deflection_mm"), list):
-        raise table.fault("deflection_mm", "must be a list", f"give {len(force)} deflections, one per force")
+        return Obstacle(spring.deflection, spring.force, damping, 1.0 / compliance if compliance else math.inf)
+    if table.stiffness_n_per_mm:
+        return Obstacle.spring(table.stiffness_n_per_mm * _PER_MM, damping, series)
     try:
-        return Obstacle(tuple(item / _PER_MM for item in deflections), forces, damping, series)
+        return Obstacle(tuple(item / _PER_MM for item in table.deflection_mm), table.force_n, damping, series)
     except ConfigurationError as fault:
-        raise table.fault("force_n", fault.message, fault.hint) from fault
+        raise place.fault("force_n", fault.message, fault.hint) from fault
 
 
 _HINT = 'give a joint and its position, as "elbow = 62deg" or "lift = 0.3m"'
@@ -196,132 +202,172 @@ class InjectSection:
         }
 
 
-def read_inject_section(table: Table, found: LogsOf, joints: tuple[str, ...], groups: tuple[str, ...]) -> InjectSection:
-    """Read and check [inject]; raises ConfigurationError naming the key.
+@dataclass(frozen=True, kw_only=True)
+class StiffnessGrid:
+    """Stiffnesses in equal steps of their logarithm, rounded to two digits."""
+
+    begin: Annotated[Positive, setting("the smallest", key="from", unit="N/mm")]
+    end: Annotated[Positive, setting("the largest", key="to", unit="N/mm")]
+    per_decade: Annotated[Count, setting("how many in a decade")] = 2
+
+    def __post_init__(self) -> None:
+        if self.end <= self.begin:
+            raise UsageError(f"to is {self.end:g}, not above from", "give a larger stiffness")
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Return the stiffnesses [N/mm]."""
+        count = max(round(float(np.log10(self.end / self.begin)) * self.per_decade), 1) + 1
+        return tuple(float(f"{value:.2g}") for value in np.geomspace(self.begin, self.end, count))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionGrid:
+    """Positions in equal steps."""
+
+    begin: Annotated[str, setting("the first, such as 0.9m, 3.2s or elbow = 62deg", key="from")]
+    end: Annotated[str, setting("the last", key="to")]
+    count: Annotated[Annotated[int, Meta(ge=2, le=_MOST_POSITIONS)], setting("how many")] = 7
+
+
+@dataclass(frozen=True, kw_only=True)
+class InjectTable:
+    """[inject]: each obstacle is put at each position into each log."""
+
+    logs: Annotated[tuple[str, ...], setting("impact-free logs; a log with a contact is left out")]
+    positions: Annotated[
+        tuple[str, ...] | PositionGrid,
+        setting("where the obstacle is reached: distances travelled (0.9m), times (3.2s) or the position of a joint"),
+    ]
+    obstacles: Annotated[dict[str, ObstacleTable], setting("obstacles by name")] = field(default_factory=dict)
+    stiffnesses_n_per_mm: Annotated[
+        tuple[Positive, ...] | StiffnessGrid, setting("springs without damping, one obstacle each", unit="N/mm")
+    ] = ()
+    obstacle_file: Annotated[
+        str, setting("a TOML file with obstacles by name, for `profile`; default: the shipped one")
+    ] = ""
+    duration_s: Annotated[
+        Positive, setting("length of a recording after its contact; a log that ends sooner is left out", unit="s")
+    ] = 1.0
+    joint: Annotated[str, setting("the axis that meets the obstacle; distances are its travel; default: the first")] = (
+        ""
+    )
+    lever_arm_m: Annotated[
+        Positive | None,
+        setting("distance of the obstacle from the axis of rotation; required for a rotary_axis, else not allowed"),
+    ] = None
+    link: Annotated[
+        str | CountFromZero, setting("planar_arm and urdf_robot, in place of `joint`: the link that meets the obstacle")
+    ] = ""
+    point: Annotated[tuple[float, float, float] | None, setting("its point in the link's frame", unit="m")] = None
+    direction: Annotated[
+        tuple[float, float, float] | Literal["motion"],
+        setting("normal of the obstacle in the axes of the base, or motion: that of the point"),
+    ] = "motion"
+    seed: Annotated[CountFromZero, setting("of the fraction of a sample at which the contact begins")] = 0
+    folder: Annotated[str, setting("where `cdtool benchmark` keeps the recordings")] = INJECTED
+    file_format: Annotated[str, setting(f"one of {', '.join(FORMATS)}", key="format")] = "csv"
+
+    def __post_init__(self) -> None:
+        if self.file_format not in FORMATS:
+            raise UsageError(f"format is '{self.file_format}'", nearest(self.file_format, FORMATS))
+        if self.direction != "motion" and not any(self.direction):
+            raise UsageError("direction has the length 0", 'give a vector such as [0, 0, 1], or "motion"')
+
+
+def inject_section(table: InjectTable, place: Place, found: LogsOf, groups: tuple[str, ...]) -> InjectSection:
+    """Return the section that [inject] describes, with mistakes of single keys in `place`; raises ConfigurationError.
 
     `groups` are the groups of real impacts that an obstacle may be compared with.
     """
-    shipped = shipped_obstacles(joined(found.base, table.text("obstacle_file")) if "obstacle_file" in table else None)
-    obstacles = _obstacles(table, shipped, groups)
     machine = found.machine_file.machine
-    struck = _struck(table, machine)
-    joint = table.choice("joint", joints, joints[0])
-    section = InjectSection(
-        logs=found.of(Table({"logs": table.raw("logs", [])}, table.where, table.prefix)),
-        obstacles=obstacles,
-        positions=_positions(table, machine),
-        duration=table.number("duration_s", 1.0, above=0.0),
-        seed=table.whole("seed", 0, minimum=0),
-        joint=joints.index(joint),
-        folder=table.text("folder", INJECTED),
-        file_format=table.choice("format", FORMATS, "csv"),
-        struck=struck,
-        lever=_lever(table, machine),
+    joints = machine.joints
+    shipped = shipped_obstacles(joined(found.base, table.obstacle_file) if table.obstacle_file else None)
+    if table.joint and table.joint not in joints:
+        place.note("joint", f"is '{table.joint}'", nearest(table.joint, joints))
+    return InjectSection(
+        logs=place.tried((), found.of, table.logs, place.key("logs")),
+        obstacles=_obstacles(table, place, shipped, groups),
+        positions=_positions(table.positions, place, machine),
+        duration=table.duration_s,
+        seed=table.seed,
+        joint=joints.index(table.joint) if table.joint in joints else 0,
+        folder=table.folder,
+        file_format=table.file_format,
+        struck=_struck(table, place, machine),
+        lever=_lever(table, place, machine),
     )
-    table.finish()
-    return section
 
 
-def _struck(table: Table, machine: Machine) -> StruckPoint | None:
+def _struck(table: InjectTable, place: Place, machine: Machine) -> StruckPoint | None:
     """Return the point of a robot that meets the obstacle; None for an axis."""
     if not has_links(machine):
-        for key in ("link", "point", "direction"):
-            if key in table:
-                raise table.fault(key, "applies to a planar_arm or urdf_robot only", "remove it")
+        for key in ("link", "point"):
+            if getattr(table, key) not in ("", None):
+                raise place.fault(key, "applies to a planar_arm or urdf_robot only", "remove it")
+        if table.direction != "motion":
+            raise place.fault("direction", "applies to a planar_arm or urdf_robot only", "remove it")
         return None
-    if "joint" in table:
-        raise table.fault("joint", "applies to axes only", "give link, and the point of it that meets the obstacle")
-    raw = table.raw("link")
-    link = table.whole("link", 0, minimum=0) if isinstance(raw, int) else table.text("link")
-    if not isinstance(table.raw("point"), list):
-        raise table.fault("point", "is missing or no list", "give [x, y, z] in the link's frame, in m")
-    x, y, z = table.numbers("point", 3)
-    return StruckPoint(link, (x, y, z), _direction(table))
+    if table.joint:
+        raise place.fault("joint", "applies to axes only", "give link, and the point of it that meets the obstacle")
+    if table.link == "":
+        raise place.fault("link", "is missing", "name the link that meets the obstacle")
+    if table.point is None:
+        raise place.fault("point", "is missing", "give [x, y, z] in the link's frame, in m")
+    return StruckPoint(table.link, table.point, None if table.direction == "motion" else table.direction)
 
 
-def _lever(table: Table, machine: Machine) -> float:
+def _lever(table: InjectTable, place: Place, machine: Machine) -> float:
     """Return the distance of the obstacle from a rotary axis [m]; 0 for other machines."""
-    if isinstance(machine, Axis) and machine.force_unit != "N":
-        if "lever_arm_m" not in table:
-            raise table.fault("lever_arm_m", "is missing", "give the obstacle's distance from the axis of rotation")
-        return table.number("lever_arm_m", above=0.0)
-    if "lever_arm_m" in table:
-        raise table.fault("lever_arm_m", "applies to a rotary_axis only", "remove it")
-    return 0.0
+    is_rotary = isinstance(machine, Axis) and machine.force_unit != "N"
+    if is_rotary and table.lever_arm_m is None:
+        raise place.fault("lever_arm_m", "is missing", "give the obstacle's distance from the axis of rotation")
+    if not is_rotary and table.lever_arm_m is not None:
+        raise place.fault("lever_arm_m", "applies to a rotary_axis only", "remove it")
+    return table.lever_arm_m or 0.0
 
 
-def _direction(table: Table) -> tuple[float, float, float] | None:
-    """Return the normal of the obstacle in the axes of the base; None for the direction of the point's motion."""
-    if not isinstance(table.raw("direction", "motion"), list):
-        table.choice("direction", ("motion",), "motion")
-        return None
-    x, y, z = table.numbers("direction", 3)
-    if math.hypot(x, y, z) == 0.0:
-        raise table.fault("direction", "has the length 0", 'give a vector such as [0, 0, 1], or "motion"')
-    return x, y, z
-
-
-def _obstacles(table: Table, shipped: Mapping[str, Obstacle], groups: tuple[str, ...]) -> tuple[NamedObstacle, ...]:
-    tables = table.table("obstacles")
+def _obstacles(
+    table: InjectTable, place: Place, shipped: Mapping[str, Obstacle], groups: tuple[str, ...]
+) -> tuple[NamedObstacle, ...]:
+    below = place.below("obstacles")
     found = []
-    for name in tables.values:
+    for name, own in table.obstacles.items():
         if not name.replace("_", "").replace("-", "").isalnum():
-            raise tables.fault(name, "is not a valid name", "use letters, digits, - and _")
-        own = tables.table(name)
-        compared = own.text("compare_with", "")
-        if compared and compared not in groups:
-            raise own.fault("compare_with", f"is '{compared}'", nearest(compared, groups))
-        found.append(NamedObstacle(name, read_obstacle(own, shipped), compared))
-    for stiffness in _stiffnesses(table):
-        found.append(NamedObstacle(f"{digits(stiffness)}_n_per_mm", Obstacle.spring(stiffness * 1e3)))
+            raise below.fault(name, "is not a valid name", "use letters, digits, - and _")
+        if own.compare_with and own.compare_with not in groups:
+            raise below.below(name).fault("compare_with", f"is '{own.compare_with}'", nearest(own.compare_with, groups))
+        found.append(NamedObstacle(name, _obstacle(own, shipped, below.below(name)), own.compare_with))
+    springs = table.stiffnesses_n_per_mm
+    for stiffness in springs.values if isinstance(springs, StiffnessGrid) else springs:
+        found.append(NamedObstacle(f"{digits(stiffness)}_n_per_mm", Obstacle.spring(stiffness * _PER_MM)))
     if not found:
-        raise table.fault(
+        raise place.fault(
             "obstacles", "is missing", "give [inject.obstacles.NAME] with stiffness_n_per_mm, or stiffnesses_n_per_mm"
         )
     if len({item.name for item in found}) < len(found):
-        raise table.fault("stiffnesses_n_per_mm", "repeats an obstacle", "list each stiffness once")
+        raise place.fault("stiffnesses_n_per_mm", "repeats an obstacle", "list each stiffness once")
     return tuple(found)
 
 
-def _stiffnesses(table: Table) -> tuple[float, ...]:
-    """Return a list of stiffnesses [N/mm], or `{ from, to, per_decade }`, rounded to two digits."""
-    if "stiffnesses_n_per_mm" not in table:
-        return ()
-    if isinstance(table.raw("stiffnesses_n_per_mm"), list):
-        return table.numbers("stiffnesses_n_per_mm", len(table.raw("stiffnesses_n_per_mm")), above=0.0)
-    grid = table.table("stiffnesses_n_per_mm")
-    low, high = grid.number("from", above=0.0), grid.number("to", above=0.0)
-    per_decade = grid.whole("per_decade", 2, minimum=1)
-    grid.finish()
-    if high <= low:
-        raise grid.fault("to", f"is {high:g}, not above from", "give a larger stiffness")
-    count = max(round(float(np.log10(high / low)) * per_decade), 1) + 1
-    return tuple(float(f"{value:.2g}") for value in np.geomspace(low, high, count))
+def _positions(given: tuple[str, ...] | PositionGrid, place: Place, machine: Machine) -> tuple[Mark, ...]:
+    """Return a list of marks, or an equal grid of marks."""
+    if isinstance(given, PositionGrid):
+        below = place.below("positions")
+        begin, end = _mark(below, "from", given.begin, machine), _mark(below, "to", given.end, machine)
+        if replace(begin, value=end.value) != end or not end.value > begin.value:
+            raise below.fault("to", "is not after from", "give both in the same unit")
+        return tuple(replace(begin, value=float(value)) for value in np.linspace(begin.value, end.value, given.count))
+    marks = tuple(_mark(place, "positions", text, machine) for text in given)
+    if len({getattr(mark, "joint", None) for mark in marks}) > 1:
+        raise place.fault("positions", "are those of different joints", "give positions of one joint")
+    if len({f"{digits(mark.value)} {mark.unit}" for mark in marks}) < len(marks):
+        raise place.fault("positions", "repeats a position", "list each position once")
+    return marks
 
 
-def _positions(table: Table, machine: Machine) -> tuple[Mark, ...]:
-    """Return a list of marks, or an equal grid `{ from, to, count }` of marks."""
-    raw = table.raw("positions")
-    if not isinstance(raw, dict):
-        marks = tuple(_mark(table, "positions", text, machine) for text in table.texts("positions"))
-        if len({getattr(mark, "joint", None) for mark in marks}) > 1:
-            raise table.fault("positions", "are those of different joints", "give positions of one joint")
-        if len({f"{digits(mark.value)} {mark.unit}" for mark in marks}) < len(marks):
-            raise table.fault("positions", "repeats a position", "list each position once")
-        return marks
-    grid = table.table("positions")
-    begin, end = (_mark(grid, name, grid.text(name), machine) for name in ("from", "to"))
-    count = grid.whole("count", 7, minimum=2)
-    grid.finish()
-    if replace(begin, value=end.value) != end or not end.value > begin.value:
-        raise grid.fault("to", "is not after from", "give both in the same unit")
-    if count > _MOST_POSITIONS:
-        raise grid.fault("count", f"is {count}", f"give at most {_MOST_POSITIONS}")
-    return tuple(replace(begin, value=float(value)) for value in np.linspace(begin.value, end.value, count))
-
-
-def _mark(table: Table, name: str, text: str, machine: Machine) -> Mark:
+def _mark(place: Place, name: str, text: str, machine: Machine) -> Mark:
     try:
         return JointMark.of_machine(text, machine) if "=" in text else Mark.parse(text)
     except UsageError as fault:
-        raise table.fault(name, fault.message, fault.hint or MARK_HINT) from fault
+        raise place.fault(name, fault.message, fault.hint or MARK_HINT) from fault

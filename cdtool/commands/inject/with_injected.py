@@ -15,9 +15,9 @@ from typing import Any
 from cdtool.base.errors import ConfigurationError, OutputError
 from cdtool.base.files.writing import replaced_folder
 from cdtool.base.remote.remote_path import joined
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place, read
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.commands.inject.inject_section import INJECTED, InjectSection, NamedObstacle, read_inject_section
+from cdtool.commands.inject.inject_section import INJECTED, InjectSection, InjectTable, NamedObstacle, inject_section
 from cdtool.commands.inject.injected_logs import InjectedCase, InjectedLogs, model_of, read_injected, write_injected
 from cdtool.commands.judging.named_logs import LogsOf
 from cdtool.commands.judging.runs import shown_path
@@ -66,17 +66,19 @@ class InjectedGroups:
     section: InjectSection
 
     @classmethod
-    def read(cls, root: Table, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]) -> InjectedGroups:
-        """Read and check [inject]; raises ConfigurationError."""
+    def read(
+        cls, table: Mapping[str, Any], place: Place, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]
+    ) -> InjectedGroups | None:
+        """Read [inject] with the mistakes in `place`; None if it cannot be used. Raises ConfigurationError."""
         if found.runs:
             hint = "write each run to its own log"
-            raise root.fault("inject", f"cannot be used with operations = '{operations}'", hint)
-        real = tuple(name for name, group in groups.items() if not group.is_impact_free and not group.condition)
-        section = read_inject_section(root.table("inject"), found, found.machine_file.machine.joints, real)
+            raise place.fault("inject", f"cannot be used with operations = '{operations}'", hint)
         for name in groups:
             if name.startswith(f"{INJECTED}_"):
-                raise root.fault("impacts", f"{name} is the name of an injected group", "choose another name")
-        return cls(section)
+                place.note("impacts", f"{name} is the name of an injected group", "choose another name")
+        real = tuple(name for name, group in groups.items() if not group.is_impact_free and not group.condition)
+        given = read(InjectTable, table, place.below("inject"))
+        return None if given is None else cls(inject_section(given, place.below("inject"), found, real))
 
     def names(self, machine_file: MachineFile) -> tuple[str, ...]:
         """Return the names of the groups: one per obstacle, and per assumption about the machine."""

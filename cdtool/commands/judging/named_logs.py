@@ -2,22 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import first_of
 from cdtool.base.remote.remote_path import joined
-from cdtool.base.tables import Table
-from cdtool.base.value_words import value_in_words
+from cdtool.base.settings import NotNegative, Place, setting
 from cdtool.commands.judging.runs import find_logs, resolve_all, shown_path
 from cdtool.formats.channels.run_reading import split_run
-from cdtool.formats.labels.labels import CLOCKS, Labels, read_labels
+from cdtool.formats.labels.labels import Labels, read_labels
 from cdtool.formats.labels.named_rows import by_recording
 from cdtool.formats.machine_file import MachineFile
 from cdtool.recordings.log_section import MARK_HINT, LogSection, Mark
+from cdtool.truth.onset_rule import OnsetRule
+
+_LOGS_HINT = "give a list of texts"
+
+
+_PART = "of each log that is used: a time on its clock (3.2s) or a distance travelled (0.8m); default: the whole log"
+_FROM = Annotated[str | None, setting(f"begin of the part {_PART}", key="from", hint=f"{MARK_HINT}, in quotes")]
+_TO = Annotated[str | None, setting(f"end of the part {_PART}", key="to", hint=f"{MARK_HINT}, in quotes")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogEntry:
+    """A log or pattern of a list with a part of its own."""
+
+    path: Annotated[str, setting("a log or a pattern")]
+    begin: _FROM = None
+    end: _TO = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogsTable:
+    """A table with logs, and the part of each that is used."""
+
+    logs: Annotated[
+        tuple[str | LogEntry, ...], setting("logs, relative to the file; * and ? are allowed", hint=_LOGS_HINT)
+    ] = ()
+    begin: _FROM = None
+    end: _TO = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogList:
+    """A campaign or a test point."""
+
+    logs: Annotated[tuple[str, ...], setting("scored logs that belong together", hint=_LOGS_HINT)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnsetTable(OnsetRule):
+    """[onset]: when a contact begins, by the load cell or by labels."""
+
+    labels: Annotated[
+        str | None, setting("a label file: its contacts replace those of the load cell in the recordings it names")
+    ] = None
+    labels_clock: Annotated[
+        Literal["recording", "source"] | None,
+        setting("clock of the labels' numbers: recording, as cdtool shows it (the default), or source, the log's own"),
+    ] = None
+    labels_zone: Annotated[str, setting('offset such as "+02:00" of dates without a zone; default: UTC')] = ""
+    not_contacts: Annotated[tuple[str, ...], setting("kinds of labels that are not contacts")] = ()
+    synchronisation_s: Annotated[
+        NotNegative | None,
+        setting("how far the load cell's clock may be off; part of each latency's resolution; default: 0", unit="s"),
+    ] = None
+    synchronisation: Annotated[
+        Literal["stated", "measured"],
+        setting("measured: in place of synchronisation_s, what the sync audit of all impact logs shows"),
+    ] = "stated"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.synchronisation == "measured" and self.synchronisation_s is not None:
+            raise UsageError(
+                "synchronisation is measured, but synchronisation_s is stated too", "remove one of the two"
+            )
+
+    @property
+    def rule(self) -> OnsetRule:
+        """Return the rule by which a contact begins on the load cell."""
+        return OnsetRule(**{item.name: getattr(self, item.name) for item in fields(OnsetRule)})
 
 
 @dataclass(frozen=True)
@@ -31,34 +101,27 @@ class LogsOf:
     machine_file: MachineFile
     runs: bool = False
 
-    def of(self, table: Table) -> tuple[Path, ...]:
-        """Return the files that `logs` names; raises ConfigurationError for no match and for unknown keys."""
-        logs = find_logs(table.texts("logs"), self.base, table.key("logs"), runs=self.runs)
-        table.finish()
-        return self._without_files_beside(logs)
+    def of(self, logs: Sequence[str], key: str) -> tuple[Path, ...]:
+        """Return the files that the patterns `logs` of the `key` name; raises ConfigurationError for no match."""
+        return self._without_files_beside(find_logs(logs, self.base, key, runs=self.runs))
 
-    def sections(self, table: Table) -> dict[Path, LogSection]:
-        """Return the files that `logs` names, with the part of each that is used.
+    def sections(self, table: LogsTable, place: Place) -> dict[Path, LogSection]:
+        """Return the files that a table names, with the part of each that is used.
 
-        `from` and `to` of the table are for all of them; an entry `{ path = "...", from = "...", to = "..." }` has its
-        own. Raises ConfigurationError for no match, for unknown keys, and for a log with two different parts.
+        `from` and `to` of the table are for all of them; an entry of its own has its own. Raises ConfigurationError for
+        no match, and for a log with two different parts.
         """
-        common = _section(table)
-        entries = table.raw("logs")
+        common = _section(table, place)
         found: dict[Path, LogSection] = {}
-        for number, entry in enumerate(entries if isinstance(entries, list) else [entries]):
-            section, pattern = common, entry
-            if isinstance(entry, dict):
-                own = Table(entry, table.where, f"{table.prefix}logs[{number}].")
-                pattern, section = own.text("path"), _section(own, common)
-                own.finish()
-            texts = Table({"logs": pattern}, table.where, table.prefix).texts("logs")
-            for path in find_logs(texts, self.base, table.key("logs"), runs=self.runs):
+        for number, entry in enumerate(table.logs):
+            pattern, section = entry, common
+            if isinstance(entry, LogEntry):
+                pattern, section = entry.path, _section(entry, place.below(f"logs[{number}]"), common)
+            for path in find_logs([str(pattern)], self.base, place.key("logs"), runs=self.runs):
                 if found.setdefault(path, section) != section:
-                    raise table.fault("logs", f"names {path} with two different parts", "name each log once")
+                    raise place.fault("logs", f"names {path} with two different parts", "name each log once")
         if not found:
-            raise table.fault("logs", "is empty", "name at least one log")
-        table.finish()
+            raise place.fault("logs", "is empty", "name at least one log")
         return {path: found[path] for path in self._without_files_beside(list(found))}
 
     def _without_files_beside(self, logs: Sequence[Path]) -> tuple[Path, ...]:
@@ -69,48 +132,49 @@ class LogsOf:
         return split_run(log)[0] if self.runs else log
 
 
-def _section(table: Table, common: LogSection = LogSection()) -> LogSection:
+def _section(table: LogsTable | LogEntry, place: Place, common: LogSection = LogSection()) -> LogSection:
     """Return `from` and `to` of a table; those of `common` where it has none."""
-    begin, end = (_mark(table, name) for name in ("from", "to"))
+    begin, end = (_mark(place, name, text) for name, text in (("from", table.begin), ("to", table.end)))
     try:
         return LogSection(begin, end).within(common)
     except UsageError as fault:
-        raise table.fault("to", fault.message, fault.hint) from fault
+        raise place.fault("to", fault.message, fault.hint) from fault
 
 
-def _mark(table: Table, name: str) -> Mark | None:
-    text = table.raw(name)
-    if text is not None and not isinstance(text, str):
-        raise table.fault(name, f"is {value_in_words(text)}", f"{MARK_HINT}, in quotes")
+def _mark(place: Place, name: str, text: str | None) -> Mark | None:
     try:
         return None if text is None else Mark.parse(text)
     except UsageError as fault:
-        raise table.fault(name, fault.message, fault.hint) from fault
+        raise place.fault(name, fault.message, fault.hint) from fault
 
 
-def named_logs(table: Table, found_logs: LogsOf, scored: Sequence[Path]) -> dict[Path, str]:
+def named_logs(
+    tables: Mapping[str, LogList], place: Place, found_logs: LogsOf, scored: Sequence[Path]
+) -> dict[Path, str]:
     """Return the campaign or test point of each of the `scored` logs, independent of how its path is written.
 
     A run, LOG#ID, is named as it is in its group.
 
     Raises ConfigurationError for a log that is not scored, or that belongs to two of them.
     """
-    known = dict(zip(resolve_all(scored), scored, strict=True)) if table.values else {}
+    known = dict(zip(resolve_all(scored), scored, strict=True)) if tables else {}
     found: dict[Path, str] = {}
-    for name in table.values:
+    for name, table in tables.items():
         if not name.strip():
-            raise table.fault(name, "has no name", "give it a name")
-        for log in found_logs.of(table.table(name)):
+            raise place.fault(name, "has no name", "give it a name")
+        for log in found_logs.of(table.logs, place.below(name).key("logs")):
             path = known.get(log.resolve())
             if path is None:
-                raise table.fault(name, f"names {log}, which is not in a group of [impacts]", "name only scored logs")
+                raise place.fault(name, f"names {log}, which is not in a group of [impacts]", "name only scored logs")
             if found.get(path, name) != name:
-                raise table.fault(name, f"names {log}, which is also in '{found[path]}'", "list each log once")
+                raise place.fault(name, f"names {log}, which is also in '{found[path]}'", "list each log once")
             found[path] = name
     return found
 
 
-def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Sequence[Path] = ()) -> Labels | None:
+def labels_of(
+    onset: OnsetTable, place: Place, logs: LogsOf, scored: Sequence[Path], learned: Sequence[Path] = ()
+) -> Labels | None:
     """Return the label file, whose rows are about the `scored` logs; None without a file.
 
     Rows about other logs are a note.
@@ -120,16 +184,15 @@ def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Seque
     If logs are cut into runs, each row is about a run of a log, LOG#ID. Raises ConfigurationError for a file
     name that matches several.
     """
-    settings = {"clock": onset.choice("labels_clock", CLOCKS, "recording"), "zone": onset.text("labels_zone", "")}
-    not_contacts = onset.texts("not_contacts", ())
-    if "labels" not in onset:
+    if onset.labels is None:
         for key in ("labels_clock", "labels_zone", "not_contacts"):
-            if key in onset:
-                raise onset.fault(key, "is only for a label file", "name one: labels")
+            if getattr(onset, key):
+                raise place.fault(key, "is only for a label file", "name one: labels")
         return None
     base = logs.base
-    path = joined(base, onset.text("labels"))
-    labels = read_labels(path, not_contacts=not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
+    path = joined(base, onset.labels)
+    settings = {"clock": onset.labels_clock or "recording", "zone": onset.labels_zone}
+    labels = read_labels(path, not_contacts=onset.not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
     runs = logs.runs
     recordings, others = (
         [shown_path(split_run(log)[0] if runs else log, base) for log in some] for some in (scored, learned)

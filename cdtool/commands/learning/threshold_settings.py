@@ -1,125 +1,84 @@
-"""A threshold rule and its settings, from the tables [threshold] and [signature] or from the command line."""
+"""A threshold rule and its settings, from the tables [threshold] and [signature]."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import Field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from cdtool.base.errors import UsageError, nearest
 from cdtool.base.files.bounded_loading import ContentError, parse_toml
-from cdtool.base.tables import Table
-from cdtool.base.value_words import value_in_words
-from cdtool.recordings.motion.progress import ALIGNMENTS
+from cdtool.base.settings import Place, keys_of, read
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import Threshold
-from cdtool.thresholds.fitted_signature import RULES, SIDES
+from cdtool.thresholds.fitted_signature import Sides
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 
 _DEFAULT = "signature"
-_OPTIONS = {"alignment": "align"}  # of the command line, where their names differ from those of the settings
 
 
-def read_signature(table: Table, default_sides: str) -> Signature:
-    """Return the signature rule that the table [signature] describes."""
-    if "debounce" in table:
-        raise table.fault("debounce", "belongs in another table", "move it to [activation]")
-    settings: dict[str, Any] = {
-        "rule": table.choice("rule", RULES, "pooled"),
-        "sides": table.choice("sides", SIDES, default_sides),
-        "alignment": table.choice("alignment", ALIGNMENTS, "time_then_position"),
-        "position_step": table.number("position_step", Signature.position_step, above=0.0),
-        "position_window": table.number("position_window", Signature.position_window, above=0.0),
-        "force": table.flag("force", False),
-        "adaptive_level": table.number("adaptive_level", Signature.adaptive_level, minimum=0.0),
-        "speed_range": table.flag("speed_range", Signature.speed_range),
-    }
-    if settings["speed_range"] and settings["alignment"] == "time":
-        raise table.fault(
-            "speed_range",
-            "cannot be combined with an alignment by time: at another speed a time is another location",
-            "align by time_then_position or position",
-        )
-    if "safety_factor" in table:
-        settings["safety_factor"] = table.number("safety_factor", above=0.0)
-    table.finish()
-    return Signature(**settings)
+def threshold_of(
+    given: str | Mapping[str, Any], signature: Signature, default_sides: Sides, place: Place
+) -> tuple[str, Threshold, Signature]:
+    """Return the threshold's name, its rule, and the signature, with the mistakes of single keys in `place`.
 
+    Raises ConfigurationError for an unknown threshold, and for settings that do not fit together.
 
-def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
-    """Return the threshold's name and rule; raises ConfigurationError for an unknown name or key, or a wrong value.
-
-    `threshold = "NAME"` selects NAME with default settings; a table [threshold] has `name` and NAME's own fields. The
+    A text selects a threshold with its default settings; a table has `name` and that threshold's own fields. The
     settings of the signature, also if another rule learns one, are in [signature]; so is the safety factor of any rule
     if [threshold] does not set it.
     """
-    given = root.raw("threshold")
-    if not isinstance(given, dict):
-        names = THRESHOLDS.names_for(_DEFAULT if given is None else given)
-        name, table = root.choice("threshold", names, _DEFAULT), Table({}, root.where, "threshold.")
-    else:
-        table = root.table("threshold")
-        name = table.choice("name", THRESHOLDS.names_for(given.get("name", _DEFAULT)), _DEFAULT)
-    if name == _DEFAULT:
-        for key in table.values:
-            if key != "name":
-                raise table.fault(key, "is not a key of this table", "the signature's settings are in [signature]")
-        return name, signature
-    if signature.adaptive_level > 0.0:
-        raise root.fault(
-            "threshold",
-            f"'{name}' does not follow a run: adaptive_level of [signature] is for the threshold 'signature'",
-            "remove adaptive_level, or choose that threshold",
-        )
-    if signature.speed_range:
-        raise root.fault(
-            "threshold",
-            f"'{name}' has no limits between speeds: speed_range of [signature] is for the threshold 'signature'",
-            "remove speed_range, or choose that threshold",
-        )
-    rule = THRESHOLDS.load(name)
-    own = [item for item in fields(rule) if item.name != "signature"]
-    settings = {item.name: _value(table, item) for item in own if item.name in table}
-    table.finish()
-    if "limits" in settings and ("safety_factor" in settings or signature.safety_factor is not None):
-        raise table.fault("safety_factor", "cannot be combined with limits set by hand", "remove one of the two")
-    if "safety_factor" not in settings and signature.safety_factor is not None:
-        settings["safety_factor"] = signature.safety_factor
-    try:
-        return name, with_context(rule(**settings), signature.sides, signature)
-    except UsageError as fault:
-        raise table.fault("name", f"'{name}': {fault.message}", fault.hint) from fault
-
-
-def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: str) -> Threshold:
-    """Return the rule of that name for a command line: `given` are KEY=VALUE settings, `signature` the signature's.
-
-    Raises UsageError for an unknown name, ConfigurationError for an unknown key or a wrong value.
-    """
+    signature = signature if signature.sides else replace(signature, sides=default_sides)
+    table: dict[str, Any] = {"name": given} if isinstance(given, str) else {"name": _DEFAULT, **given}
+    name = table.pop("name")
+    below = place if isinstance(given, str) else place.below("threshold")
+    key = "threshold" if isinstance(given, str) else "name"
     known = THRESHOLDS.names_for(name)
     if name not in known:
-        raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
-    settings = dict(_setting(text) for text in given)
+        raise below.fault(key, f"is {name!r}", nearest(str(name), known))
     if name == _DEFAULT:
-        return read_signature(_Options({**signature, **settings}, settings), default_sides)
-    learned = read_signature(_Options(signature, ()), default_sides)
-    return read_threshold(Table({"threshold": {"name": name, **settings}}, "--set"), learned)[1]
+        for other in table:
+            below.note(other, "is not a key of this table", "the signature's settings are in [signature]")
+        return name, signature, signature
+    for own, problem in (("adaptive_level", "does not follow a run"), ("speed_range", "has no limits between speeds")):
+        if getattr(signature, own):
+            what = f"'{name}' {problem}: {own} of [signature] is for the threshold 'signature'"
+            raise place.fault("threshold", what, f"remove {own}, or choose that threshold")
+    kind = THRESHOLDS.load(name)
+    if "safety_factor" in keys_of(kind) and "safety_factor" not in table and signature.safety_factor is not None:
+        table["safety_factor"] = signature.safety_factor
+    if "limits" in table and "safety_factor" in table:
+        raise below.fault("safety_factor", "cannot be combined with limits set by hand", "remove one of the two")
+    if (rule := read(kind, table, below)) is None:
+        return name, signature, signature
+    try:
+        return name, with_context(rule, signature.sides, signature), signature
+    except UsageError as fault:
+        raise below.whole(fault) from fault
 
 
-class _Options(Table):
-    """The settings of a command line: those in `by_set` were given by --set KEY=VALUE, the others by own options."""
-
-    def __init__(self, values: Mapping[str, Any], by_set: Collection[str]) -> None:
-        super().__init__(values, "")
-        self._by_set = by_set
-
-    def key(self, name: str) -> str:
-        """Return the option that the user gave."""
-        return f"--set: {name}" if name in self._by_set else f"--{_OPTIONS.get(name, name.replace('_', '-'))}"
+def set_by_hand(rule: Threshold) -> bool:
+    """Whether the rule's limits or its safety factor differ from the default."""
+    return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor
 
 
-def _setting(text: str) -> tuple[str, Any]:
+def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: Sides) -> Threshold:
+    """Return the rule of that name for a command line: `given` are KEY=VALUE settings, `signature` the signature's.
+
+    Raises ConfigurationError for an unknown name or key, or a wrong value.
+    """
+    settings = dict(map(setting_of, given))
+    place = Place("--set")
+    if name == _DEFAULT:
+        signature, settings = {**signature, **settings}, {}
+    own = read(Signature, signature, place) or Signature()
+    rule = threshold_of({"name": name, **settings}, own, default_sides, place)
+    place.finish()
+    return rule[1]
+
+
+def setting_of(text: str) -> tuple[str, Any]:
     """Parse KEY=VALUE with a TOML value; a bare word is a text."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not (name and equals and value):
@@ -128,33 +87,3 @@ def _setting(text: str) -> tuple[str, Any]:
         return name, parse_toml(f"value = {value}")["value"]
     except ContentError:
         return name, value
-
-
-def set_by_hand(rule: Threshold) -> bool:
-    """Whether the rule's limits or its safety factor differ from the default."""
-    return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor
-
-
-def _value(table: Table, item: Field[Any]) -> Any:
-    """Return a key's value, checked against the type of the field."""
-    kind = item.type
-    if kind == "bool":
-        return table.flag(item.name, False)
-    if kind in ("int", "int | None"):
-        return table.whole(item.name, 0, minimum=0)
-    if kind in ("float", "float | None"):
-        return table.number(item.name)
-    if kind == "tuple[int, ...]":
-        return _numbers(table, item.name, int, "give a list of whole numbers")
-    if kind == "tuple[float, ...]":
-        return _numbers(table, item.name, (int, float), "give a list of numbers")
-    return table.texts(item.name) if kind == "tuple[str, ...]" else table.text(item.name)
-
-
-def _numbers(table: Table, name: str, kind: type | tuple[type, ...], wanted: str) -> tuple[Any, ...]:
-    """Return a list of numbers; a single number is a list of one."""
-    values = table.raw(name)
-    values = values if isinstance(values, list) else [values]
-    if not values or any(isinstance(x, bool) or not isinstance(x, kind) for x in values):
-        raise table.fault(name, f"is {value_in_words(table.raw(name))}", wanted)
-    return tuple(values)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
@@ -16,13 +16,15 @@ from cdtool.base.files.bounded_loading import read_bytes
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
-from cdtool.base.tables import Table, read_toml
+from cdtool.base.settings import NotNegative, Place, Positive, read, setting
+from cdtool.base.tables import read_toml
 from cdtool.commands.judging.log_groups import Split
-from cdtool.commands.judging.named_logs import LogsOf, labels_of, named_logs
+from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_logs
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, resolve_all, shown_path
 from cdtool.commands.judging.scoring_rules import ScoringRules
-from cdtool.commands.learning.threshold_settings import read_signature, read_threshold
+from cdtool.commands.judging.settings_table import ForceTable, JudgingTable, apply_settings
+from cdtool.commands.learning.threshold_settings import threshold_of
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
 from cdtool.execution.workers import Progress, Workers
@@ -32,18 +34,16 @@ from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.operations import RunCut
 from cdtool.results.curves.false_alarm_budget import Budget
-from cdtool.results.limits import ALL, LimitRule, read_limits
+from cdtool.results.limits import ALL, Bounds, LimitRule, limit_rules
 from cdtool.results.results import ConditionResult, Skipped
 from cdtool.results.summary import kind_group
 from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.signature import Signature
 from cdtool.truth.force.limits import ForceProfile, profile_of, read_force_limits
-from cdtool.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
+from cdtool.truth.onset_rule import OnsetRule
 
 HOLDOUT = "holdout"
 
-# Where a log that is learned from ends.
-_UNTIL = ("end", "onset")
 # How long before its first contact a log is no longer learned from [s].
 GUARD = 0.2
 
@@ -75,8 +75,10 @@ class MadeGroups(Protocol):
     """Groups of logs that a command makes for a benchmark, by a section of its own in the benchmark file."""
 
     @classmethod
-    def read(cls, root: Table, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]) -> MadeGroups:
-        """Read and check the section in the file `root`; `groups` are the others. Raises ConfigurationError."""
+    def read(
+        cls, table: Mapping[str, Any], place: Place, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]
+    ) -> MadeGroups | None:
+        """Read the section `table` of the file at `place`; `groups` are the others. Raises ConfigurationError."""
         ...
 
     def names(self, machine_file: MachineFile) -> tuple[str, ...]:
@@ -102,6 +104,84 @@ SECTIONS = Registry(
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class LearnTable(LogsTable):
+    """[learn]: the logs that limits are learned from."""
+
+    until: Annotated[
+        Literal["end", "onset"], setting("onset: learn from each log up to its first contact, by load cell or labels")
+    ] = "end"
+    guard_s: Annotated[
+        NotNegative | None,
+        setting('with until = "onset": how long before the contact learning ends; default: 0.2', unit="s"),
+    ] = None
+    split: Annotated[
+        Split,
+        setting(
+            "what stays together where runs set a limit for other runs (a budget, tune): with day, no run is assessed "
+            "by what was learned on its day; the day is the date in the path, or that of the clock"
+        ),
+    ] = Split.RECORDING
+
+    def __post_init__(self) -> None:
+        if self.guard_s is not None and self.until == "end":
+            raise UsageError("guard_s is given without until", 'set until = "onset", or remove it')
+
+    @property
+    def guard(self) -> float | None:
+        """Return how long before its first contact a log is no longer learned from [s]; None: it is used to its end."""
+        return None if self.until == "end" else GUARD if self.guard_s is None else self.guard_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactsTable(LogsTable):
+    """[impacts.NAME]: a group of logs with impacts; any name but holdout."""
+
+    window_s: Annotated[Positive | None, setting("the window for this group; default: the file's", unit="s")] = None
+    force_profile: Annotated[str | None, setting("the force limits for this group; default: force.profile")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConditionTable:
+    """[conditions.NAME]: logs of the machine under a changed condition."""
+
+    holdout: Annotated[LogsTable | None, setting("impact-free logs")] = None
+    impacts: Annotated[
+        dict[str, LogsTable],
+        setting("logs of impacts by a group of [impacts], whose window and force profile they have"),
+    ] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchmarkTable(JudgingTable):
+    """A benchmark file as it is written: the logs to learn from and to score, and the detectors."""
+
+    machine: Annotated[str, setting("the machine file")]
+    detectors: Annotated[
+        tuple[str, ...] | None,
+        setting("full or short names, each once, or all; required unless the command names them"),
+    ] = None
+    learn: Annotated[LearnTable | None, setting("impact-free logs to learn from")] = None
+    holdout: Annotated[
+        LogsTable | None, setting("impact-free logs for false alarms, none of which is learned from")
+    ] = None
+    impacts: Annotated[dict[str, ImpactsTable], setting("groups of logs with impacts")] = field(default_factory=dict)
+    conditions: Annotated[dict[str, ConditionTable], setting("changed conditions of the machine")] = field(
+        default_factory=dict
+    )
+    campaigns: Annotated[dict[str, LogList], setting("test campaigns: intervals count each as one")] = field(
+        default_factory=dict
+    )
+    points: Annotated[dict[str, LogList], setting("tests at one point of the machine: their forces are averaged")] = (
+        field(default_factory=dict)
+    )
+    limits: Annotated[dict[str, Bounds], setting("what a pipeline checks: detector.group.metric")] = field(
+        default_factory=dict
+    )
+    inject: Annotated[dict[str, Any] | None, setting("contacts that are put into impact-free logs")] = None
+    protocol: Annotated[dict[str, Any] | None, setting("the test protocol of the benchmark")] = None
+
+
 @dataclass(frozen=True)
 class BenchmarkFile:
     """A validated benchmark file with resolved globs.
@@ -110,12 +190,11 @@ class BenchmarkFile:
 
     `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock, or
     not known before the logs are audited if `measures_synchronisation`.
-    `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
-    versions were read. `sections` are the parts of scored logs that are used, `learned_sections` those of the logs
-    learned from, which end `guard` [s] before their first contact; None: they have no contact. `split`: which runs stay
-    together where runs set a limit for others. `made`: the groups that a command
-    makes before they are scored; `not_made`: their logs and contacts that were left out. `force_limits`: the file of
-    the force profiles; None: the shipped ones.
+    `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `sections` are the parts of scored logs
+    that are used, `learned_sections` those of the logs learned from, which end `guard` [s] before
+    their first contact; None: they have no contact. `split`: which runs stay together where runs set a limit for
+    others. `made`: the groups that a command makes before they are scored; `not_made`: their logs and contacts that
+    were left out. `force_limits`: the file of the force profiles; None: the shipped ones.
     """
 
     path: Path
@@ -139,7 +218,6 @@ class BenchmarkFile:
     limits: tuple[LimitRule, ...]
     digest: str
     window: float = 1.0
-    migrated: tuple[str, ...] = ()
     sections: Mapping[Path, LogSection] = field(default_factory=dict)
     learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
@@ -285,71 +363,96 @@ class BenchmarkFile:
 
 
 def read_benchmark_file(
-    path: str | Path, learning: bool = True, also_known: Sequence[str] = (), detectors: Sequence[str | Detector] = ()
+    path: str | Path,
+    learning: bool = True,
+    also_known: Sequence[str] = (),
+    detectors: Sequence[str | Detector] = (),
+    settings: Mapping[str, Any] | None = None,
 ) -> BenchmarkFile:
-    """Read and check a benchmark file; raises ConfigurationError naming the key.
+    """Read and check a benchmark file; raises ConfigurationError with every mistake.
 
     `detectors` are used if the file does not name any; `all` selects every registered detector. Without `learning`, for
     external alarms, the file needs neither detectors nor logs to learn from, and [limits] may be set for the detectors
-    `also_known`.
+    `also_known`. `settings` take the place of keys of the file, as "activation.debounce".
     """
     file = location(path)
-    root = Table(read_toml(file, "a benchmark file"), str(file))
-    root.raw("protocol")  # read by its command
-    if isinstance(root.raw("machine"), dict):
+    values = read_toml(file, "a benchmark file")
+    if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
-    base = file.parent
-    machine_file = read_machine_file(joined(base, root.text("machine")))
-    wanted = _wanted_detectors(root, learning, detectors)
-    names = tuple(machine_file.detector(name).name for name in wanted)
-    if len(set(names)) < len(names):
-        raise root.fault("detectors", "contains a detector twice", "list each detector once")
-    signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
-    threshold, rule = read_threshold(root, signature)
-    operations = _read_operations(root)
-    found = LogsOf(base, machine_file, RunCut.of(operations) is not None)
+    place = Place(str(file), by_option=frozenset(settings or ()), root=BenchmarkTable)
+    table = read(BenchmarkTable, apply_settings(values, settings or {}), place)
+    if table is None:
+        place.finish()
+    assert table is not None
+    machine_file = place.tried(None, read_machine_file, joined(file.parent, table.machine))
+    if machine_file is None:
+        place.finish()
+    assert machine_file is not None
+    benchmark = _resolved(file, table, place, machine_file, _Wanted(learning, tuple(also_known), tuple(detectors)))
+    place.finish()
+    if learning:
+        _refuse_unknown_locations(benchmark)
+    return benchmark
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What a command needs of a benchmark file; see `read_benchmark_file`."""
+
+    learning: bool
+    also_known: tuple[str, ...]
+    detectors: tuple[str | Detector, ...]
+
+
+def _resolved(
+    file: Path, table: BenchmarkTable, place: Place, machine_file: MachineFile, wanted: _Wanted
+) -> BenchmarkFile:
+    """Return the benchmark that the tables describe, its logs found, with the mistakes in `place`."""
+    machine = machine_file.machine
+    names: tuple[str, ...] = place.tried((), _detectors, table, place, machine_file, wanted)
+    otherwise: tuple[str, Threshold, Signature] = ("signature", table.signature, table.signature)
+    given = (table.threshold, table.signature, machine.default_sides, place)
+    threshold, rule, signature = place.tried(otherwise, threshold_of, *given)
+    cut = place.tried(None, _cut, table, place)
+    found = LogsOf(file.parent, machine_file, cut is not None)
     if found.runs and (machine_file.columns.beside or machine_file.topics.beside):
         hint = "write each run to a log of its own, or map a channel of the log"
-        raise root.fault("operations", "cannot divide a channel that is in a file of its own into runs", hint)
-    by_hand = bool(getattr(rule, "limits", ()))
-    needs_runs = learning and not by_hand and not is_per_run(rule)
-    learn_table = root.table("learn", required=needs_runs)
-    guard = _guard(learn_table)
-    split = Split(learn_table.choice("split", [item.value for item in Split], Split.RECORDING.value))
-    learn = found.sections(learn_table) if needs_runs or "learn" in root else {}
-    force = root.table("force")
-    mass_before_cell = _mass_before_cell(force)
-    window = root.number("window_s", 1.0, above=0.0)
-    impacts, sections = _groups(root, found, window, force)
-    made = SECTIONS.load("inject").read(root, found, operations, impacts) if "inject" in root else None
-    learn = _under_scored_paths(learn, _scored(impacts, impact_free=True))
-    onset = root.table("onset")
-    migrated = migrated_onset(onset)
-    labels = labels_of(onset, found, _scored(impacts, impact_free=True), tuple(learn))
+        place.note("operations", "cannot divide a channel that is in a file of its own into runs", hint)
+    needs_runs = wanted.learning and not getattr(rule, "limits", ()) and not is_per_run(rule)
+    learn: dict[Path, LogSection] = place.tried({}, _learned, table, place, found, needs_runs)
+    impacts, sections = _groups(table, place, found)
+    scored, with_impacts = _scored(impacts, impact_free=True), _scored(impacts)
+    made = None
+    if table.inject is not None:
+        made = place.tried(None, SECTIONS.load("inject").read, table.inject, place, found, table.cut, impacts)
+    learn = _under_scored_paths(learn, scored)
+    onset = place.below("onset")
+    labels = place.tried(None, labels_of, table.onset, onset, found, scored, tuple(learn))
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
         detectors=names,
-        watched=_read_watched(root, machine_file.machine.joints),
-        operations=operations,
+        watched=table.joints,
+        operations=table.cut,
         threshold=threshold,
-        budget=_read_budget(root),
+        budget=place.tried(None, _budget, table, place),
         signature=signature,
         rule=rule,
-        activation=_read_activation(root.table("activation")),
+        activation=table.activation,
         labels=labels,
-        synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
-        measures_synchronisation=_measures_synchronisation(onset),
-        onset=read_onset(onset),
-        mass_before_cell=mass_before_cell,
+        synchronisation=table.onset.synchronisation_s or 0.0,
+        measures_synchronisation=table.onset.synchronisation == "measured",
+        onset=table.onset.rule,
+        mass_before_cell=table.force.mass_before_cell_kg,
         learn=tuple(learn),
         impacts=impacts,
-        campaigns=named_logs(root.table("campaigns"), found, _scored(impacts, impact_free=True)),
-        points=named_logs(root.table("points"), found, _scored(impacts)),
-        limits=read_limits(
-            root.table("limits"),
-            [*_names(machine_file, names), *((name, name) for name in also_known)],
+        campaigns=place.tried({}, named_logs, table.campaigns, place.below("campaigns"), found, scored),
+        points=place.tried({}, named_logs, table.points, place.below("points"), found, with_impacts),
+        limits=limit_rules(
+            table.limits,
+            place.below("limits"),
+            [*_names(machine_file, names), *((name, name) for name in wanted.also_known)],
             (*impacts, *(made.names(machine_file) if made else ())),
             [
                 kind_group(name, kind)
@@ -359,22 +462,23 @@ def read_benchmark_file(
             ],
         ),
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
-        window=window,
-        migrated=migrated,
+        window=table.window_s,
         sections=sections,
         learned_sections={path: section for path, section in learn.items() if section},
-        guard=guard,
-        split=split,
+        guard=table.learn.guard if table.learn else None,
+        split=table.learn.split if table.learn else Split.RECORDING,
         made=made,
-        force_limits=_force_limits(force, base),
+        force_limits=_force_limits(table.force, file.parent),
     )
-    root.finish()
-    if benchmark.points and not any(group.force for group in impacts.values()):
-        raise root.fault("points", "there is no force profile to check them against", "set [force] profile")
-    refuse_limits_by_hand(benchmark)
-    _refuse_overlap(benchmark)
-    if learning:
-        _refuse_unknown_locations(benchmark)
+    for joint in table.joints:
+        if joint not in machine.joints:
+            problem = f"contains '{joint}', which is not a joint of the machine file"
+            place.note("joints", problem, nearest(joint, machine.joints))
+    if table.points and not any(group.force for group in impacts.values()):
+        place.note("points", "there is no force profile to check them against", "set [force] profile")
+    for check in (refuse_limits_by_hand, _refuse_overlap):
+        with place.noting():
+            check(benchmark)
     return benchmark
 
 
@@ -384,24 +488,40 @@ def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:
     return (*kinds, "") if kinds else ()
 
 
-def _measures_synchronisation(onset: Table) -> bool:
-    measured = onset.choice("synchronisation", ("stated", "measured"), "stated") == "measured"
-    if measured and "synchronisation_s" in onset:
-        raise onset.fault(
-            "synchronisation", "is measured, but synchronisation_s is stated too", "remove one of the two"
-        )
-    return measured
+def _detectors(table: BenchmarkTable, place: Place, machine_file: MachineFile, wanted: _Wanted) -> tuple[str, ...]:
+    """Return the full names of a file's detectors, or else of those given; a force rig's recordings may need none."""
+    given: Sequence[str | Detector] = table.detectors or wanted.detectors
+    if wanted.learning and not given:
+        if table.detectors is None:
+            raise place.fault("detectors", "is missing", "give a list of texts")
+        hint = "name detectors, or write a protocol without them: cdtool protocol init"
+        raise place.fault("detectors", "is empty: nothing can be scored", f"{hint} {place.where}")
+    names: tuple[str, ...] = ()
+    for item in _all_or(given):
+        with place.noting(), place.at("detectors"):
+            names += (machine_file.detector(item).name,)
+    if len(set(names)) < len(names):
+        raise place.fault("detectors", "contains a detector twice", "list each detector once")
+    return names
 
 
-def _wanted_detectors(root: Table, learning: bool, detectors: Sequence[str | Detector]) -> Sequence[str | Detector]:
-    """Return the detectors of a file, or else those given; the recordings of a force rig may need none."""
-    if root.raw("detectors") != []:
-        default: Any = _all_or(detectors) if detectors or not learning else None
-        return root.texts("detectors", default)
-    if learning and not detectors:
-        hint = "name some, or write a protocol of the forces without detectors: cdtool protocol init"
-        raise root.fault("detectors", "is empty: nothing can be scored", f"{hint} {root.where}")
-    return _all_or(detectors) if learning else ()
+def _cut(table: BenchmarkTable, place: Place) -> RunCut | None:
+    with place.at("operations" if isinstance(table.operations, str) else "operations.by", table.cut):
+        return RunCut.of(table.cut)
+
+
+def _budget(table: BenchmarkTable, place: Place) -> Budget | None:
+    """Return `false_alarm_budget`; None if it is missing."""
+    with place.at("false_alarm_budget", table.false_alarm_budget):
+        return None if table.false_alarm_budget is None else Budget.parse(table.false_alarm_budget)
+
+
+def _learned(table: BenchmarkTable, place: Place, found: LogsOf, needed: bool) -> dict[Path, LogSection]:
+    if table.learn is None:
+        if needed:
+            raise place.fault("learn", "is missing", "add a table [learn]")
+        return {}
+    return found.sections(table.learn, place.below("learn"))
 
 
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
@@ -443,59 +563,41 @@ def _may_share_a_run(one: Path, other: Path) -> bool:
     return not first or not second or fnmatchcase(first, second) or fnmatchcase(second, first)
 
 
-def _guard(learn: Table) -> float | None:
-    """Return how long before its first contact a log is no longer learned from [s]; None if it is used to its end."""
-    if learn.choice("until", _UNTIL, "end") == "end":
-        if "guard_s" in learn:
-            raise learn.fault("guard_s", "is given without until", 'set until = "onset", or remove it')
-        return None
-    return learn.number("guard_s", GUARD, minimum=0.0)
-
-
 def _groups(
-    root: Table, found: LogsOf, window: float, force: Table
+    table: BenchmarkTable, place: Place, found: LogsOf
 ) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
     """Return the groups of impacts, the hold-out and those of changed conditions, and the sections of their logs."""
-    tables = root.table("impacts")
-    if HOLDOUT in tables.values:
-        raise tables.fault(
-            HOLDOUT, "is the name of the impact-free group", "choose another name for the group of impacts"
-        )
-    profiles = read_force_limits(_force_limits(force, found.base))
-    profile = force.text("profile", "")
-    if profile:
-        _profile(profiles, force, "profile", force)
-    groups = {}
+    force, below = table.force, place.below("force")
+    profiles: dict[str, ForceProfile] = place.tried({}, read_force_limits, _force_limits(force, found.base))
+    profile = place.tried(None, _profile, profiles, force, below, "profile", force.profile)
+    groups: dict[str, ImpactGroup] = {}
     sections: dict[Path, LogSection] = {}
-    for name in tables.values:
-        if name.strip() in ("", ALL):
-            raise tables.fault(name, "is not a valid group name", f"choose another name; {ALL} stands for every group")
-        table = tables.table(name)
-        limits = _profile(profiles, table, "force_profile", force) if "force_profile" in table else None
-        if profile and "force_profile" not in table:
-            limits = profiles[profile]
-        own = table.number("window_s", window, above=0.0)
-        logs = found.sections(table)
+    for name, group in table.impacts.items():
+        own = place.below("impacts").below(name)
+        if name.strip() in ("", ALL, HOLDOUT):
+            hint = f"choose another name; {ALL} stands for every group, {HOLDOUT} for the impact-free one"
+            place.below("impacts").note(name, "is not a valid group name", hint)
+        logs: dict[Path, LogSection] = place.tried({}, found.sections, group, own)
+        limits = profile
+        if group.force_profile is not None:
+            limits = place.tried(None, _profile, profiles, force, own, "force_profile", group.force_profile)
         sections |= logs
-        groups[name] = ImpactGroup(tuple(logs), own, limits)
-    if HOLDOUT in root:
-        logs = found.sections(root.table(HOLDOUT))
+        groups[name] = ImpactGroup(tuple(logs), group.window_s or table.window_s, limits)
+    if table.holdout:
+        logs = place.tried({}, found.sections, table.holdout, place.below(HOLDOUT))
         sections |= logs
-        groups[HOLDOUT] = ImpactGroup(tuple(logs), window, is_impact_free=True)
-    if "limits" in force and not any(group.force for group in groups.values()):
-        raise force.fault(
-            "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"
-        )
-    if not groups and "inject" not in root:
-        raise root.fault("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")
-    changed, of_changed = _conditions(root.table("conditions"), found, window, groups)
+        groups[HOLDOUT] = ImpactGroup(tuple(logs), table.window_s, is_impact_free=True)
+    if force.limits and not any(group.force for group in groups.values()):
+        below.note("limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}")
+    if not groups and table.inject is None:
+        place.note("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")
+    changed, of_changed = _conditions(table, place.below("conditions"), found, groups)
     sections |= of_changed
-    groups |= changed
-    return groups, {path: section for path, section in sections.items() if section}
+    return groups | changed, {path: section for path, section in sections.items() if section}
 
 
 def _conditions(
-    tables: Table, found: LogsOf, window: float, groups: Mapping[str, ImpactGroup]
+    table: BenchmarkTable, place: Place, found: LogsOf, groups: Mapping[str, ImpactGroup]
 ) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
     """Return the groups of changed conditions of the machine, as CONDITION/GROUP, and the sections of their logs.
 
@@ -504,61 +606,46 @@ def _conditions(
     changed: dict[str, ImpactGroup] = {}
     sections: dict[Path, LogSection] = {}
     struck = [name for name in groups if name != HOLDOUT]
-    for condition in tables.values:
-        table = tables.table(condition)
-        named = {HOLDOUT: table.table(HOLDOUT)} if HOLDOUT in table else {}
-        impacts = table.table("impacts")
-        for name in impacts.values:
+    for condition, own in table.conditions.items():
+        below = place.below(condition)
+        named = {HOLDOUT: (own.holdout, below.below(HOLDOUT))} if own.holdout else {}
+        for name, logs_of in own.impacts.items():
             if name not in struck:
-                raise impacts.fault(name, "is not a group of [impacts]", nearest(name, struck))
-            named[name] = impacts.table(name)
-        table.finish()
-        if not condition.strip():
-            raise tables.fault(condition, "has no name", "give it a name")
-        if condition.strip() == ALL:
-            raise tables.fault(condition, "is not a valid name", f"choose another name; {ALL} stands for every group")
+                below.below("impacts").note(name, "is not a group of [impacts]", nearest(name, struck))
+            named[name] = logs_of, below.below("impacts").below(name)
+        if condition.strip() in ("", ALL):
+            place.note(condition, "is not a valid name", f"choose another name; {ALL} stands for every group")
         if not named:
-            raise tables.fault(condition, "has no logs", "add holdout.logs, impacts.GROUP.logs or both")
-        for name, table_of_logs in named.items():
+            place.note(condition, "has no logs", "add holdout.logs, impacts.GROUP.logs or both")
+        for name, (logs_of, at) in named.items():
             group = f"{condition}/{name}"
             if group in (*groups, *changed) or condition in groups:
                 same = condition if condition in groups else group
-                raise tables.fault(
-                    condition, f"{same} is the name of another group", "choose another name for the condition"
-                )
-            logs = found.sections(table_of_logs)
+                place.note(condition, f"{same} is the name of another group", "choose another name for the condition")
+            logs: dict[Path, LogSection] = place.tried({}, found.sections, logs_of, at)
             sections |= logs
-            unchanged = groups.get(name, ImpactGroup((), window, is_impact_free=True))
+            unchanged = groups.get(name, ImpactGroup((), table.window_s, is_impact_free=True))
             changed[group] = replace(unchanged, logs=tuple(logs), condition=condition, counterpart=name)
     return changed, sections
 
 
-def _force_limits(force: Table, base: Path) -> Path | None:
-    return joined(base, force.text("limits")) if "limits" in force else None
+def _force_limits(force: ForceTable, base: Path) -> Path | None:
+    return joined(base, force.limits) if force.limits else None
 
 
-def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:
+def _profile(
+    profiles: Mapping[str, ForceProfile], force: ForceTable, place: Place, key: str, name: str
+) -> ForceProfile | None:
     """Return the force profile that a key names, None for an empty text; ConfigurationError names key and file."""
-    if not (name := table.text(key)):
+    if not name:
         return None
     try:
         return profile_of(profiles, name)
     except UsageError as fault:
         where = (
-            f" in {force.text('limits')}"
-            if "limits" in force
-            else "; [force] limits does not name a file with your own profiles"
+            f" in {force.limits}" if force.limits else "; [force] limits does not name a file with your own profiles"
         )
-        raise table.fault(key, f"{fault.message}{where}", fault.hint) from fault
-
-
-def _mass_before_cell(force: Table) -> float:
-    """Return the mass before the cell [kg]; reads every key of [force] so that an unknown key is reported first."""
-    mass = force.number("mass_before_cell_kg", 0.0, minimum=0.0)
-    for name in ("limits", "profile"):
-        force.raw(name)
-    force.finish()
-    return mass
+        raise place.fault(key, f"{fault.message}{where}", fault.hint) from fault
 
 
 def _scored(groups: Mapping[str, ImpactGroup], *, impact_free: bool = False) -> list[Path]:
@@ -619,102 +706,3 @@ def _ends_early(benchmark: BenchmarkFile, log: Path) -> bool:
     if benchmark.guard is not None:
         return True
     return log in resolve_all(path for path, section in benchmark.learned_sections.items() if section.end)
-
-
-def _read_operations(root: Table) -> str:
-    """Return how logs are cut: `operations` as a text, or `by` in the table [operations]."""
-    is_table = isinstance(root.raw("operations"), dict)
-    table = root.table("operations") if is_table else root
-    key = "by" if is_table else "operations"
-    text = table.text(key, None if is_table else "whole")
-    if is_table:
-        table.finish()
-    try:
-        RunCut.of(text)
-    except UsageError as fault:
-        raise table.fault(key, f"is '{text}'", fault.hint) from fault
-    return text
-
-
-def _read_budget(table: Table) -> Budget | None:
-    """Return `false_alarm_budget`; None if it is missing."""
-    if "false_alarm_budget" not in table:
-        return None
-    text = table.text("false_alarm_budget")
-    try:
-        return Budget.parse(text)
-    except UsageError as fault:
-        raise table.fault("false_alarm_budget", f"is '{text}'", fault.hint) from fault
-
-
-def _read_watched(table: Table, joints: Sequence[str]) -> tuple[str, ...]:
-    """Return `joints`, the joints to monitor; empty: all of them."""
-    watched = table.texts("joints", ())
-    for joint in watched:
-        if joint not in joints:
-            raise table.fault(
-                "joints", f"contains '{joint}', which is not a joint of the machine file", nearest(joint, joints)
-            )
-    return watched
-
-
-def _read_activation(table: Table) -> Activation:
-    """Return [activation]: how a signal outside the limits becomes an alarm."""
-    activation = Activation(
-        debounce=table.whole("debounce", 1, minimum=1) if "debounce" in table else None,
-        rearm=table.number("rearm_s", Activation.rearm, minimum=0.0),
-        hysteresis=_share(table, "hysteresis", Activation.hysteresis),
-        latch=table.flag("latch", Activation.latch),
-    )
-    table.finish()
-    return activation
-
-
-def _share(table: Table, name: str, default: float) -> float:
-    value = table.number(name, default, minimum=0.0)
-    if value >= 1.0:
-        raise table.fault(name, f"is {value:g}", "give a number from 0 to below 1")
-    return value
-
-
-def migrated_onset(table: Table) -> tuple[str, ...]:
-    """Return how a setting of an earlier version is read; empty without such a setting."""
-    if "samples" not in table:
-        return ()
-    return (f"{table.key('samples')}: read as hold_s = {_hold(table):g} (samples at 1 kHz): use hold_s instead",)
-
-
-def _hold(table: Table) -> float:
-    """Return `hold_s`, or `samples` of an earlier version at 1 kHz, independent of the load cell's actual rate."""
-    if "samples" not in table:
-        hold = table.number("hold_s", OnsetRule.hold, minimum=0.0)
-        if hold > LONGEST_HOLD:
-            raise table.fault("hold_s", f"is {hold:g}", f"give at most {LONGEST_HOLD:g} s")
-        return hold
-    samples = table.whole("samples", 3, minimum=1)
-    if "hold_s" in table:
-        raise table.fault(
-            "samples", "cannot be combined with hold_s", "remove samples: the onset rule counts in seconds"
-        )
-    if samples * SAMPLE > LONGEST_HOLD:
-        raise table.fault(
-            "samples", f"is {samples}: the onset rule now counts in seconds", f"set hold_s, at most {LONGEST_HOLD:g}"
-        )
-    return samples * SAMPLE
-
-
-def read_onset(table: Table) -> OnsetRule:
-    """Return [onset]: when a contact begins."""
-    above = table.number("above_n", above=0.0) if "above_n" in table else None
-    back_to = table.number("back_to_n", above=0.0) if "back_to_n" in table else None
-    if above is not None and back_to is not None and back_to > above:
-        raise table.fault("back_to_n", f"is {back_to:g}, more than above_n", "give at most above_n")
-    rule = OnsetRule(
-        above=above,
-        back_to=back_to,
-        hold=_hold(table),
-        sigmas=table.number("sigmas", OnsetRule.sigmas, above=0.0),
-        separation=table.number("separation_s", OnsetRule.separation, above=0.0),
-    )
-    table.finish()
-    return rule

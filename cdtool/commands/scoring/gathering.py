@@ -9,7 +9,7 @@ from typing import Any
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
-from cdtool.base.findings import Finding, remark
+from cdtool.base.findings import Finding
 from cdtool.commands.judging.impact_free import unchecked
 from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.commands.scoring.counting import Exposure, SweepRows
@@ -35,7 +35,6 @@ def results_before(
     findings: Iterable[RecordingFinding] = (),
 ) -> Results:
     """Return what is known of the results before a log is scored: no row of a log."""
-    of_file = [RecordingFinding.of(str(setup.path), remark(words)) for words in setup.migrated]
     return Results(
         provenance=provenance,
         detectors=tuple(detectors),
@@ -45,7 +44,7 @@ def results_before(
         false_alarms=(),
         exposure=(),
         skipped=tuple(skipped),
-        findings=(*of_file, *setup.rules_of("").findings, *findings),
+        findings=(*setup.rules_of("").findings, *findings),
     )
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, make_dataclass
 from typing import Any, ClassVar
 
-from cdtool.base.errors import ConfigurationError
-from cdtool.base.tables import Table
+from cdtool.base.errors import ConfigurationError, nearest
+from cdtool.base.settings import Place, read
+from cdtool.base.value_words import value_in_words
 from cdtool.machines.axis import Axis
 from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
-from cdtool.machines.joint_machine import JointMachine
+from cdtool.machines.joint_machine import JointMachine, PerJoint, per_joint
 
 # What [machine] gives, so that it must not be repeated in [model.drive].
 _FROM_MACHINE = ("load_mass",)
@@ -37,37 +38,51 @@ class Bristle:
                 )
 
 
+_PARTS: dict[str, type[Any]] = {
+    "drive": ElasticDrive,
+    "friction": Friction,
+    "controller": Controller,
+    "sensors": Sensors,
+    "bristle": Bristle,
+}
+# The keys of a section are the parameters of its part, as numbers per joint.
+_NUMBERS = {
+    name: tuple(item.name for item in fields(part) if item.name not in _NOT_KEYS) for name, part in _PARTS.items()
+}
+_SECTIONS = {
+    name: make_dataclass(name, [(key, PerJoint, ()) for key in keys] + [("rigid", bool, False)] * (name == "drive"))
+    for name, keys in _NUMBERS.items()
+}
+
+
 @dataclass(frozen=True)
 class ModelTable:
     """The values of [model] by section and key, one per joint; a section that is not given is missing."""
 
     sections: Mapping[str, Mapping[str, tuple[float, ...]]]
 
-    parts: ClassVar[dict[str, type[Any]]] = {
-        "drive": ElasticDrive,
-        "friction": Friction,
-        "controller": Controller,
-        "sensors": Sensors,
-        "bristle": Bristle,
-    }
+    parts: ClassVar[dict[str, type[Any]]] = _PARTS
 
     @classmethod
-    def read(cls, table: Table, joints: int) -> ModelTable:
-        """Read and check [model]; raises ConfigurationError naming the key."""
+    def read(cls, table: Mapping[str, Any], joints: int, place: Place) -> ModelTable:
+        """Return [model], with the mistakes in `place`; a number is that of all joints, or a list has one for each."""
         sections: dict[str, dict[str, tuple[float, ...]]] = {}
-        for name, part in cls.parts.items():
-            if name not in table:
+        for name, values in table.items():
+            if name not in cls.parts:
+                place.note(name, "unknown key", nearest(name, cls.parts))
                 continue
-            section = table.table(name)
-            values: dict[str, tuple[float, ...]] = {}
-            if name == "drive" and section.flag("rigid", False):
-                values["stated_rigid"] = (True,) * joints
-            for item in fields(part):
-                if item.name in section.values and item.name not in _NOT_KEYS:
-                    values[item.name] = section.numbers(item.name, joints)
-            section.finish()
-            sections[name] = values
-        table.finish()
+            if not isinstance(values, dict):
+                place.note(name, f"is {value_in_words(values)}", f"add a table [model.{name}]")
+                continue
+            below = place.below(name)
+            given = read(_SECTIONS[name], values, below)
+            keys = [key for key in values if joints and key in _NUMBERS[name]]
+            found: dict[str, tuple[float, ...]] = {
+                key: place.tried((), per_joint, given, key, joints, below) for key in keys
+            }
+            if getattr(given, "rigid", False):
+                found["stated_rigid"] = (True,) * joints
+            sections[name] = found
         return cls(sections)
 
     def of_joint(self, name: str, joint: int) -> dict[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.recording import Recording
 
-ALIGNMENTS = ("time_then_position", "time", "position")
+Alignment = Literal["time_then_position", "time", "position"]
+ALIGNMENTS: tuple[Alignment, ...] = get_args(Alignment)
 # Shares of the nominal speed at which the stroke has begun, and at which it runs.
 START_SHARE = 0.1
 RUNNING_SHARE = 0.95

@@ -113,11 +113,10 @@ def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -
 
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Series
-    >>> from cdtool.base.tables import Table
     >>> time = np.arange(0.0, 6.0, 0.005)
     >>> position = Series(time, 0.3 * np.sin(2.0 * time) ** 3, "m")
     >>> speed = Series(time + 0.004, 1.8 * np.sin(2.0 * time) ** 2 * np.cos(2.0 * time), "m/s")
-    >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
+    >>> axis = LinearAxis.of({"coordinates": "load"})
     >>> found = audit(Recording("run", "", ("axis",), {"position": position, "speed": speed}), axis, [])
     >>> found[0].channel, found[0].reference, round(found[0].offset.value, 4)
     ('speed', 'position', 0.004)

@@ -13,7 +13,6 @@ import pytest
 
 import cdtool
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.tables import Table
 from cdtool.commands.identify.robot.robot_dynamics import RobotFit
 from cdtool.commands.identify.robot.robot_regressor import regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
@@ -89,7 +88,7 @@ def panda(folder: Path, **keys: object) -> UrdfRobot:
         "constant_force": [0.3, -0.2, 0.1, 0.2, -0.1, 0.05, 0.1],
         **keys,
     }
-    return UrdfRobot.from_table(Table(values, str(folder / "machine.toml"), "machine."))
+    return UrdfRobot.of(values, str(folder / "machine.toml"))
 
 
 def planar_arm(**keys: object) -> PlanarArm:
@@ -106,7 +105,7 @@ def planar_arm(**keys: object) -> PlanarArm:
         "constant_force": [0.005, -0.002],
         **keys,
     }
-    return PlanarArm.from_table(Table(values, "machine.toml", "machine."))
+    return PlanarArm.of(values)
 
 
 # Seconds after the first row, as in docs/examples/ur10e_collisions.py: where an abrupt stop begins, and contacts.

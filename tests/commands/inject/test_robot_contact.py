@@ -11,7 +11,6 @@ import pytest
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.base.tables import Table
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, DriveBeyond
 from cdtool.commands.inject.axis_contact import Doubt, InjectedContact
 from cdtool.commands.inject.injected_logs import injected_recording
@@ -263,7 +262,7 @@ def test_a_point_that_was_beyond_the_obstacle_before_meets_it_at_the_contact_onl
     """A real motion in which the tool crosses every plane several times, without a rest between."""
     keys = {"urdf": "ur10e.urdf", "joints": list(UR10E), "drive_inertia": [0.0, 3.7434, 0.0, 0.0708, 0.2342, 0.4365]}
     keys |= {"viscous_friction": 10.0, "coulomb_friction": 5.0, "coulomb_slope": 50.0}
-    machine = UrdfRobot.from_table(Table(keys, str(UR10E_LOGS / "machine.toml"), "machine."))
+    machine = UrdfRobot.of(keys, str(UR10E_LOGS / "machine.toml"))
     table = np.loadtxt(UR10E_LOGS / "no_torque.csv.gz", delimiter=",", usecols=range(19))
     series = {
         name: Series(table[:, 0] - table[0, 0], table[:, first : first + 6], machine.load_units[name])

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.tables import Table
-from cdtool.commands.judging.named_logs import LogsOf, labels_of
+from cdtool.base.settings import Place, read
+from cdtool.commands.judging.named_logs import LogsOf, OnsetTable, labels_of
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 
 MACHINE = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\n'
@@ -36,26 +36,28 @@ def logs(folder: Path) -> LogsOf:
 def test_the_file_of_a_logs_load_cell_is_not_a_log(tmp_path, force, names):
     for name in ("01.csv", "01_cell.csv", "02.csv", "03_cell.csv"):  # the last one has no log
         (tmp_path / name).write_text("t\n", encoding="utf-8")
-    found = LogsOf(tmp_path, machine(tmp_path, force)).of(Table({"logs": ["*.csv"]}, "b.toml", "learn."))
+    found = LogsOf(tmp_path, machine(tmp_path, force)).of(["*.csv"], "b.toml: learn.logs")
     assert [path.name for path in found] == names
 
 
 @pytest.mark.parametrize("key", ["labels_clock", "labels_zone", "not_contacts"])
 def test_a_setting_of_labels_needs_a_label_file(tmp_path, key):
-    value = {"labels_clock": "source", "labels_zone": "Z", "not_contacts": ["soft"]}[key]
+    value = {"labels_clock": "source", "labels_zone": "Z", "not_contacts": ("soft",)}[key]
     with pytest.raises(ConfigurationError, match=f"onset.{key}: is only for a label file"):
-        labels_of(Table({key: value}, "b.toml", "onset."), logs(tmp_path), [])
+        labels_of(OnsetTable(**{key: value}), Place("b.toml", "onset."), logs(tmp_path), [])
 
 
 def test_the_settings_of_the_labels_reach_the_file(tmp_path):
     rows = "recording,start_time,end_time,kind\n01.csv,2025-04-03T12:00,,hard\n01.csv,2025-04-03T12:01,,soft\n"
     (tmp_path / "labels.csv").write_text(rows, encoding="utf-8")
-    settings = {"labels": "labels.csv", "labels_zone": "+02:00", "not_contacts": ["soft"]}
-    labels = labels_of(Table(settings, "b.toml", "onset."), logs(tmp_path), [tmp_path / "01.csv"])
+    settings = {"labels": "labels.csv", "labels_zone": "+02:00", "not_contacts": ("soft",)}
+    labels = labels_of(OnsetTable(**settings), Place("b.toml", "onset."), logs(tmp_path), [tmp_path / "01.csv"])
     assert labels is not None and labels.kinds == ("hard",) and labels.clock == "source"
     assert labels.contacts["01.csv"][0].start == 1_743_674_400.0
 
 
-def test_an_unknown_clock_of_the_labels_is_refused(tmp_path):
+def test_an_unknown_clock_of_the_labels_is_refused():
+    place = Place("b.toml", "onset.")
+    read(OnsetTable, {"labels": "l.csv", "labels_clock": "log"}, place)
     with pytest.raises(ConfigurationError, match=r"onset\.labels_clock: is 'log'.*recording"):
-        labels_of(Table({"labels": "l.csv", "labels_clock": "log"}, "b.toml", "onset."), logs(tmp_path), [])
+        place.finish()

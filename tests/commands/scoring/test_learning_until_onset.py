@@ -246,7 +246,7 @@ def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):
         ((HEAD, LEARN.replace('until = "onset"\n', ""), GROUPS), 'both learned from and scored .*until = "onset"'),
         ((HEAD, LEARN, '[holdout]\nlogs = ["stiff/*.csv"]\n'), "both learned from and scored"),
         ((HEAD, LEARN.replace("onset", "contact"), GROUPS), "learn.until: is 'contact'"),
-        ((HEAD, LEARN.replace('until = "onset"', "guard_s = 0.1"), GROUPS), "learn.guard_s: is given without until"),
+        ((HEAD, LEARN.replace('until = "onset"', "guard_s = 0.1"), GROUPS), "learn: guard_s is given without until"),
         ((HEAD, LEARN, "guard_s = -0.1\n", GROUPS), "learn.guard_s: is -0.1"),
         ((HEAD, LEARN, "to = 3.2\n", GROUPS), "learn.to: is 3.2 .*in quotes"),
         ((HEAD, LEARN, 'to = "3.2"\n', GROUPS), "learn.to: is '3.2'"),
@@ -256,7 +256,7 @@ def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):
             r"logs\[0\].too: unknown",
         ),
         ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [{ to = '3s' }]\n"), r"impacts.x.logs\[0\].path: is missing"),
-        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [3]\n"), "impacts.x.logs: is 3"),
+        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [3]\n"), "impacts.x.logs.0.: is 3"),
         (
             (HEAD, LEARN, GROUPS, '[impacts.x]\nfrom = "3s"\nlogs = [{ path = "free/01.csv", to = "1s" }]\n'),
             r"impacts.x.logs\[0\].to: the end, 1 s, is not after the begin, 3 s",

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.tables import Table
 from cdtool.machines.axis_model.model_table import ModelTable
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
@@ -30,7 +29,7 @@ SHUFFLED = ("lift", "pan", "elbow", "tool", "wrist", "reach")
 
 
 def planar_arm(**keys: object) -> PlanarArm:
-    return PlanarArm.from_table(Table({**ARM, **keys}, "machine.toml"))
+    return PlanarArm.of({**ARM, **keys})
 
 
 def machines(folder: Path) -> list[CoupledMachine]:
@@ -82,7 +81,7 @@ def test_an_index_names_the_link_of_a_joint_of_the_log(tmp_path: Path) -> None:
 
 def test_motor_inertia_may_be_a_share_of_the_links() -> None:
     values = {key: value for key, value in ARM.items() if key not in ("motor_inertia", "transmission_ratio")}
-    machine = PlanarArm.from_table(Table({**values, "coordinates": "load"}, "machine.toml"))
+    machine = PlanarArm.of({**values, "coordinates": "load"})
     table = ModelTable({"drive": {"motor_mass": (0.02, 0.01), "stiffness": (400.0, 400.0)}})
     model = robot_model(machine, table)
     matrix, _ = model.dynamics(np.zeros(2), np.zeros(2))

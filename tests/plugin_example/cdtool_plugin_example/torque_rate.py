@@ -41,8 +41,7 @@ class TorqueRate:
 
     >>> from cdtool.machines.linear_axis import LinearAxis
     >>> from cdtool.recordings.recording import Recording, Series
-    >>> from cdtool.base.tables import Table
-    >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
+    >>> axis = LinearAxis.of({"coordinates": "load"})
     >>> time = np.arange(2000) * 1e-3
     >>> run = Recording("run", "", ("axis",), {"torque": Series(time, 1000.0 * time, "N")})
     >>> signal = TorqueRate().signal(run, axis)

@@ -1,0 +1,387 @@
+"""Settings that people write: each is one annotated field of a model, with type, bounds, unit, default and meaning.
+
+A model is a dataclass or a `msgspec.Struct`. Its fields are the keys of a table in a TOML file: they give the check of
+each value, the error with what is allowed, and the JSON schema. A field of a type that no TOML value has is not a key.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from enum import Enum
+from functools import cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+from cdtool.base.errors import CdtoolError, ConfigurationError, MistakesError, UsageError, nearest
+from cdtool.base.value_words import value_in_words
+
+Model = TypeVar("Model")
+Made = TypeVar("Made")
+
+#: No quantity of a machine in SI is larger, or smaller than its inverse unless 0: squares and products stay finite.
+_LARGEST = 1e12
+
+NotNegative = Annotated[float, Meta(ge=0.0)]
+Positive = Annotated[float, Meta(gt=0.0)]
+Count = Annotated[int, Meta(ge=1)]
+CountFromZero = Annotated[int, Meta(ge=0)]
+
+
+#: Annotation of a field that is not a key, because it is filled in.
+NOT_A_KEY = Meta(extra={"key": None})
+
+
+def setting(meaning: str, *, key: str = "", unit: str = "", infinite: bool = False, hint: str = "") -> Meta:
+    """Return the annotation of a field: what it means, its key in a file if that is not its name, and its unit.
+
+    `infinite`: inf is allowed, for a limit that is not there. `hint`: what to give in place of a wrong value, where
+    type and bounds do not say it.
+
+    >>> from typing import Annotated
+    >>> Hold = Annotated[NotNegative, setting("how long the force stays above", key="hold_s", unit="s")]
+    """
+    return Meta(description=meaning, extra={"key": key, "unit": unit, "infinite": infinite, "hint": hint})
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a model: `name` in the file, `attribute` of the model, its type, and what `setting` says about it."""
+
+    name: str
+    attribute: str
+    hint: Any
+    required: bool
+    meaning: str = ""
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def allowed(self) -> str:
+        """Return what to give, in words."""
+        return self.extra.get("hint") or f"give {kind_in_words(self.hint)}"
+
+
+def keys_of(model: Any) -> Mapping[str, Key]:
+    """Return the keys of a model by their names in a file, in the order of its fields."""
+    return _keys_of(model)
+
+
+@cache
+def _keys_of(model: Hashable) -> Mapping[str, Key]:
+    hints = get_type_hints(model, include_extras=True)
+    found = {}
+    for attribute, required in _fields_of(model):
+        meta = _meta(hints[attribute])
+        extra = (meta and meta.extra) or {"key": ""}
+        key = Key(
+            extra.get("key") or attribute,
+            attribute,
+            hints[attribute],
+            required,
+            (meta and meta.description) or "",
+            extra,
+        )
+        if extra.get("key") is not None and all(_is_written(part) for part in alternatives(key.hint)):
+            found[key.name] = key
+    return found
+
+
+def _fields_of(model: Any) -> list[tuple[str, bool]]:
+    """Return the names of a model's fields, and whether each must be given."""
+    if is_dataclass(model):
+        return [
+            (item.name, item.default is MISSING and item.default_factory is MISSING)
+            for item in fields(model)
+            if item.init
+        ]
+    return [(item.name, item.required) for item in msgspec.structs.fields(model)]
+
+
+def is_model(hint: Any) -> bool:
+    """Whether a type is a table with keys of its own."""
+    return is_dataclass(hint) or (isinstance(hint, type) and issubclass(hint, msgspec.Struct))
+
+
+def _is_written(hint: Any) -> bool:
+    """Whether a TOML value can have that type."""
+    bare = bare_type(hint)
+    origin = get_origin(bare)
+    if origin in (tuple, list, dict, Literal) or bare is Any or is_model(bare):
+        return True
+    return bare in (bool, int, float, str) or (isinstance(bare, type) and issubclass(bare, Enum))
+
+
+def _meta(hint: Any) -> Meta | None:
+    """Return the last annotation of a field that `setting` made, also that of a part of a union."""
+    for item in reversed(getattr(hint, "__metadata__", ())):
+        if isinstance(item, Meta) and item.extra is not None:
+            return item
+    return None
+
+
+def bare_type(hint: Any) -> Any:
+    """Return a type without its annotations."""
+    return hint.__origin__ if get_origin(hint) is Annotated else hint
+
+
+def alternatives(hint: Any) -> tuple[Any, ...]:
+    """Return the types that a value may have: the members of a union without None, or the type itself."""
+    bare = bare_type(hint)
+    if get_origin(bare) in (Union, UnionType):
+        return tuple(part for part in get_args(bare) if part is not NoneType)
+    return (hint,)
+
+
+def words_of(hint: Any) -> tuple[str, ...]:
+    """Return the words that are allowed, for a choice; else empty."""
+    bare = bare_type(hint)
+    if get_origin(bare) is Literal:
+        return tuple(map(str, get_args(bare)))
+    return tuple(str(item.value) for item in bare) if isinstance(bare, type) and issubclass(bare, Enum) else ()
+
+
+def kind_in_words(hint: Any, plural: bool = False) -> str:
+    """Return what a type allows in words.
+
+    >>> kind_in_words(Count | None), kind_in_words(tuple[Positive, ...]), kind_in_words(bool)
+    ('a whole number of at least 1', 'one number or a list of numbers above 0', 'true or false, without quotes')
+    """
+    return " or ".join(dict.fromkeys(_one_kind(part, plural) for part in alternatives(hint)))
+
+
+def _one_kind(hint: Any, plural: bool) -> str:
+    bare = bare_type(hint)
+    if words := words_of(hint):
+        return f"one of {', '.join(words)}"
+    if get_origin(bare) in (tuple, list):
+        items = [part for part in get_args(bare) if part is not Ellipsis]
+        size = "" if Ellipsis in get_args(bare) or get_origin(bare) is list else f"{len(items)} "
+        one = "one number or " if not size and bare_type(items[0]) in (int, float) else ""
+        return f"{one}{size or 'a list of '}{kind_in_words(items[0], plural=True)}"
+    if bare is bool:
+        return "true or false, without quotes"
+    if bare in (int, float):
+        number = "whole number" if bare is int else "number"
+        return f"{number}s{_bounds(hint)}" if plural else f"a {number}{_bounds(hint)}"
+    if bare is str:
+        return "texts" if plural else "a text in quotes"
+    return "tables" if plural else "a table"
+
+
+def _bounds(hint: Any) -> str:
+    words = []
+    for item in getattr(hint, "__metadata__", ()):
+        for bound, text in ((item.ge, "of at least"), (item.gt, "above"), (item.le, "of at most"), (item.lt, "below")):
+            words += [] if bound is None else [f" {text} {bound:g}"]
+    return " and".join(words)
+
+
+def _scalar(key: Key, hint: Any, value: Any) -> tuple[Any, str, str]:
+    """Return a single value as its type has it, what is wrong with it, and what to give instead; "" if it is allowed.
+
+    Each type of a union is tried by itself: msgspec 0.23 aborts on a union of a bounded number and a tuple.
+    """
+    problem = f"is {value_in_words(value)}"
+    for part in alternatives(hint):
+        if not _is_scalar(part):
+            continue
+        try:
+            found = msgspec.convert(value, part)
+        except msgspec.ValidationError:
+            continue
+        is_number = isinstance(found, float) and not math.isfinite(found)
+        if is_number and not (key.extra.get("infinite") and found == math.inf):
+            break
+        return found, "", ""
+    words = [word for part in alternatives(hint) for word in words_of(part)]
+    return value, problem, nearest(value, words) if words and isinstance(value, str) else key.allowed
+
+
+def _is_scalar(hint: Any) -> bool:
+    bare = bare_type(hint)
+    return not is_model(bare) and get_origin(bare) not in (tuple, list, dict) and bare is not Any
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in a file values stand, and the mistakes that were found in the file so far.
+
+    `by_option`: full keys that an option gave. `root`: the model of the whole file, to say where a key belongs.
+    """
+
+    where: str
+    prefix: str = ""
+    mistakes: list[ConfigurationError] = field(default_factory=list)
+    by_option: frozenset[str] = frozenset()
+    root: type[Any] | None = None
+
+    def key(self, name: str) -> str:
+        """Return file and full key, for an error message; for one of `by_option`, the option that gave it."""
+        full = f"{self.prefix}{name}"
+        return f"--set {full}" if full in self.by_option else f"{self.where}: {full}"
+
+    def home_of(self, name: str) -> str:
+        """Return the table of the file that has a key of that name, if only one has; else an empty text."""
+        tables = keys_of(self.root) if self.root else {}
+        models = {key.name: bare_type(part) for key in tables.values() for part in alternatives(key.hint)}
+        homes = [table for table, model in models.items() if is_model(model) and name in keys_of(model)]
+        return homes[0] if len(homes) == 1 and self.prefix != f"{homes[0]}." else ""
+
+    def below(self, name: str) -> Place:
+        """Return the place of the table `name` in this one."""
+        return replace(self, prefix=f"{self.prefix}{name}.")
+
+    def fault(self, name: str, problem: str, hint: str = "") -> ConfigurationError:
+        """Return an error about one key."""
+        found = ConfigurationError(f"{self.key(name)}: {problem}", hint)
+        found.key = f"{self.prefix}{name}"
+        return found
+
+    def whole(self, fault: CdtoolError) -> ConfigurationError:
+        """Return an error about the table itself."""
+        if not self.prefix:
+            return ConfigurationError(f"{self.where}: {fault.message}", fault.hint)
+        above, dot, table = self.prefix.removesuffix(".").rpartition(".")
+        return replace(self, prefix=f"{above}{dot}").fault(table, fault.message, fault.hint)
+
+    def note(self, name: str, problem: str, hint: str = "") -> None:
+        """Remember a mistake, so that the rest of the file is checked as well."""
+        self._add(self.fault(name, problem, hint))
+
+    def _add(self, mistake: ConfigurationError) -> None:
+        """Remember a mistake, unless it only follows from one about the same key or a part of it."""
+        key = mistake.key
+        if not key or not any(f"{known.key}.".replace("[", ".").startswith(f"{key}.") for known in self.mistakes):
+            self.mistakes.append(mistake)
+
+    def tried(self, otherwise: Made, make: Callable[..., Made], *given: Any) -> Made:
+        """Return what `make` makes of what is given; after an error, which is remembered, `otherwise`."""
+        with self.noting():
+            return make(*given)
+        return otherwise
+
+    @contextmanager
+    def at(self, name: str, value: Any = None) -> Iterator[None]:
+        """Name the key in an error that is raised inside; with a value, that it is this one is what is wrong."""
+        try:
+            yield
+        except UsageError as fault:
+            problem = fault.message if value is None else f"is {value_in_words(value)}"
+            raise self.fault(name, problem, fault.hint) from fault
+
+    @contextmanager
+    def noting(self) -> Iterator[None]:
+        """Remember an error that is raised inside instead of raising it."""
+        try:
+            yield
+        except MistakesError as faults:
+            for fault in faults.mistakes:
+                self._add(fault)
+        except ConfigurationError as fault:
+            self._add(fault)
+
+    def finish(self) -> None:
+        """Raise the mistakes that were found, all at once."""
+        if self.mistakes:
+            raise self.mistakes[0] if len(self.mistakes) == 1 else MistakesError(self.mistakes)
+
+
+_WRONG: Any = object()
+
+
+def read(model: type[Model], values: Mapping[str, Any], place: Place) -> Model | None:
+    """Return the model that the `values` of a table describe, with every mistake in `place`.
+
+    A wrong value is replaced by its default, so that what depends on it can still be checked. A single value stands for
+    a list with one. None if a key that must be given is missing or wrong, or if the values do not fit together.
+    """
+    keys = keys_of(model)
+    given = {}
+    for name, value in values.items():
+        if name not in keys:
+            home = place.home_of(name)
+            place.note(name, "unknown key", f"it belongs in [{home}]" if home else nearest(name, keys))
+        elif (found := _value(keys[name], keys[name].hint, name, value, place)) is not _WRONG:
+            given[keys[name].attribute] = found
+    for name, key in keys.items():
+        if key.required and name not in values:
+            place.note(name, "is missing", key.allowed)
+    if any(key.required and key.attribute not in given for key in keys.values()):
+        return None
+    try:
+        return model(**given)
+    except CdtoolError as fault:
+        place.mistakes.append(place.whole(fault))
+        return None
+
+
+def _value(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
+    """Return a value as its type has it, or _WRONG with its mistakes in `place`."""
+    parts = alternatives(hint)
+    if hint is Any:
+        return value
+    if isinstance(value, dict):
+        for part in map(bare_type, parts):
+            if is_model(part):
+                found = read(part, value, place.below(name))
+                return _WRONG if found is None else found
+            if get_origin(part) is dict:
+                return _table(key, get_args(part)[1], value, place.below(name))
+    lists = [part for part in parts if get_origin(bare_type(part)) in (tuple, list)]
+    if lists and (isinstance(value, list) or len(lists) == len(parts)):
+        return _list(key, bare_type(lists[0]), name, value, place)
+    found, problem, allowed = _scalar(key, hint, value)
+    is_size = isinstance(found, float) and 0.0 < abs(found) < math.inf
+    if not problem and is_size and not 1.0 / _LARGEST <= abs(found) <= _LARGEST:
+        problem = f"is {value_in_words(value)}"
+        allowed = f"no quantity is above {_LARGEST:g} or, unless 0, below {1.0 / _LARGEST:g}: check the unit"
+    if problem and all(is_model(bare_type(part)) or get_origin(bare_type(part)) is dict for part in parts):
+        allowed = key.extra.get("hint") or f"add a table [{place.prefix}{name}]"
+    if problem:
+        place.note(name, problem, allowed)
+        return _WRONG
+    return found
+
+
+def _table(key: Key, hint: Any, values: Mapping[str, Any], place: Place) -> Any:
+    """Return a table whose keys are names that the user chooses; those with a wrong value are left out."""
+    found = {name: _value(key, hint, name, value, place) for name, value in values.items()}
+    return {name: value for name, value in found.items() if value is not _WRONG}
+
+
+def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
+    """Return a list; a single value is a list with one."""
+    kinds = [part for part in get_args(hint) if part is not Ellipsis]
+    single = not isinstance(value, list)
+    items = [value] if single else value
+    if Ellipsis not in get_args(hint) and get_origin(hint) is tuple and len(items) != len(kinds):
+        place.note(name, f"has {len(items)} values", key.allowed)
+        return _WRONG
+    names = [name if single else f"{name}[{i}]" for i in range(len(items))]
+    found = [_value(key, kinds[0], own, item, place) for own, item in zip(names, items, strict=True)]
+    return _WRONG if any(item is _WRONG for item in found) else tuple(found)
+
+
+def check(values: Any) -> None:
+    """Raise UsageError naming the first field of a model whose value its annotation does not allow.
+
+    For `__post_init__` of a model that is also made in Python.
+    """
+    for key in keys_of(type(values)).values():
+        value = getattr(values, key.attribute)
+        if isinstance(value, dict) or is_model(type(value)):
+            continue
+        lists = [bare_type(part) for part in alternatives(key.hint) if get_origin(bare_type(part)) is tuple]
+        hint = get_args(lists[0])[0] if lists and isinstance(value, tuple) else key.hint
+        for item in value if isinstance(value, tuple) else (value,):
+            if item is None and NoneType in get_args(bare_type(key.hint)):
+                continue
+            # A number of numpy is one of Python.
+            _, problem, allowed = _scalar(key, hint, getattr(item, "item", lambda item=item: item)())
+            if problem:
+                raise UsageError(f"{key.attribute} {problem}", allowed)

@@ -1,0 +1,147 @@
+"""Models of settings: every mistake of a table at once, each by its key, with what is allowed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Annotated, Literal
+
+import numpy as np
+import pytest
+
+from cdtool.base.errors import ConfigurationError, MistakesError, UsageError
+from cdtool.base.settings import NOT_A_KEY, Count, NotNegative, Place, Positive, check, keys_of, read, setting
+
+
+class Side(Enum):
+    ONE = "one"
+    TWO = "two"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inner:
+    rate: Annotated[Positive, setting("how often", key="rate_hz", unit="Hz")]
+    name: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outer:
+    mass: Annotated[Positive, setting("of the load", key="mass_kg", unit="kg")] = 1.0
+    count: Count | None = None
+    latch: bool = False
+    side: Side = Side.ONE
+    shape: Literal["line", "table"] = "line"
+    names: tuple[str, ...] = ()
+    limits: Annotated[tuple[Positive, ...], setting("limits", infinite=True)] = ()
+    gravity: NotNegative | tuple[float, float, float] = 9.81
+    inner: Inner | None = None
+    groups: dict[str, Inner] = field(default_factory=dict)
+    made: Annotated[Inner | None, NOT_A_KEY] = None
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.latch and self.count is None:
+            raise UsageError("latch without count", "give count")
+
+
+def mistakes(**values: object) -> list[str]:
+    place = Place("m.toml", root=Outer)
+    read(Outer, values, place)
+    return [str(item) for item in place.mistakes]
+
+
+def test_values_become_those_of_the_model():
+    place = Place("m.toml")
+    found = read(
+        Outer,
+        {
+            "mass_kg": 2,
+            "side": "two",
+            "names": "a",
+            "limits": [1, float("inf")],
+            "gravity": [0, 0, -9.81],
+            "inner": {"rate_hz": 3},
+            "groups": {"any name": {"rate_hz": 1.0, "name": "x"}},
+        },
+        place,
+    )
+    assert not place.mistakes and found == Outer(
+        mass=2.0,
+        side=Side.TWO,
+        names=("a",),
+        limits=(1.0, float("inf")),
+        gravity=(0.0, 0.0, -9.81),
+        inner=Inner(rate=3.0),
+        groups={"any name": Inner(rate=1.0, name="x")},
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"mass_kg": "2"}, "m.toml: mass_kg: is '2' (give a number above 0)"),
+        ({"mass_kg": True}, "m.toml: mass_kg: is true (give a number above 0)"),
+        ({"mass_kg": float("nan")}, "m.toml: mass_kg: is nan (give a number above 0)"),
+        ({"mass_kg": 1e15}, "m.toml: mass_kg: is 1e+15 (no quantity is above 1e+12 or, unless 0, below 1e-12: check"),
+        ({"mass": 2.0}, "m.toml: mass: unknown key (did you mean mass_kg? known:"),
+        ({"rate_hz": 2.0}, "m.toml: rate_hz: unknown key (it belongs in [inner])"),
+        ({"count": 1.5}, "m.toml: count: is 1.5 (give a whole number of at least 1)"),
+        ({"latch": "yes"}, "m.toml: latch: is 'yes' (give true or false, without quotes)"),
+        ({"side": "oen"}, "m.toml: side: is 'oen' (did you mean one? known: one, two)"),
+        ({"shape": 3}, "m.toml: shape: is 3 (give one of line, table)"),
+        ({"names": ["a", 1]}, "m.toml: names[1]: is 1 (give a list of texts)"),
+        ({"limits": [1.0, -2.0]}, "m.toml: limits[1]: is -2 (give one number or a list of numbers above 0)"),
+        ({"gravity": -9.81}, "m.toml: gravity: is -9.81 (give a number of at least 0 or 3 numbers)"),
+        ({"gravity": [0.0, 1.0]}, "m.toml: gravity: has 2 values (give a number of at least 0 or 3 numbers)"),
+        ({"inner": 3}, "m.toml: inner: is 3 (add a table [inner])"),
+        ({"inner": {}}, "m.toml: inner.rate_hz: is missing (give a number above 0)"),
+        ({"groups": {"x": {"rate_hz": 0}}}, "m.toml: groups.x.rate_hz: is 0 (give a number above 0)"),
+        ({"made": {"rate_hz": 1}}, "m.toml: made: unknown key"),
+        ({"latch": True}, "m.toml: latch without count (give count)"),
+    ],
+)
+def test_a_mistake_names_its_key_its_value_and_what_is_allowed(values, said):
+    (found,) = mistakes(**values)
+    assert found.startswith(said)
+
+
+def test_all_mistakes_of_a_file_come_at_once_each_of_them_once():
+    found = mistakes(mass_kg=-1, latch=2, groups={"a": {"rate_hz": "x", "nmae": 1}, "b": 3}, inner={"name": "n"})
+    assert [line.split(": ")[1] for line in found] == [
+        "mass_kg",
+        "latch",
+        "groups.a.rate_hz",
+        "groups.a.nmae",
+        "groups.b",
+        "inner.rate_hz",
+    ]
+
+
+def test_what_only_follows_from_a_mistake_is_not_a_second_one():
+    place = Place("m.toml")
+    read(Outer, {"inner": {"rate_hz": "x"}}, place)
+    place.note("inner", "is missing")
+    with pytest.raises(ConfigurationError, match=r"inner\.rate_hz: is 'x'"):
+        place.finish()
+    assert len(place.mistakes) == 1
+
+
+def test_several_mistakes_are_one_error_and_a_single_one_is_itself():
+    place = Place("m.toml", by_option=frozenset({"mass_kg"}))
+    read(Outer, {"mass_kg": -1, "latch": 2}, place)
+    with pytest.raises(MistakesError, match=r"--set mass_kg: is -1[^\n]*\nm.toml: latch: is 2"):
+        place.finish()
+
+
+def test_a_model_made_in_python_is_checked_by_the_same_annotations():
+    assert Outer(count=np.int64(3)).count == 3
+    with pytest.raises(UsageError, match="mass is -1"):
+        Outer(mass=-1.0)
+    with pytest.raises(UsageError, match="limits is -1"):
+        Outer(limits=(1.0, -1.0))
+
+
+def test_a_key_has_its_meaning_and_unit():
+    key = keys_of(Outer)["mass_kg"]
+    assert (key.attribute, key.meaning, key.extra["unit"], key.required) == ("mass", "of the load", "kg", False)
+    assert "made" not in keys_of(Outer)
