@@ -6,6 +6,7 @@ each value, the error with what is allowed, and the JSON schema. A field of a ty
 
 from __future__ import annotations
 
+import datetime as dt
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
@@ -29,6 +30,7 @@ _LARGEST = 1e12
 
 NotNegative = Annotated[float, Meta(ge=0.0)]
 Positive = Annotated[float, Meta(gt=0.0)]
+Text = Annotated[str, Meta(pattern=r"\S")]
 Count = Annotated[int, Meta(ge=1)]
 CountFromZero = Annotated[int, Meta(ge=0)]
 
@@ -75,7 +77,7 @@ def keys_of(model: Any) -> Mapping[str, Key]:
 def _keys_of(model: Hashable) -> Mapping[str, Key]:
     hints = get_type_hints(model, include_extras=True)
     found = {}
-    for attribute, required in _fields_of(model):
+    for attribute, required, noted in _fields_of(model):
         meta = _meta(hints[attribute])
         extra = (meta and meta.extra) or {"key": ""}
         key = Key(
@@ -83,7 +85,7 @@ def _keys_of(model: Hashable) -> Mapping[str, Key]:
             attribute,
             hints[attribute],
             required,
-            (meta and meta.description) or "",
+            (meta and meta.description) or noted,
             extra,
         )
         if extra.get("key") is not None and all(_is_written(part) for part in alternatives(key.hint)):
@@ -91,15 +93,15 @@ def _keys_of(model: Hashable) -> Mapping[str, Key]:
     return found
 
 
-def _fields_of(model: Any) -> list[tuple[str, bool]]:
-    """Return the names of a model's fields, and whether each must be given."""
+def _fields_of(model: Any) -> list[tuple[str, bool, str]]:
+    """Return the names of a model's fields, whether each must be given, and its meaning if its metadata has it."""
     if is_dataclass(model):
         return [
-            (item.name, item.default is MISSING and item.default_factory is MISSING)
+            (item.name, item.default is MISSING and item.default_factory is MISSING, item.metadata.get("meaning", ""))
             for item in fields(model)
             if item.init
         ]
-    return [(item.name, item.required) for item in msgspec.structs.fields(model)]
+    return [(item.name, item.required, "") for item in msgspec.structs.fields(model)]
 
 
 def is_model(hint: Any) -> bool:
@@ -113,7 +115,7 @@ def _is_written(hint: Any) -> bool:
     origin = get_origin(bare)
     if origin in (tuple, list, dict, Literal) or bare is Any or is_model(bare):
         return True
-    return bare in (bool, int, float, str) or (isinstance(bare, type) and issubclass(bare, Enum))
+    return bare in (bool, int, float, str, dt.date) or (isinstance(bare, type) and issubclass(bare, Enum))
 
 
 def _meta(hint: Any) -> Meta | None:
@@ -168,6 +170,8 @@ def _one_kind(hint: Any, plural: bool) -> str:
     if bare in (int, float):
         number = "whole number" if bare is int else "number"
         return f"{number}s{_bounds(hint)}" if plural else f"a {number}{_bounds(hint)}"
+    if bare is dt.date:
+        return "a day as 2026-03-31"
     if bare is str:
         return "texts" if plural else "a text in quotes"
     return "tables" if plural else "a table"
@@ -191,8 +195,8 @@ def _scalar(key: Key, hint: Any, value: Any) -> tuple[Any, str, str]:
         if not _is_scalar(part):
             continue
         try:
-            found = msgspec.convert(value, part)
-        except msgspec.ValidationError:
+            found = _date(value) if bare_type(part) is dt.date else msgspec.convert(value, part)
+        except (msgspec.ValidationError, ValueError):
             continue
         is_number = isinstance(found, float) and not math.isfinite(found)
         if is_number and not (key.extra.get("infinite") and found == math.inf):
@@ -200,6 +204,15 @@ def _scalar(key: Key, hint: Any, value: Any) -> tuple[Any, str, str]:
         return found, "", ""
     words = [word for part in alternatives(hint) for word in words_of(part)]
     return value, problem, nearest(value, words) if words and isinstance(value, str) else key.allowed
+
+
+def _date(value: Any) -> dt.date:
+    """Return a day, written as a date of TOML or as a text in the order of ISO 8601 or with points; ValueError."""
+    if isinstance(value, dt.date) and not isinstance(value, dt.datetime):
+        return value
+    if not isinstance(value, str):
+        raise ValueError
+    return dt.datetime.strptime(value, "%d.%m.%Y").date() if "." in value else dt.date.fromisoformat(value)
 
 
 def _is_scalar(hint: Any) -> bool:
@@ -294,8 +307,10 @@ class Place:
 _WRONG: Any = object()
 
 
-def read(model: type[Model], values: Mapping[str, Any], place: Place) -> Model | None:
+def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_in: Any) -> Model | None:
     """Return the model that the `values` of a table describe, with every mistake in `place`.
+
+    `filled_in` are fields that are not keys.
 
     A wrong value is replaced by its default, so that what depends on it can still be checked. A single value stands for
     a list with one. None if a key that must be given is missing or wrong, or if the values do not fit together.
@@ -314,7 +329,7 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place) -> Model |
     if any(key.required and key.attribute not in given for key in keys.values()):
         return None
     try:
-        return model(**given)
+        return model(**given, **filled_in)
     except CdtoolError as fault:
         place.mistakes.append(place.whole(fault))
         return None
@@ -322,47 +337,57 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place) -> Model |
 
 def _value(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
     """Return a value as its type has it, or _WRONG with its mistakes in `place`."""
-    parts = alternatives(hint)
     if hint is Any:
         return value
-    if isinstance(value, dict):
-        for part in map(bare_type, parts):
-            if is_model(part):
-                found = read(part, value, place.below(name))
-                return _WRONG if found is None else found
-            if get_origin(part) is dict:
-                return _table(key, get_args(part)[1], value, place.below(name))
-    lists = [part for part in parts if get_origin(bare_type(part)) in (tuple, list)]
-    if lists and (isinstance(value, list) or len(lists) == len(parts)):
-        return _list(key, bare_type(lists[0]), name, value, place)
+    parts = alternatives(hint)
+    kinds = [bare_type(part) for part in parts]
+    tables = [kind for kind in kinds if is_model(kind) or get_origin(kind) is dict]
+    if tables and isinstance(value, dict):
+        return _table(key, tables[0], value, place.below(name))
+    lists = [kind for kind in kinds if get_origin(kind) in (tuple, list)]
+    of_tables = bool(lists) and is_model(bare_type(get_args(lists[0])[0]))
+    if lists and (isinstance(value, list) or (len(lists) == len(parts) and not of_tables)):
+        return _list(key, lists[0], name, value, place)
     found, problem, allowed = _scalar(key, hint, value)
-    is_size = isinstance(found, float) and 0.0 < abs(found) < math.inf
-    if not problem and is_size and not 1.0 / _LARGEST <= abs(found) <= _LARGEST:
-        problem = f"is {value_in_words(value)}"
-        allowed = f"no quantity is above {_LARGEST:g} or, unless 0, below {1.0 / _LARGEST:g}: check the unit"
-    if problem and all(is_model(bare_type(part)) or get_origin(bare_type(part)) is dict for part in parts):
+    if problem and of_tables:
+        allowed = key.extra.get("hint") or f"write each as a table [[{place.prefix}{name}]]"
+    elif problem and len(tables) == len(kinds):
         allowed = key.extra.get("hint") or f"add a table [{place.prefix}{name}]"
+    if not problem:
+        problem, allowed = _size(found)
     if problem:
         place.note(name, problem, allowed)
         return _WRONG
     return found
 
 
-def _table(key: Key, hint: Any, values: Mapping[str, Any], place: Place) -> Any:
-    """Return a table whose keys are names that the user chooses; those with a wrong value are left out."""
-    found = {name: _value(key, hint, name, value, place) for name, value in values.items()}
-    return {name: value for name, value in found.items() if value is not _WRONG}
+def _size(value: Any) -> tuple[str, str]:
+    """Return what is wrong with the size of a number, and what to do; empty texts if nothing is."""
+    is_size = isinstance(value, float) and 0.0 < abs(value) < math.inf
+    if not is_size or 1.0 / _LARGEST <= abs(value) <= _LARGEST:
+        return "", ""
+    hint = f"no quantity is above {_LARGEST:g} or, unless 0, below {1.0 / _LARGEST:g}: check the unit"
+    return f"is {value_in_words(value)}", hint
+
+
+def _table(key: Key, kind: Any, values: Mapping[str, Any], place: Place) -> Any:
+    """Return a table: a model, or one whose keys are names that the user chooses, without those with a wrong value."""
+    if is_model(kind):
+        found = read(kind, values, place)
+        return _WRONG if found is None else found
+    every = {name: _value(key, get_args(kind)[1], name, value, place) for name, value in values.items()}
+    return {name: value for name, value in every.items() if value is not _WRONG}
 
 
 def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
-    """Return a list; a single value is a list with one."""
+    """Return a list; a single value is a list with one. Its items are counted from 1."""
     kinds = [part for part in get_args(hint) if part is not Ellipsis]
     single = not isinstance(value, list)
     items = [value] if single else value
     if Ellipsis not in get_args(hint) and get_origin(hint) is tuple and len(items) != len(kinds):
         place.note(name, f"has {len(items)} values", key.allowed)
         return _WRONG
-    names = [name if single else f"{name}[{i}]" for i in range(len(items))]
+    names = [name if single else f"{name}[{i}]" for i in range(1, len(items) + 1)]
     found = [_value(key, kinds[0], own, item, place) for own, item in zip(names, items, strict=True)]
     return _WRONG if any(item is _WRONG for item in found) else tuple(found)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 import traceback
 from pathlib import Path
@@ -26,6 +27,8 @@ def value_in_words(value: Any) -> str:
         return f"'{shorten(value, _LONGEST)}'"
     if isinstance(value, int | float):
         return digits(value) if not value or 1e-9 <= abs(value) < 1e15 else f"{value:g}"
+    if isinstance(value, dt.date | dt.time):
+        return str(value)
     if isinstance(value, list | tuple):
         plain = all(isinstance(item, int | float | str) for item in value) and len(value) <= 4
         listed = ", ".join(map(value_in_words, value))

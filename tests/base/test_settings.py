@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Annotated, Literal
@@ -89,8 +90,8 @@ def test_values_become_those_of_the_model():
         ({"latch": "yes"}, "m.toml: latch: is 'yes' (give true or false, without quotes)"),
         ({"side": "oen"}, "m.toml: side: is 'oen' (did you mean one? known: one, two)"),
         ({"shape": 3}, "m.toml: shape: is 3 (give one of line, table)"),
-        ({"names": ["a", 1]}, "m.toml: names[1]: is 1 (give a list of texts)"),
-        ({"limits": [1.0, -2.0]}, "m.toml: limits[1]: is -2 (give one number or a list of numbers above 0)"),
+        ({"names": ["a", 1]}, "m.toml: names[2]: is 1 (give a list of texts)"),
+        ({"limits": [1.0, -2.0]}, "m.toml: limits[2]: is -2 (give one number or a list of numbers above 0)"),
         ({"gravity": -9.81}, "m.toml: gravity: is -9.81 (give a number of at least 0 or 3 numbers)"),
         ({"gravity": [0.0, 1.0]}, "m.toml: gravity: has 2 values (give a number of at least 0 or 3 numbers)"),
         ({"inner": 3}, "m.toml: inner: is 3 (add a table [inner])"),
@@ -145,3 +146,22 @@ def test_a_key_has_its_meaning_and_unit():
     key = keys_of(Outer)["mass_kg"]
     assert (key.attribute, key.meaning, key.extra["unit"], key.required) == ("mass", "of the load", "kg", False)
     assert "made" not in keys_of(Outer)
+
+
+@dataclass(frozen=True)
+class Day:
+    day: dt.date | None = None
+
+
+@pytest.mark.parametrize("written", [dt.date(2026, 11, 12), "2026-11-12", "12.11.2026"])
+def test_a_day_is_one_of_toml_or_a_text_whose_order_is_certain(written):
+    place = Place("p.toml")
+    assert read(Day, {"day": written}, place) == Day(dt.date(2026, 11, 12)) and not place.mistakes
+
+
+@pytest.mark.parametrize("written", ["12/11/2026", "12.11.26", "30.2.2026", dt.datetime(2026, 11, 12, 10), 20261112])
+def test_another_day_is_refused(written):
+    place = Place("p.toml")
+    read(Day, {"day": written}, place)
+    (mistake,) = place.mistakes
+    assert mistake.hint == "give a day as 2026-03-31"

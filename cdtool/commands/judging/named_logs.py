@@ -113,7 +113,7 @@ class LogsOf:
         """
         common = _section(table, place)
         found: dict[Path, LogSection] = {}
-        for number, entry in enumerate(table.logs):
+        for number, entry in enumerate(table.logs, 1):
             pattern, section = entry, common
             if isinstance(entry, LogEntry):
                 pattern, section = entry.path, _section(entry, place.below(f"logs[{number}]"), common)

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Annotated, Any
 
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.files.bounded_loading import read_bytes
 from cdtool.base.remote.remote_path import joined, location
-from cdtool.base.tables import Table, read_toml
-from cdtool.base.value_words import value_in_words
-from cdtool.commands.protocol.assessment.plan import (
-    Deviation,
-    Exclusion,
-    Instrument,
-    MachineParticulars,
-    MeasuringPoint,
-    TestParticulars,
-    TestPlan,
-)
+from cdtool.base.settings import Place, read, setting
+from cdtool.base.tables import read_toml
+from cdtool.commands.protocol.assessment.plan import MeasuringPoint, TestPlan
 from cdtool.truth.force.limits import ForceProfile, profile_of, read_force_limits
 
 TABLE = "protocol"
-_LANGUAGES = ("en", "de")
-Entries = TypeVar("Entries")
+
+
+@dataclass(frozen=True)
+class ProtocolTable(TestPlan):
+    """[protocol] as it is written: the plan, and the files that it refers to."""
+
+    benchmark: Annotated[str, setting("the benchmark file with the recordings, relative to the file")] = ""
+    limits: Annotated[str, setting("your own file of force limits; default: the shipped one")] = ""
 
 
 @dataclass(frozen=True)
@@ -87,35 +84,36 @@ def read_protocol_file(path: str | Path) -> ProtocolFile:
     [('closing edge', 4), ('closing edge with bumper', 4)]
     """
     file = location(path)
-    root = Table(read_toml(file, "a protocol file"), str(file))
-    if TABLE not in root:
+    values, place = read_toml(file, "a protocol file"), Place(str(file))
+    if not isinstance(values.get(TABLE), dict):
         raise ConfigurationError(f"{file}: has no table [protocol]", "draft one: cdtool protocol init BENCHMARK")
-    is_benchmark = "machine" in root.values
-    if not is_benchmark:
-        root.finish()
-    table = root.table(TABLE, required=True)
-    limits = joined(file.parent, table.text("limits")) if table.text("limits", "") else None
-    profiles = read_force_limits(limits)
-    benchmark = table.text("benchmark", "")
-    if is_benchmark and benchmark:
-        raise table.fault("benchmark", "is only for a file of its own", "remove the key")
-    try:
-        plan = TestPlan(
-            number=table.text("number", ""),
-            language=table.choice("language", _LANGUAGES, "en"),  # type: ignore[arg-type]  # a checked choice
-            machine=_entries(table.table("machine"), MachineParticulars),
-            test=_entries(table.table("test"), TestParticulars),
-            instruments=_list(table, "instrument", Instrument),
-            points=_list(table, "point", MeasuringPoint),
-            deviations=_list(table, "deviation", Deviation),
-            exclusions=_list(table, "exclusion", Exclusion),
-        )
-    except UsageError as fault:
-        raise ConfigurationError(f"{file}: {fault.message}", fault.hint) from fault
-    table.finish()
-    _check_profiles(plan, profiles, table)
-    base = file if is_benchmark else joined(file.parent, benchmark) if benchmark else None
-    return ProtocolFile(file, plan, base, profiles, limits)
+    is_benchmark = "machine" in values
+    for name in values:
+        if name != TABLE and not is_benchmark:
+            place.note(name, "unknown key", f"known: {TABLE}")
+    below = place.below(TABLE)
+    table = read(ProtocolTable, _filled(values[TABLE]), below)
+    if table is None:
+        place.finish()
+    assert table is not None
+    limits = joined(file.parent, table.limits) if table.limits else None
+    profiles: dict[str, ForceProfile] = place.tried({}, read_force_limits, limits)
+    if is_benchmark and table.benchmark:
+        below.note("benchmark", "is only for a file of its own", "remove the key")
+    for number, point in enumerate(table.points, 1):
+        if point.profile and profiles:
+            with place.noting(), below.at(f"point[{number}].profile"):
+                profile_of(profiles, point.profile)
+    place.finish()
+    base = file if is_benchmark else joined(file.parent, table.benchmark) if table.benchmark else None
+    return ProtocolFile(file, table, base, profiles, limits)
+
+
+def _filled(value: Any) -> Any:
+    """Return the values of a table without those that are empty: they are not known yet."""
+    if isinstance(value, dict):
+        return {name: _filled(item) for name, item in value.items() if item != ""}
+    return [_filled(item) for item in value] if isinstance(value, list) else value
 
 
 def digest_of_file(path: Path) -> str:
@@ -123,64 +121,3 @@ def digest_of_file(path: Path) -> str:
     import hashlib
 
     return hashlib.sha256(read_bytes(path, ConfigurationError)).hexdigest()
-
-
-def _check_profiles(plan: TestPlan, profiles: Mapping[str, ForceProfile], table: Table) -> None:
-    for number, point in enumerate(plan.points, 1):
-        if point.profile:
-            try:
-                profile_of(profiles, point.profile)
-            except UsageError as fault:
-                raise ConfigurationError(
-                    f"{table.where}: protocol.point[{number}].profile: {fault.message}", fault.hint
-                ) from fault
-
-
-def _list(table: Table, name: str, kind: type[Entries]) -> tuple[Entries, ...]:
-    """Return the tables [[protocol.NAME]]."""
-    values = table.raw(name, [])
-    if not isinstance(values, list) or not all(isinstance(item, dict) for item in values):
-        raise table.fault(name, f"is {value_in_words(values)}", f"write each as a table [[protocol.{name}]]")
-    prefix = f"{table.prefix}{name}"
-    return tuple(_entries(Table(item, table.where, f"{prefix}[{n}]."), kind) for n, item in enumerate(values, 1))
-
-
-def _entries(table: Table, kind: type[Entries]) -> Entries:
-    """Return the values of a table by the fields of its dataclass; a missing or empty value is not known."""
-    hints = get_type_hints(kind)
-    values = {}
-    for item in fields(kind):  # type: ignore[arg-type]  # a dataclass
-        value = table.raw(item.name)
-        if value is None or value == "":
-            continue
-        values[item.name] = _value(table, item.name, hints[item.name])
-    table.finish()
-    return kind(**values)
-
-
-def _value(table: Table, name: str, hint: Any) -> Any:
-    if hint == dt.date | None:
-        return _date(table, name)
-    if hint == float | None:
-        # Only a temperature may be negative.
-        return table.number(name) if name == "temperature_c" else table.number(name, minimum=0.0)
-    if hint is int:
-        return table.whole(name, 0, minimum=0)
-    if hint == tuple[float, ...]:
-        value = table.raw(name)
-        return table.numbers(name, len(value) if isinstance(value, list) else 1, minimum=0.0)
-    if hint == tuple[str, ...]:
-        return table.texts(name)
-    return table.text(name)
-
-
-def _date(table: Table, name: str) -> dt.date:
-    """Return a day, written as a date of TOML or as a text."""
-    value = table.raw(name)
-    if isinstance(value, dt.date) and not isinstance(value, dt.datetime):
-        return value
-    try:
-        return dt.date.fromisoformat(table.text(name))
-    except (ValueError, ConfigurationError) as fault:
-        shown = str(value) if isinstance(value, dt.datetime | dt.time) else value_in_words(value)
-        raise table.fault(name, f"is {shown}", "write a day as 2026-03-31") from fault

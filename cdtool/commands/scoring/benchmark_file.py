@@ -490,7 +490,9 @@ def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:
 
 def _detectors(table: BenchmarkTable, place: Place, machine_file: MachineFile, wanted: _Wanted) -> tuple[str, ...]:
     """Return the full names of a file's detectors, or else of those given; a force rig's recordings may need none."""
-    given: Sequence[str | Detector] = table.detectors or wanted.detectors
+    # An empty list says that there are none; with learning, those of the command are meant then.
+    is_open = wanted.learning or table.detectors is None
+    given: Sequence[str | Detector] = table.detectors or (wanted.detectors if is_open else ())
     if wanted.learning and not given:
         if table.detectors is None:
             raise place.fault("detectors", "is missing", "give a list of texts")

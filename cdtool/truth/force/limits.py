@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
-from cdtool.base.tables import Table, read_toml
+from cdtool.base.settings import NOT_A_KEY, Count, NotNegative, Place, Positive, Text, read, setting
+from cdtool.base.tables import read_toml
 from cdtool.base.value_words import value_in_words
 
 _SHIPPED = Path(__file__).with_name("limits.toml")
@@ -27,9 +29,9 @@ _PRESSURE = ("pressures", "pressure_source")
 class ForceStep:
     """From `from_s` [s] after the onset on, the force may be at most `at_most_n` [N]."""
 
-    from_s: float
-    at_most_n: float
-    name: str
+    from_s: Annotated[NotNegative, setting("from when it applies, after the onset; the first one from 0", unit="s")]
+    at_most_n: Annotated[Positive, setting("the largest allowed force", unit="N")]
+    name: Annotated[Text, setting("its name, each once")]
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,23 @@ class PressureLimit:
     allowance, and the quasi-static limit applies from the first moment.
     """
 
-    area: str
-    quasi_static: float
-    transient: float | None = None
+    area: Annotated[Text, setting("area of the body, each once")]
+    quasi_static: Annotated[
+        Positive, setting("from the second step of the profile on", key="quasi_static_n_per_cm2", unit="N/cm2")
+    ]
+    transient: Annotated[
+        Positive | None,
+        setting(
+            "before that, at least the quasi-static one; default: the quasi-static one",
+            key="transient_n_per_cm2",
+            unit="N/cm2",
+        ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.transient is not None and self.transient < self.quasi_static:
+            hint = f"give at least the quasi-static one, {self.quasi_static:g}"
+            raise UsageError(f"transient_n_per_cm2 is {self.transient:g}", hint)
 
     @property
     def first(self) -> float:
@@ -62,20 +78,50 @@ class ForceProfile:
     `permissible`: False of a region that nothing may touch: no contact passes, whatever its force.
     """
 
-    name: str
-    title: str
-    source: str
-    checked: bool
-    steps: tuple[ForceStep, ...]
-    average_of: int = 1
-    note: str = ""
-    sample_rate_at_least_hz: float = 0.0
-    record_at_least_s: float = 0.0
-    obstacle_stiffness_n_per_mm: float = 0.0
-    measuring_source: str = ""
-    pressures: tuple[PressureLimit, ...] = ()
-    pressure_source: str = ""
-    permissible: bool = True
+    name: Annotated[str, NOT_A_KEY]
+    title: Annotated[Text, setting("what it limits, for reports")]
+    source: Annotated[Text, setting("standard, edition and clause")]
+    checked: Annotated[bool, setting("whether someone has checked the values against the text of the standard")]
+    steps: Annotated[
+        tuple[ForceStep, ...],
+        setting("the limits", hint="give a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]"),
+    ]
+    average_of: Annotated[Count, setting("tests at one point that are averaged; 1: each is assessed on its own")] = 1
+    note: Annotated[str, setting("for reports")] = ""
+    sample_rate_at_least_hz: Annotated[NotNegative, setting("required of a measurement; 0: nothing", unit="Hz")] = 0.0
+    record_at_least_s: Annotated[NotNegative, setting("required length after the onset; 0: nothing", unit="s")] = 0.0
+    obstacle_stiffness_n_per_mm: Annotated[
+        NotNegative, setting("of the spring of the force meter; 0: nothing is required", unit="N/mm")
+    ] = 0.0
+    measuring_source: Annotated[str, setting("from where these requirements are")] = ""
+    pressures: Annotated[
+        tuple[PressureLimit, ...],
+        setting(
+            "the allowed pressures on the areas of the body region, for a test protocol",
+            hint="give a list such as [{ area = 'palm', transient_n_per_cm2 = 520, quasi_static_n_per_cm2 = 260 }]",
+        ),
+    ] = ()
+    pressure_source: Annotated[str, setting("from where the pressures are: standard, edition, table")] = ""
+    permissible: Annotated[bool, setting("false: a region that nothing may touch; no contact passes")] = True
+
+    def __post_init__(self) -> None:
+        times = [step.from_s for step in self.steps]
+        if not times or times[0] != 0.0 or any(later <= earlier for earlier, later in pairwise(times)):
+            given = f"begin at {', '.join(f'{time:g}' for time in times)} s" if times else "are empty"
+            raise UsageError(f"steps {given}", "the first step begins with the contact, at 0, and times increase")
+        for what, names in (
+            ("steps", [step.name for step in self.steps]),
+            ("pressures", [item.area for item in self.pressures]),
+        ):
+            if twice := [name for name in names if names.count(name) > 1]:
+                raise UsageError(f"{what} name '{twice[0]}' twice", "give each a different name")
+        if self.pressures and not self.pressure_source.strip():
+            raise UsageError(
+                "pressure_source is missing", "state from where the pressures are: standard, edition, table"
+            )
+        if len(self.steps) < 2 and any(item.transient is not None for item in self.pressures):
+            hint = "give a second one: from its time on, the quasi-static pressure applies"
+            raise UsageError("steps has one step", hint)
 
     @property
     def warning(self) -> str:
@@ -139,12 +185,18 @@ def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
     """
     file = _SHIPPED if path is None else path
     where = str(file) if path else "the shipped limits.toml"
-    root = Table(read_toml(file, "a file of force limits"), where)
-    profiles = {name: _profile(name, root.table(name)) for name in root.values}
-    if not profiles:
+    values, place = read_toml(file, "a file of force limits"), Place(where)
+    if not values:
         raise ConfigurationError(
             f"{where}: contains no profile", "write one table per profile, see docs/force-limits.md"
         )
+    profiles = {}
+    for name, table in values.items():
+        if not isinstance(table, dict):
+            place.note(name, f"is {value_in_words(table)}", f"add a table [{name}]")
+        elif profile := read(ForceProfile, {"checked": False, **table}, place.below(name), name=name):
+            profiles[name] = profile
+    place.finish()
     return profiles
 
 
@@ -176,87 +228,3 @@ def profile_of(profiles: Mapping[str, ForceProfile], name: str) -> ForceProfile:
     if name not in profiles:
         raise UsageError(f"unknown force profile '{name}'", nearest(name, profiles))
     return profiles[name]
-
-
-def _profile(name: str, table: Table) -> ForceProfile:
-    profile = ForceProfile(
-        name=name,
-        title=_words(table, "title"),
-        source=_words(table, "source"),
-        checked=table.flag("checked", False),
-        steps=_steps(table),
-        average_of=table.whole("average_of", 1, minimum=1),
-        note=table.text("note", ""),
-        sample_rate_at_least_hz=table.number("sample_rate_at_least_hz", 0.0, minimum=0.0),
-        record_at_least_s=table.number("record_at_least_s", 0.0, minimum=0.0),
-        obstacle_stiffness_n_per_mm=table.number("obstacle_stiffness_n_per_mm", 0.0, minimum=0.0),
-        measuring_source=table.text("measuring_source", ""),
-        pressures=_pressures(table),
-        pressure_source=table.text("pressure_source", ""),
-        permissible=table.flag("permissible", True),
-    )
-    _check_pressures(profile, table)
-    table.finish()
-    return profile
-
-
-def _steps(table: Table) -> tuple[ForceStep, ...]:
-    listed = table.raw("steps")
-    if not isinstance(listed, list) or not listed or not all(isinstance(item, dict) for item in listed):
-        problem = "is missing" if listed is None else f"is {value_in_words(listed)}"
-        raise table.fault(
-            "steps", problem, "give a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]"
-        )
-    steps: list[ForceStep] = []
-    for i, item in enumerate(listed):
-        row = Table(item, table.where, f"{table.prefix}steps[{i}].")
-        step = ForceStep(row.number("from_s"), row.number("at_most_n", above=0.0), _words(row, "name"))
-        row.finish()
-        if not steps and step.from_s != 0.0:
-            raise row.fault("from_s", f"is {step.from_s:g}", "the first step begins with the contact, at 0")
-        if steps and step.from_s <= steps[-1].from_s:
-            raise row.fault("from_s", f"is {step.from_s:g} after {steps[-1].from_s:g}", "times must increase")
-        if any(step.name == earlier.name for earlier in steps):
-            raise row.fault("name", f"'{step.name}' names two steps", "give each step a different name")
-        steps.append(step)
-    return tuple(steps)
-
-
-def _pressures(table: Table) -> tuple[PressureLimit, ...]:
-    listed = table.raw("pressures", [])
-    if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
-        hint = "give a list such as [{ area = 'palm', transient_n_per_cm2 = 520, quasi_static_n_per_cm2 = 260 }]"
-        raise table.fault("pressures", f"is {value_in_words(listed)}", hint)
-    limits: list[PressureLimit] = []
-    for i, item in enumerate(listed):
-        row = Table(item, table.where, f"{table.prefix}pressures[{i}].")
-        quasi_static = row.number("quasi_static_n_per_cm2", above=0.0)
-        transient = row.number("transient_n_per_cm2", above=0.0) if "transient_n_per_cm2" in row else None
-        limit = PressureLimit(_words(row, "area"), quasi_static, transient)
-        row.finish()
-        if transient is not None and transient < quasi_static:
-            hint = f"give at least the quasi-static one, {quasi_static:g}"
-            raise row.fault("transient_n_per_cm2", f"is {transient:g}", hint)
-        if any(limit.area == earlier.area for earlier in limits):
-            raise row.fault("area", f"'{limit.area}' names two areas", "give each area a different name")
-        limits.append(limit)
-    return tuple(limits)
-
-
-def _check_pressures(profile: ForceProfile, table: Table) -> None:
-    """Raise ConfigurationError for pressures without a source, or without the time at which the transient one ends."""
-    if profile.pressures and not profile.pressure_source.strip():
-        raise table.fault(
-            "pressure_source", "is missing", "state from where the pressures are: standard, edition, table"
-        )
-    if len(profile.steps) < 2 and any(item.transient is not None for item in profile.pressures):
-        raise table.fault(
-            "steps", "has one step", "give a second one: from its time on, the quasi-static pressure applies"
-        )
-
-
-def _words(table: Table, name: str) -> str:
-    text = table.text(name)
-    if not text.strip():
-        raise table.fault(name, "is empty", "give a text")
-    return text

@@ -293,8 +293,8 @@ def test_a_measurement_that_was_exported_again_is_no_repetition(name, tmp_path):
     [
         ({"logs": 'group = "edges"'}, "no group 'edges'"),
         ({"logs": 'logs = ["*.toml"]'}, "is not in a group of"),
-        ({"day": '"31.3.2026"'}, "write a day as 2026-03-31"),
-        ({"day": "2026-03-31T10:00:00"}, "is 2026-03-31 10:00:00 (write a day as 2026-03-31)"),
+        ({"day": '"31/3/2026"'}, "is '31/3/2026' (give a day as 2026-03-31)"),
+        ({"day": "2026-03-31T10:00:00"}, "is 2026-03-31 10:00:00 (give a day as 2026-03-31)"),
         ({"language": "fr"}, "protocol.language"),
         ({"more": "speed = 1"}, "protocol.point[1].speed: unknown key"),
         ({"more": "obstacle = 3"}, "protocol.point[1].obstacle"),

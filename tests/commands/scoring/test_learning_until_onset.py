@@ -253,13 +253,13 @@ def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):
         ((HEAD, LEARN, 'from = "3s"\nto = "2s"\n', GROUPS), "learn.to: the end, 2 s, is not after"),
         (
             (HEAD, LEARN, GROUPS, '[impacts.x]\nlogs = [{ path = "free/01.csv", too = "3s" }]\n'),
-            r"logs\[0\].too: unknown",
+            r"logs\[1\].too: unknown",
         ),
-        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [{ to = '3s' }]\n"), r"impacts.x.logs\[0\].path: is missing"),
-        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [3]\n"), "impacts.x.logs.0.: is 3"),
+        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [{ to = '3s' }]\n"), r"impacts.x.logs\[1\].path: is missing"),
+        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [3]\n"), "impacts.x.logs.1.: is 3"),
         (
             (HEAD, LEARN, GROUPS, '[impacts.x]\nfrom = "3s"\nlogs = [{ path = "free/01.csv", to = "1s" }]\n'),
-            r"impacts.x.logs\[0\].to: the end, 1 s, is not after the begin, 3 s",
+            r"impacts.x.logs\[1\].to: the end, 1 s, is not after the begin, 3 s",
         ),
         (
             (HEAD, LEARN, '[impacts.x]\nlogs = ["free/*.csv", { path = "free/01.csv", to = "3s" }]\n'),

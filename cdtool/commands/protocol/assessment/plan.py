@@ -9,9 +9,10 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from cdtool.base.errors import UsageError
+from cdtool.base.settings import CountFromZero, NotNegative, check, setting
 
 Due = Literal["before_test", "test_day", "never"]
 Language = Literal["en", "de"]
@@ -47,7 +48,7 @@ class TestParticulars:
     date: dt.date | None = entry("day of the test, as 2026-03-31", default=None)
     place: str = entry("place of the test")
     temperature_c: float | None = entry("temperature at the machine [°C]", due="test_day", default=None)
-    humidity_percent: float | None = entry("relative humidity [%]", due="never", default=None)
+    humidity_percent: NotNegative | None = entry("relative humidity [%]", due="never", default=None)
     conditions: str = entry("other conditions: wind, supply voltage, warm-up", due="never")
 
     __test__ = False  # not a test of pytest
@@ -62,11 +63,13 @@ class Instrument:
     serial_number: str = entry("serial number")
     calibrated_on: dt.date | None = entry("day of the calibration, as 2026-01-31", default=None)
     calibration_valid_until: dt.date | None = entry("last day on which the calibration is valid", default=None)
-    range_n: float | None = entry("largest force that it measures [N]; only of a force", default=None)
-    range_n_per_cm2: float | None = entry("largest pressure that it measures [N/cm2]; only of a pressure", default=None)
+    range_n: NotNegative | None = entry("largest force that it measures [N]; only of a force", default=None)
+    range_n_per_cm2: NotNegative | None = entry(
+        "largest pressure that it measures [N/cm2]; only of a pressure", default=None
+    )
     range: str = entry("measuring range of another quantity, with its unit", due="never")
     accuracy_class: str = entry("accuracy class or uncertainty, as on the calibration certificate")
-    sample_rate_hz: float | None = entry("sample rate [Hz]; only of a force", default=None)
+    sample_rate_hz: NotNegative | None = entry("sample rate [Hz]; only of a force", default=None)
     filter: str = entry('filter before recording, as "100 Hz low-pass, 2nd order", or "none"')
 
     @property
@@ -92,30 +95,30 @@ class MeasuringPoint:
     position: str = entry("where on the machine, and where along its travel")
     region: str = entry("opening gap or body region: what can be hit or crushed there")
     obstacle: str = entry("the obstacle", due="never")
-    obstacle_stiffness_n_per_mm: float | None = entry("stiffness of the obstacle or its spring [N/mm]", default=None)
-    contact_area_mm2: float | None = entry("area of the contact [mm2]", default=None)
-    speed_m_per_s: float | None = entry("speed at the contact [m/s]", default=None)
-    repetitions: int = entry("number of measurements", default=0)
+    obstacle_stiffness_n_per_mm: NotNegative | None = entry(
+        "stiffness of the obstacle or its spring [N/mm]", default=None
+    )
+    contact_area_mm2: NotNegative | None = entry("area of the contact [mm2]", default=None)
+    speed_m_per_s: NotNegative | None = entry("speed at the contact [m/s]", default=None)
+    repetitions: CountFromZero = entry("number of measurements", default=0)
     profile: str = entry("name of the force profile; empty: that of the recordings' group", due="never")
     group: str = entry("group of the benchmark file whose recordings are the repetitions", due="never")
     logs: tuple[str, ...] = entry("recordings of the repetitions, instead of a group", due="never", default=())
-    peak_pressures_n_per_cm2: tuple[float, ...] = entry(
+    peak_pressures_n_per_cm2: tuple[NotNegative, ...] = entry(
         "peak pressure of each repetition [N/cm2], from a film or sensor of its own", due="never", default=()
     )
     body_area: str = entry(
         "area of the body whose pressure limit applies; empty: the lowest of the region", due="never"
     )
     pressure_not_applicable: str = entry("why no pressure is measured here; shown as a deviation", due="never")
-    speed_tolerance_percent: float | None = entry(
+    speed_tolerance_percent: NotNegative | None = entry(
         "how far the measured speed may be from the planned one [%], at most 25; empty: 10", due="never", default=None
     )
 
     def __post_init__(self) -> None:
         if self.group and self.logs:
             raise UsageError(f"the measuring point '{self.name}' has a group and logs", "give one of them")
-        for name in ("obstacle_stiffness_n_per_mm", "contact_area_mm2", "speed_m_per_s", "repetitions"):
-            if (getattr(self, name) or 0) < 0:
-                raise UsageError(f"{name} of the measuring point '{self.name}' is negative", "give a positive number")
+        check(self)
         if not 0.0 <= self.speed_tolerance <= MOST_SPEED_TOLERANCE:
             raise UsageError(
                 f"speed_tolerance_percent of the measuring point '{self.name}' is {self.speed_tolerance_percent:g}",
@@ -159,14 +162,14 @@ class TestPlan:
     Raises UsageError for two points of one name, and for a deviation of a point that does not exist.
     """
 
-    number: str = ""
-    language: Language = "en"
-    machine: MachineParticulars = MachineParticulars()
-    test: TestParticulars = TestParticulars()
-    instruments: tuple[Instrument, ...] = ()
-    points: tuple[MeasuringPoint, ...] = ()
-    deviations: tuple[Deviation, ...] = ()
-    exclusions: tuple[Exclusion, ...] = ()
+    number: Annotated[str, setting("number of the protocol")] = ""
+    language: Annotated[Language, setting("language of the document")] = "en"
+    machine: Annotated[MachineParticulars, setting("the machine under test")] = MachineParticulars()
+    test: Annotated[TestParticulars, setting("who tested, when and where")] = TestParticulars()
+    instruments: Annotated[tuple[Instrument, ...], setting("measuring instruments", key="instrument")] = ()
+    points: Annotated[tuple[MeasuringPoint, ...], setting("measuring points", key="point")] = ()
+    deviations: Annotated[tuple[Deviation, ...], setting("deviations from the plan", key="deviation")] = ()
+    exclusions: Annotated[tuple[Exclusion, ...], setting("recordings that are not counted", key="exclusion")] = ()
 
     __test__ = False
 
