@@ -190,7 +190,7 @@ def _scalar(key: Key, hint: Any, value: Any) -> tuple[Any, str, str]:
 
     Each type of a union is tried by itself: msgspec 0.23 aborts on a union of a bounded number and a tuple.
     """
-    problem = f"is {value_in_words(value)}"
+    problem, allowed = f"is {value_in_words(value)}", key.extra.get("hint") or f"give {kind_in_words(hint)}"
     for part in alternatives(hint):
         if not _is_scalar(part):
             continue
@@ -203,7 +203,7 @@ def _scalar(key: Key, hint: Any, value: Any) -> tuple[Any, str, str]:
             break
         return found, "", ""
     words = [word for part in alternatives(hint) for word in words_of(part)]
-    return value, problem, nearest(value, words) if words and isinstance(value, str) else key.allowed
+    return value, problem, nearest(value, words) if words and isinstance(value, str) else allowed
 
 
 def _date(value: Any) -> dt.date:
@@ -337,7 +337,7 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
 
 def _value(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
     """Return a value as its type has it, or _WRONG with its mistakes in `place`."""
-    if hint is Any:
+    if bare_type(hint) is Any:
         return value
     parts = alternatives(hint)
     kinds = [bare_type(part) for part in parts]

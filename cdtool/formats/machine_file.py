@@ -8,19 +8,19 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import location
-from cdtool.base.settings import Place, read
-from cdtool.base.tables import Table, read_toml
+from cdtool.base.settings import Place, read, setting
+from cdtool.base.tables import read_toml
 from cdtool.base.value_words import value_in_words
-from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource, read_channel_map
+from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource, channel_maps
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.machines.joint_machine import per_joint
 
@@ -82,6 +82,18 @@ class MachineFile(StoresDerived):
         return replace(self, gains={**self.gains, **{registry.canonical(item.name): asdict(item) for item in made}})
 
 
+@dataclass(frozen=True, kw_only=True)
+class MachineTable:
+    """A machine file as it is written, without [machine]: its keys depend on the type."""
+
+    channels: Annotated[Any, setting("where the channels are in a log")] = None
+    csv: Annotated[dict[str, Any] | None, setting("the dialect of text tables, where it is not found")] = None
+    detectors: Annotated[dict[str, dict[str, Any]], setting("gains that differ from the defaults")] = field(
+        default_factory=dict
+    )
+    model: Annotated[dict[str, Any] | None, setting("what the model of each axis has beside [machine]")] = None
+
+
 def read_machine_file(path: str | Path) -> MachineFile:
     """Read and check a machine file.
 
@@ -114,21 +126,23 @@ def read_machine_file(path: str | Path) -> MachineFile:
         raise ConfigurationError(f"{file}: is a benchmark file, not a machine file", f"give {values['machine']}")
     place = Place(str(file))
     machine = place.tried(None, _machine, values, place)
-    root = Table({name: value for name, value in values.items() if name != "machine"}, str(file))
+    written = {name: value for name, value in values.items() if name not in ("machine", "operations")}
+    table = read(MachineTable, written, place)
     joints = machine.joints if machine else ()
     columns = topics = ChannelMap(TimeSource(), (), joints)
-    channels = root.table("channels")
-    if machine is not None:
-        columns = place.tried(columns, read_channel_map, channels, joints, machine.accepted_units, False)
-        topics = place.tried(topics, read_channel_map, channels.table("mcap"), joints, machine.accepted_units, True)
+    if table is not None and machine is not None:
+        given, below, units = written.get("channels", {}), place.below("channels"), machine.accepted_units
+        columns, topics = channel_maps(given, below, joints, units)
         topics = replace(topics, named=len(joints) > 1 or "joints" in values["machine"])
-    columns = replace(columns, pins=place.tried(TablePins(), _read_pins, root.table("csv")))
-    gains = _read_gains(root.table("detectors").values, len(joints), place.below("detectors"))
-    model = _read_model(root.table("model").values if "model" in root else None, len(joints), place.below("model"))
-    with place.noting():
-        root.finish()
+    pins, model = TablePins(), None
+    gains: dict[str, dict[str, Gain]] = {}
+    if table is not None:
+        pins = _read_pins(table.csv, place.below("csv"))
+        gains = _read_gains(table.detectors, len(joints), place.below("detectors"))
+        model = _read_model(table.model, len(joints), place.below("model"))
     place.finish()
     assert machine is not None
+    columns = replace(columns, pins=pins)
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
     return MachineFile(file, machine, columns, topics, gains, digest, model)
 
@@ -194,10 +208,10 @@ def _read_model(table: Mapping[str, Any] | None, joints: int, place: Place) -> A
     return None if table is None else import_module(part).ModelTable.read(table, joints, place)
 
 
-def _read_pins(table: Table) -> TablePins:
-    if not table.values:
+def _read_pins(table: Mapping[str, Any] | None, place: Place) -> TablePins:
+    if table is None:
         return TablePins()
-    pins: TablePins = import_module("cdtool.formats.csv_dialect.pins").read_pins(table)
+    pins: TablePins = import_module("cdtool.formats.csv_dialect.pins").read_pins(table, place)
     return pins
 
 

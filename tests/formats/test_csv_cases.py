@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdtool.base.errors import RecordingError
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place
 from cdtool.formats.channels.channel_map import ChannelMap, TimeSource
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv_dialect.pins import read_pins
@@ -24,7 +24,7 @@ def pinned(case: Case, names: list[str]) -> ChannelMap | None:
         return None
     from cdtool.formats.channels.channel_map import ChannelSource
 
-    pins = read_pins(Table(tomllib.loads(case.pins), "machine.toml", "csv."))
+    pins = read_pins(tomllib.loads(case.pins), Place("machine.toml", "csv."))
     sources = tuple(ChannelSource(f"c{i}", (name,)) for i, name in enumerate(names[1:]))
     return ChannelMap(TimeSource(column=names[0]), sources, ("axis",), pins=pins)
 

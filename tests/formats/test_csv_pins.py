@@ -9,7 +9,7 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import ConfigurationError, RecordingError
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
@@ -76,7 +76,7 @@ def test_the_dialect_that_info_prints_can_be_pasted_and_reads_the_same(log, mach
 def test_the_printed_dialect_of_any_table_reads_the_same_numbers(log, case):
     path = log(case.content)
     found = Csv().columns(path)
-    pins = read_pins(Table(tomllib.loads(found.dialect)["csv"], "machine.toml", "csv."))
+    pins = read_pins(tomllib.loads(found.dialect)["csv"], Place("machine.toml", "csv."))
     numbers = [i for i, name in enumerate(found.names) if name in found.columns and found.columns[name].unit != "s"]
     sources = tuple(
         ChannelSource(f"c{i}", (i,)) for i in {*numbers, len(found.names) - 1} if found.names[i] in found.columns

@@ -14,7 +14,7 @@ from cdtool.base.files.writing import write_text
 from cdtool.base.findings import Finding, worst_first
 from cdtool.base.log_names import log_stem
 from cdtool.base.remote.remote_path import location
-from cdtool.base.tables import Table
+from cdtool.base.settings import Place
 from cdtool.commands.init.benchmark_draft import draft_benchmark
 from cdtool.commands.init.channel_guess import guess_channels
 from cdtool.commands.init.derived_speed import propose_low_pass
@@ -30,6 +30,7 @@ from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.information import info
 from cdtool.commands.judging.log_findings import before_contact
 from cdtool.commands.judging.runs import read, several_logs
+from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.channels.reading import choose_format, element_names, has_topics, log_parts, with_nanoseconds
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv_dialect.pins import read_pins
@@ -267,13 +268,21 @@ def _checked_together(logs: Sequence[Path], machine_file: MachineFile) -> tuple[
     return check_channels(parts, machine_file.machine)
 
 
+def _pins(csv: Mapping[str, Any]) -> TablePins:
+    """Return the dialect that --csv sets; raises ConfigurationError."""
+    place = Place("--csv")
+    pins = read_pins(csv, place)
+    place.finish()
+    return pins
+
+
 def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
     """Return all columns of a log; a table that cannot be read without settings names the option for them."""
     is_table = found.name == Csv.name
     if csv and not is_table:
         raise UsageError(f"{path}: is {found.name}, not a text table", "remove --csv")
     try:
-        return Csv().columns(path, pins=read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
+        return Csv().columns(path, pins=_pins(csv)) if csv else found.columns(path)
     except RecordingError as fault:
         if not is_table or csv:
             raise

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from cdtool.base.errors import ConfigurationError, nearest
+from cdtool.base.errors import nearest
 from cdtool.base.log_names import log_stem
-from cdtool.base.tables import Table
+from cdtool.base.settings import CountFromZero, NotNegative, Place, Positive, Text, read, setting
 from cdtool.base.value_words import value_in_words
 from cdtool.recordings.recording import CHANNELS, CHECKED, GROUND_TRUTH, RIG_UNITS, TRIGGER, UNITLESS
 from cdtool.recordings.units import RAW_UNITS, unit
 
-_CLOCKS = ("log", "publish", "header")
 # The axes of a force vector, in the order of its columns.
 AXES = ("x", "y", "z")
 # What stands for the log in the name of a file beside it.
@@ -205,286 +204,401 @@ class ChannelMap:
         return any(source.channel == channel for source in self.sources)
 
 
-def read_channel_map(table: Table, joints: tuple[str, ...], accepted: AcceptedUnits, topics: bool) -> ChannelMap:
-    """Return the map in `[channels]` (columns) or `[channels.mcap]` (topics); `accepted`: SI units per channel."""
-    time = _time_source(table, topics)
-    low_pass = table.number("speed_low_pass_hz", 50.0, above=0.0)
-    sources = []
-    for name in table.values:
-        if name in ("time", "speed_low_pass_hz") or (name == "mcap" and not topics):
-            table.raw(name)
-            continue
-        if name not in CHANNELS:
-            raise table.fault(name, "unknown channel", nearest(name, ["time", *CHANNELS]))
-        try:
-            sources.append(_source(table.table(name), name, joints, accepted(name), topics))
-        except ConfigurationError as fault:
-            fault.channel = name
-            raise
-    in_log = tuple(source for source in sources if source.own_file is None)
-    beside = tuple(source for source in sources if source.own_file is not None)
-    return ChannelMap(time, in_log, joints, topics, low_pass, beside=beside)
+_COLUMN_HINT = "give a column's name, or its number counted from 0"
+Column = Text | CountFromZero
+_ColumnKey = Annotated[Column | None, setting("a column's name, or its number counted from 0", hint=_COLUMN_HINT)]
 
 
-def _time_source(table: Table, topics: bool) -> TimeSource:
-    if topics:
-        part = table.table("time")
-        clock = part.choice("clock", _CLOCKS, "log")
-        part.finish()
-        return TimeSource(clock=clock)  # type: ignore[arg-type]
-    if not table.values or set(table.values) == {"mcap"}:
-        return TimeSource()
-    return _column_time(table.table("time", required=True))
+@dataclass(frozen=True, kw_only=True)
+class ClockTable:
+    """The clock of a table: a column, a rate, or both, then the column counts samples."""
+
+    column: _ColumnKey = None
+    unit: Annotated[str, setting("s, ms, us, ns or min")] = ""
+    rate_hz: Annotated[Positive | None, setting("a fixed rate", unit="Hz")] = None
+    nanoseconds: _ColumnKey = None
 
 
-def _column_time(part: Table) -> TimeSource:
+@dataclass(frozen=True, kw_only=True)
+class MessageClockTable:
+    """Which of a message's clocks counts."""
+
+    clock: Annotated[
+        Literal["log", "publish", "header"], setting("when it was logged, published, or the stamp in its header")
+    ] = "log"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TriggerTable:
+    """Columns, in the log (or a topic and its field) and in the file beside it, that rise at the same time."""
+
+    log: _ColumnKey = None
+    file: _ColumnKey = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelTable:
+    """Where a channel is in a log, and its unit; some keys are for some channels only."""
+
+    column: _ColumnKey = None
+    columns: Annotated[
+        tuple[Column, ...] | None, setting("one column for each joint; of a force, its axes", hint=_COLUMN_HINT)
+    ] = None
+    topic: Annotated[str, setting("MCAP and bags: the topic")] = ""
+    field: Annotated[str, setting("MCAP and bags: the field of its messages")] = ""
+    topics: Annotated[tuple[str, ...], setting("of a force with several axes: a topic for each")] = ()
+    fields: Annotated[tuple[str, ...], setting("of a force with several axes: a field for each")] = ()
+    unit: Annotated[str, setting("unit of the log; required in a table")] = ""
+    scale: Annotated[
+        tuple[float, ...],
+        setting("factor on the way to that unit, not 0, such as N m per A; one for each joint, or for all"),
+    ] = ()
+    time_offset: Annotated[float | None, setting("added to the channel's times; default: 0", unit="s")] = None
+    saturation: Annotated[
+        tuple[float, float] | None,
+        setting(
+            "[lowest, highest] reading of the sensor, in the log's unit",
+            hint="give [lowest, highest] reading of the sensor, in the log's unit",
+        ),
+    ] = None
+    min: Annotated[float | None, setting("the sensor cannot measure less, in the log's unit")] = None
+    max: Annotated[float | None, setting("the sensor cannot measure more, in the log's unit")] = None
+    unit_confirmed: Annotated[
+        bool | None, setting("true: the unit is right, whatever the header says; false: it is a guess")
+    ] = None
+    confirmed: Annotated[bool, setting("the channel is right, whatever the mechanics of the machine say")] = False
+    kind: Annotated[Literal["measured", "duty"], setting("torque: duty, from the applied voltage")] = "measured"
+    supply_voltage: Annotated[Positive, setting("of a duty", unit="V")] = 1.0
+    resistance: Annotated[Positive | None, setting("of a duty: of the windings; required", unit="ohm")] = None
+    back_emf_constant: Annotated[NotNegative | None, setting("of a duty; required", unit="V s/rad")] = None
+    torque_constant: Annotated[Positive | None, setting("of a duty; required", unit="N m/A")] = None
+    direction: Annotated[
+        str | tuple[float, ...] | None,
+        setting(
+            "of a force with several axes: the component along an axis (z, -z) or a vector; default: the magnitude"
+        ),
+    ] = None
+    kinds: Annotated[
+        dict[str, str] | None,
+        setting('of a label: its values that are contacts, each with its kind, as { 1 = "hard", 2 = "soft" }'),
+    ] = None
+    file: Annotated[
+        Text | None, setting("of a load cell or pressure sensor: a file beside the log, as cell_{stem}.csv")
+    ] = None
+    time: Annotated[ClockTable | None, setting("the clock of that file")] = None
+    clock: Annotated[Literal["epoch"] | None, setting("both clocks count from 1970")] = None
+    trigger: Annotated[TriggerTable | None, setting("what rises at the same time in both")] = None
+
+
+# What says where a channel is: in a table, in messages, or in a file beside the log, which is a table.
+_IN_TABLE, _IN_MESSAGES = ("column", "columns"), ("topic", "field")
+_IN_FILE = ("file", "time", "clock", "trigger")
+_OF_DUTY = ("supply_voltage", "resistance", "back_emf_constant", "torque_constant")
+_CHANNELS = [(name, Annotated[ChannelTable | None, setting(f"the channel {name}")], None) for name in CHANNELS]
+_LOW_PASS = Annotated[Positive, setting("low-pass of a speed that is derived from the position", unit="Hz")]
+TopicsTable: Any = make_dataclass(
+    "TopicsTable",
+    [
+        ("time", Annotated[MessageClockTable, setting("the clock of the messages")], MessageClockTable()),
+        ("speed_low_pass_hz", _LOW_PASS, 50.0),
+        *_CHANNELS,
+    ],
+    frozen=True,
+)
+ColumnsTable: Any = make_dataclass(
+    "ColumnsTable",
+    [
+        ("time", Annotated[ClockTable | None, setting("the clock of a table")], None),
+        ("speed_low_pass_hz", _LOW_PASS, 50.0),
+        ("mcap", Annotated[TopicsTable, setting("the channels in messages")], TopicsTable()),
+        *_CHANNELS,
+    ],
+    frozen=True,
+)
+
+
+def channel_maps(
+    given: Any, place: Place, joints: tuple[str, ...], accepted: AcceptedUnits
+) -> tuple[ChannelMap, ChannelMap]:
+    """Return the maps of columns, [channels], and of topics, [channels.mcap], with the mistakes in `place`.
+
+    `accepted`: SI units per channel.
+    """
+    nothing = ChannelMap(TimeSource(), (), joints)
+    if not isinstance(given, dict):
+        place.note("", f"is {value_in_words(given)}", "add a table [channels]")
+        return nothing, nothing
+    table = read(ColumnsTable, given, place) or ColumnsTable()
+    time = TimeSource()
+    if table.time or set(given) - {"mcap"}:
+        time = place.tried(time, _column_time, table.time, place)
+    of_columns = _Sources(joints, accepted, False).of(table, given, place)
+    below = place.below("mcap")
+    of_topics = _Sources(joints, accepted, True).of(table.mcap, given.get("mcap", {}), below)
+    maps = []
+    for sources, clock, low_pass, topics in (
+        (of_columns, time, table.speed_low_pass_hz, False),
+        (of_topics, TimeSource(clock=table.mcap.time.clock), table.mcap.speed_low_pass_hz, True),
+    ):
+        in_log = tuple(source for source in sources if source.own_file is None)
+        beside = tuple(source for source in sources if source.own_file is not None)
+        maps.append(ChannelMap(clock, in_log, joints, topics, low_pass, beside=beside))
+    return maps[0], maps[1]
+
+
+def _column_time(table: ClockTable | None, above: Place) -> TimeSource:
     """Return the clock of a table: a column, a rate, or both."""
-    if "rate_hz" in part:
-        rate = part.number("rate_hz", above=0.0)
-        counter = part.raw("column")
-        part.finish()
-        if counter is None:
-            return TimeSource(rate=rate)
-        return TimeSource(column=_column(part, counter, "column"), factor=1.0 / rate, rate=rate)
-    column = _column(part, part.raw("column"), "column")
-    name = part.text("unit", "")
-    if not name:
-        raise part.fault("unit", "is missing", "give s, ms, us, ns or min")
-    found = unit(name, part.key("unit"))
+    place = above.below("time")
+    if table is None:
+        raise above.fault("time", "is missing", f"add a table [{above.prefix}time]")
+    if table.rate_hz is not None:
+        if table.column is None:
+            return TimeSource(rate=table.rate_hz)
+        return TimeSource(column=table.column, factor=1.0 / table.rate_hz, rate=table.rate_hz)
+    if table.column is None:
+        raise place.fault("column", "is missing", _COLUMN_HINT)
+    if not table.unit:
+        raise place.fault("unit", "is missing", "give s, ms, us, ns or min")
+    found = unit(table.unit, place.key("unit"))
     if found.si != "s":
-        raise part.fault("unit", f"'{name}' is not a unit of time", "give s, ms, us, ns or min")
-    rest = _column(part, part.raw("nanoseconds"), "nanoseconds") if "nanoseconds" in part else None
-    part.finish()
-    return TimeSource(column=column, factor=found.factor, unit=name, nanoseconds=rest)
+        raise place.fault("unit", f"'{table.unit}' is not a unit of time", "give s, ms, us, ns or min")
+    return TimeSource(column=table.column, factor=found.factor, unit=table.unit, nanoseconds=table.nanoseconds)
 
 
-def _source(
-    table: Table, channel: str, joints: tuple[str, ...], accepted: tuple[str, ...], topics: bool
-) -> ChannelSource:
-    count = 1 if channel in (*GROUND_TRUTH, *TRIGGER) else len(joints)
-    columns: tuple[str | int, ...] = ()
-    topic = field = ""
-    axes: tuple[tuple[str, str], ...] = ()
-    own_file = _own_file(table, topics) if channel in RIG_UNITS and "file" in table else None
-    topics = topics and own_file is None
-    if topics and channel == "force" and ("fields" in table or "topics" in table):
-        axes = _field_axes(table)
-        count = len(axes)
-        if count == 1:
-            ((topic, field),), axes = axes, ()
-    elif topics:
-        topic, field = table.text("topic"), table.text("field")
-    else:
-        columns = _columns(table, channel, count)
-        count = len(columns)
-    kind = table.choice("kind", ("measured", "duty"), "measured")
-    duty = _duty(table, channel) if kind == "duty" else None
-    stated, si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
-    least, most = _possible_range(table)
-    source = ChannelSource(
-        channel=channel,
-        columns=columns,
-        topic=topic,
-        field=field,
-        factor=factor,
-        unit=si,
-        stated=stated,
-        time_offset=table.number("time_offset", 0.0),
-        valid_range=_valid_range(table),
-        least=least,
-        most=most,
-        duty=duty,
-        topics=tuple(topic for topic, _ in axes),
-        fields=tuple(field for _, field in axes),
-        direction=_direction(table, count) if channel == "force" and "direction" in table else (),
-        own_file=own_file,
-        kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
-        unit_confirmed=table.flag("unit_confirmed", False)
-        if channel not in UNITLESS and "unit_confirmed" in table
-        else None,
-        confirmed=channel in CHECKED and table.flag("confirmed", False),
-    )
-    table.finish()
-    return source
+@dataclass(frozen=True)
+class _Sources:
+    """Makes the sources of a log's channels, for these joints, with their accepted SI units."""
+
+    joints: tuple[str, ...]
+    accepted: AcceptedUnits
+    topics: bool
+
+    def of(self, table: Any, given: Mapping[str, Any], place: Place) -> list[ChannelSource]:
+        """Return the sources of the channels that a table has; `given` is the table as it is written."""
+        found = []
+        for name in given:
+            if name in CHANNELS and (channel := getattr(table, name)) is not None:
+                with place.noting():
+                    found.append(self.source(name, channel, given[name], place.below(name)))
+        return found
+
+    def source(self, channel: str, table: ChannelTable, given: Mapping[str, Any], place: Place) -> ChannelSource:
+        """Return the source of a channel; raises ConfigurationError for keys that do not fit together."""
+        if channel not in RIG_UNITS:
+            table = replace(table, file=None)
+        self._refuse_others(channel, table, given, place)
+        count = 1 if channel in (*GROUND_TRUTH, *TRIGGER) else len(self.joints)
+        columns: tuple[str | int, ...] = ()
+        axes: tuple[tuple[str, str], ...] = ()
+        topics = self.topics and table.file is None
+        if topics:
+            axes = _field_axes(table, place)
+        else:
+            columns = _columns(table, channel, count, place)
+            count = len(columns)
+        if len(axes) > 1:
+            count = len(axes)
+        duty = _duty(table, place) if table.kind == "duty" else None
+        scaled = _Scaled(channel, self.accepted(channel), count, topics)
+        stated, si, factor = scaled.unit_and_factor(table, duty, place)
+        least = -math.inf if table.min is None else table.min
+        most = math.inf if table.max is None else table.max
+        if least >= most:
+            raise place.fault("min", f"is {least:g}, max is {most:g}", "give the sensor's smallest and largest value")
+        if table.saturation and table.saturation[0] >= table.saturation[1]:
+            hint = "give [lowest, highest] reading of the sensor, in the log's unit"
+            raise place.fault("saturation", f"is {value_in_words(table.saturation)}", hint)
+        topic, name = axes[0] if len(axes) == 1 else ("", "")
+        return ChannelSource(
+            channel=channel,
+            columns=columns,
+            topic=topic,
+            field=name,
+            factor=factor,
+            unit=si,
+            stated=stated,
+            time_offset=table.time_offset or 0.0,
+            valid_range=table.saturation,
+            least=least,
+            most=most,
+            duty=duty,
+            topics=tuple(topic for topic, _ in axes if len(axes) > 1),
+            fields=tuple(name for _, name in axes if len(axes) > 1),
+            direction=() if table.direction is None else _direction(table.direction, count, place),
+            own_file=None if table.file is None else _own_file(table, place, in_messages=self.topics),
+            kinds=() if table.kinds is None else _kinds(table.kinds, place),
+            unit_confirmed=table.unit_confirmed,
+            confirmed=table.confirmed,
+        )
+
+    def _refuse_others(self, channel: str, table: ChannelTable, given: Mapping[str, Any], place: Place) -> None:
+        """Note the keys that this channel, or a log of this kind, does not have."""
+        allowed = {"unit", "scale", "time_offset", "saturation", "min", "max", "unit_confirmed", "kind"}
+        allowed -= {"unit", "unit_confirmed"} if channel in UNITLESS else set()
+        allowed |= {"confirmed"} if channel in CHECKED else set()
+        allowed |= {"file"} if channel in RIG_UNITS else set()
+        allowed |= set(_OF_DUTY) if table.kind == "duty" else set()
+        allowed |= {"direction"} if channel == "force" else set()
+        allowed |= {"kinds"} if channel == "label" else set()
+        in_messages = self.topics and table.file is None
+        allowed |= set(_IN_MESSAGES if in_messages else _IN_TABLE)
+        allowed |= {"topics", "fields"} if in_messages and channel == "force" else set()
+        allowed |= set(_IN_FILE) if table.file is not None else set()
+        for name in given:
+            if name not in allowed:
+                place.note(name, "unknown key", nearest(name, allowed))
+        if table.kind == "duty" and channel != "torque":
+            place.note("kind", "'duty' is only for the torque channel", "remove it")
 
 
-def _kinds(table: Table) -> tuple[tuple[float, str], ...]:
+def _kinds(given: Mapping[str, str], place: Place) -> tuple[tuple[float, str], ...]:
     """Return the values of a label that are contacts, each with its kind: { 1 = "hard", 2 = "soft" }."""
-    part = table.table("kinds")
-    kinds = []
-    for value in part.values:
+    below, kinds = place.below("kinds"), []
+    for value, kind in given.items():
         try:
             code = float(value)
         except ValueError:
             code = math.nan
         if not math.isfinite(code):
-            raise part.fault(value, "is not a number", 'give values of the column: kinds = { 1 = "hard", 2 = "soft" }')
-        kind = part.text(value).strip()
-        if not kind:
-            raise part.fault(value, "has no name", "name the kind; leave out values that are not contacts")
-        kinds.append((code, kind))
+            hint = 'give values of the column: kinds = { 1 = "hard", 2 = "soft" }'
+            raise below.fault(value, "is not a number", hint)
+        if not kind.strip():
+            raise below.fault(value, "has no name", "name the kind; leave out values that are not contacts")
+        kinds.append((code, kind.strip()))
     if not kinds or len({code for code, _ in kinds}) < len(kinds):
-        raise table.fault("kinds", "is empty, or has a value twice", 'give each value once: { 1 = "hard", 2 = "soft" }')
+        raise place.fault("kinds", "is empty, or has a value twice", 'give each value once: { 1 = "hard", 2 = "soft" }')
     return tuple(kinds)
 
 
-def _own_file(table: Table, topics: bool) -> OwnFile:
+def _own_file(table: ChannelTable, place: Place, *, in_messages: bool) -> OwnFile:
     """Return the file beside the log of a load cell or pressure sensor; raises ConfigurationError for a wrong clock."""
-    pattern = table.text("file")
+    pattern = table.file or ""
     placeholders = _PLACEHOLDER.findall(pattern)
     if not placeholders or "\0" in pattern:
-        raise table.fault("file", f"is {value_in_words(pattern)}", "name the log in it, e.g. cell_{stem}.csv")
+        raise place.fault("file", f"is {value_in_words(pattern)}", "name the log in it, e.g. cell_{stem}.csv")
     for name in placeholders:
         if name not in _PLACEHOLDERS:
-            raise table.fault("file", f"has {name}", f"use {', '.join(_PLACEHOLDERS)}")
-    given = [key for key in ("trigger", "clock") if key in table]
-    if len(given) == 2 or not (given or "time_offset" in table):
-        raise table.fault(
-            "file", "the clocks are not aligned", 'give time_offset, clock = "epoch" or trigger = { log = , file = }'
-        )
-    time = _column_time(table.table("time", required=True))
-    if "clock" in given:
-        table.choice("clock", ("epoch",))
+            raise place.fault("file", f"has {name}", f"use {', '.join(_PLACEHOLDERS)}")
+    if (table.clock and table.trigger) or not (table.clock or table.trigger or table.time_offset is not None):
+        hint = 'give time_offset, clock = "epoch" or trigger = { log = , file = }'
+        raise place.fault("file", "the clocks are not aligned", hint)
+    time = _column_time(table.time, place)
+    if table.clock:
         return OwnFile(pattern, time, "epoch")
-    if not given:
+    if table.trigger is None:
         return OwnFile(pattern, time, "offset")
-    part = table.table("trigger")
-    log, file = (_column(part, part.raw(key), key) for key in ("log", "file"))
-    if topics and (not isinstance(log, str) or " " not in log.strip()):
-        raise part.fault("log", f"is {value_in_words(log)}", 'give topic and field, e.g. "/sync data"')
-    part.finish()
+    log, file, below = table.trigger.log, table.trigger.file, place.below("trigger")
+    for name, value in (("log", log), ("file", file)):
+        if value is None:
+            raise below.fault(name, "is missing", _COLUMN_HINT)
+    if in_messages and (not isinstance(log, str) or " " not in log.strip()):
+        raise below.fault("log", f"is {value_in_words(log)}", 'give topic and field, e.g. "/sync data"')
+    assert log is not None and file is not None
     return OwnFile(pattern, time, "trigger", log, file)
 
 
-def _columns(table: Table, channel: str, count: int) -> tuple[str | int, ...]:
+def _columns(table: ChannelTable, channel: str, count: int, place: Place) -> tuple[str | int, ...]:
     """Return the columns of a channel: `count`, or for a force up to one per axis."""
-    given = table.raw("columns")
-    if given is not None and "column" in table:
-        raise table.fault("columns", "cannot be combined with 'column'", "remove one of the two")
-    listed = given if isinstance(given, list) else [table.raw("column")]
-    columns = tuple(_column(table, item, "column" if given is None else "columns") for item in listed)
-    if channel == "force" and given is not None:
-        return _distinct_axes(table, "columns", columns)
-    if len(columns) != count:
-        raise table.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
-    return columns
+    if table.columns is not None and table.column is not None:
+        raise place.fault("columns", "cannot be combined with 'column'", "remove one of the two")
+    if table.columns is None and table.column is None:
+        raise place.fault("column", "is missing", _COLUMN_HINT)
+    columns = (table.column,) if table.columns is None else table.columns
+    if channel == "force" and table.columns is not None:
+        _check_axes("columns", columns, place)
+    elif len(columns) != count:
+        raise place.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
+    return tuple(column for column in columns if column is not None)
 
 
-def _field_axes(table: Table) -> tuple[tuple[str, str], ...]:
-    """Return topic and field of each axis of a force: several fields of a topic, or fields of several topics."""
+def _field_axes(table: ChannelTable, place: Place) -> tuple[tuple[str, str], ...]:
+    """Return topic and field of each axis: several fields of a topic, or fields of several topics; else of the one."""
     for one, several in (("topic", "topics"), ("field", "fields")):
-        if one in table and several in table:
-            raise table.fault(several, f"cannot be combined with '{one}'", "remove one of the two")
-    topics = table.texts("topics") if "topics" in table else (table.text("topic"),)
-    fields = table.texts("fields") if "fields" in table else (table.text("field"),)
+        if getattr(table, one) and getattr(table, several):
+            raise place.fault(several, f"cannot be combined with '{one}'", "remove one of the two")
+        if not getattr(table, one) and not getattr(table, several):
+            raise place.fault(one, "is missing", "give a text")
+    topics, fields = table.topics or (table.topic,), table.fields or (table.field,)
     count = max(len(topics), len(fields))
     if len(topics) not in (1, count) or len(fields) not in (1, count):
-        raise table.fault("topics", f"names {len(topics)} topics for {len(fields)} fields", "give one of each per axis")
+        raise place.fault("topics", f"names {len(topics)} topics for {len(fields)} fields", "give one of each per axis")
     topics, fields = (names * count if len(names) == 1 else names for names in (topics, fields))
-    for name in fields:
-        if "[:]" in name:
-            raise table.fault("fields", f"names '{name}', a whole array", "name one element per axis, e.g. data[0]")
-    return _distinct_axes(table, "fields", tuple(zip(topics, fields, strict=True)))
+    axes = tuple(zip(topics, fields, strict=True))
+    if table.topics or table.fields:
+        for name in fields:
+            if "[:]" in name:
+                hint = "name one element per axis, e.g. data[0]"
+                raise place.fault("fields", f"names '{name}', a whole array", hint)
+        _check_axes("fields", axes, place)
+    return axes
 
 
-_Name = TypeVar("_Name", "str | int", "tuple[str, str]")
-
-
-def _distinct_axes(table: Table, key: str, names: tuple[_Name, ...]) -> tuple[_Name, ...]:
+def _check_axes(key: str, names: Sequence[object], place: Place) -> None:
     if not 1 <= len(names) <= len(AXES):
-        raise table.fault(key, f"names {len(names)} axes", "give up to three: the axes of the force")
+        raise place.fault(key, f"names {len(names)} axes", "give up to three: the axes of the force")
     if len(set(names)) < len(names):
-        raise table.fault(key, "names an axis twice", "name each axis once")
-    return names
+        raise place.fault(key, "names an axis twice", "name each axis once")
 
 
-def _direction(table: Table, count: int) -> tuple[float, ...]:
+def _direction(given: str | tuple[float, ...], count: int, place: Place) -> tuple[float, ...]:
     """Return the unit vector (axes,) of `direction`: the name of an axis, perhaps with a minus, or one number each."""
-    value = table.raw("direction")
     known = [f"{sign}{axis}" for axis in AXES[:count] for sign in ("", "-")]
     if count == 1:
-        raise table.fault("direction", "needs a force with several columns", "reverse one column with scale = -1")
-    if isinstance(value, str):
-        axis = table.choice("direction", known)
-        return tuple((-1.0 if axis[0] == "-" else 1.0) * (name == axis[-1]) for name in AXES[:count])
-    if not isinstance(value, list):
-        raise table.fault("direction", f"is {value_in_words(value)}", f"give {count} numbers, or one of {known}")
-    numbers = table.numbers("direction", count)
-    length = math.hypot(*numbers)
+        raise place.fault("direction", "needs a force with several columns", "reverse one column with scale = -1")
+    if isinstance(given, str):
+        if given not in known:
+            raise place.fault("direction", f"is '{given}'", nearest(given, known))
+        return tuple((-1.0 if given[0] == "-" else 1.0) * (name == given[-1]) for name in AXES[:count])
+    if len(given) != count:
+        raise place.fault("direction", f"has {len(given)} values", f"give {count} numbers, or one of {known}")
+    length = math.hypot(*given)
     if length == 0.0 or not math.isfinite(length):
-        raise table.fault("direction", "has no length", "give a vector other than 0, e.g. [0, 0, -1]")
-    return tuple(number / length for number in numbers)
+        raise place.fault("direction", "has no length", "give a vector other than 0, e.g. [0, 0, -1]")
+    return tuple(number / length for number in given)
 
 
-def _unit_factor(
-    table: Table, channel: str, accepted: tuple[str, ...], count: int, topics: bool, duty: Duty | None
-) -> tuple[str, str, tuple[float, ...]]:
-    """Return the unit as stated, the channel's own unit, and the factors between them."""
-    scale = table.numbers("scale", count, 1.0)
-    if any(item == 0.0 for item in scale):
-        raise table.fault("scale", "is 0", "give a factor other than 0, e.g. N m per A")
-    if channel in UNITLESS:  # a unit is meaningless and refused as an unknown key
-        return "", "1", scale
-    name = table.text("unit", "")
-    if not name:
-        if not topics or duty is not None:
-            raise table.fault("unit", "is missing", f"give the unit of the log, e.g. {accepted[0]}")
-        name = accepted[0]
-    found = unit(name, table.key("unit"))
-    factor = tuple(found.factor * item for item in scale)
-    if duty is not None:
-        if found.si not in ("1", "V"):
-            raise table.fault("unit", f"is '{name}'", "kind = 'duty' takes %, 1 or V")
-        return name, found.si, factor
-    if found.si in accepted:
-        return name, found.si, factor
-    if found.si in RAW_UNITS:
-        if "scale" not in table.values:
-            raise table.fault("scale", f"is missing for unit '{name}'", f"give the {accepted[0]} per {found.si}")
-        return name, accepted[0], factor
-    raise table.fault(
-        "unit",
-        f"'{name}' does not measure {channel} here",
-        f"use units of {' or '.join(accepted)}, or {', '.join(RAW_UNITS)} with a scale",
-    )
+@dataclass(frozen=True)
+class _Scaled:
+    """How the values of a channel become SI: `accepted` units, `count` columns, in messages with `topics`."""
+
+    channel: str
+    accepted: tuple[str, ...]
+    count: int
+    topics: bool
+
+    def unit_and_factor(
+        self, table: ChannelTable, duty: Duty | None, place: Place
+    ) -> tuple[str, str, tuple[float, ...]]:
+        """Return the unit as stated, the channel's own unit, and the factors between them."""
+        if len(table.scale) not in (0, 1, self.count):
+            hint = f"give one number, or {self.count}: one per joint"
+            raise place.fault("scale", f"has {len(table.scale)} values", hint)
+        scale = (table.scale or (1.0,)) * (1 if len(table.scale) == self.count else self.count)
+        if 0.0 in scale:
+            raise place.fault("scale", "is 0", "give a factor other than 0, e.g. N m per A")
+        if self.channel in UNITLESS:  # a unit is meaningless and refused as an unknown key
+            return "", "1", scale
+        if not table.unit and (not self.topics or duty is not None):
+            raise place.fault("unit", "is missing", f"give the unit of the log, e.g. {self.accepted[0]}")
+        name = table.unit or self.accepted[0]
+        found = unit(name, place.key("unit"))
+        factor = tuple(found.factor * item for item in scale)
+        if duty is not None:
+            if found.si not in ("1", "V"):
+                raise place.fault("unit", f"is '{name}'", "kind = 'duty' takes %, 1 or V")
+            return name, found.si, factor
+        if found.si in self.accepted:
+            return name, found.si, factor
+        if found.si not in RAW_UNITS:
+            others = f"{' or '.join(self.accepted)}, or {', '.join(RAW_UNITS)} with a scale"
+            raise place.fault("unit", f"'{name}' does not measure {self.channel} here", f"use units of {others}")
+        if not table.scale:
+            raise place.fault("scale", f"is missing for unit '{name}'", f"give the {self.accepted[0]} per {found.si}")
+        return name, self.accepted[0], factor
 
 
-def _duty(table: Table, channel: str) -> Duty:
-    if channel != "torque":
-        raise table.fault("kind", "'duty' is only for the torque channel", "remove it")
-    return Duty(
-        supply_voltage=table.number("supply_voltage", 1.0, above=0.0),
-        resistance=table.number("resistance", above=0.0),
-        back_emf_constant=table.number("back_emf_constant", minimum=0.0),
-        torque_constant=table.number("torque_constant", above=0.0),
-    )
-
-
-def _valid_range(table: Table) -> tuple[float, float] | None:
-    value = table.raw("saturation")
-    if value is None:
-        return None
-    if isinstance(value, list) and len(value) == 2 and all(isinstance(item, int | float) for item in value):
-        low, high = float(value[0]), float(value[1])
-        if math.isfinite(low) and math.isfinite(high) and low < high:
-            return low, high
-    raise table.fault(
-        "saturation", f"is {value_in_words(value)}", "give [lowest, highest] reading of the sensor, in the log's unit"
-    )
-
-
-def _possible_range(table: Table) -> tuple[float, float]:
-    least = table.number("min") if "min" in table else -math.inf
-    most = table.number("max") if "max" in table else math.inf
-    if least >= most:
-        raise table.fault("min", f"is {least:g}, max is {most:g}", "give the sensor's smallest and largest value")
-    return least, most
-
-
-def _column(table: Table, value: object, key: str) -> str | int:
-    if isinstance(value, str) and value:
-        return value
-    if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
-        return value
-    problem = "is missing" if value is None else f"is {value_in_words(value)}"
-    raise table.fault(key, problem, "give a column's name, or its number counted from 0")
+def _duty(table: ChannelTable, place: Place) -> Duty:
+    for name in ("resistance", "back_emf_constant", "torque_constant"):
+        if getattr(table, name) is None:
+            raise place.fault(name, "is missing", "give a number")
+    return Duty(*(float(getattr(table, name)) for name in _OF_DUTY))

@@ -3,68 +3,76 @@
 from __future__ import annotations
 
 import codecs
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
-from cdtool.base.tables import Table
-from cdtool.base.value_words import value_in_words
+from cdtool.base.settings import Count, CountFromZero, Place, read, setting
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.stamps import check_pattern
 from cdtool.formats.csv.text import UNIT_BYTES
 
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "blanks": " "}
-_THOUSANDS = ("", ",", ".", "'", " ", "\u00a0", "\u202f")
+_DECIMALS = {"comma": ",", "point": "."}
 _TIME_WORDS = ("", "number", "excel")
+_LINE = Annotated[
+    bool | Count | None,
+    setting(
+        "the number of its line, counted from 1, or false", hint="the number of its line, counted from 1, or false"
+    ),
+]
 
 
-def read_pins(table: Table) -> TablePins:
-    """Return the pins of `[csv]`; raises ConfigurationError naming the key."""
-    separator = _one_of(table, "separator", {**_SEPARATORS, **{mark: mark for mark in _SEPARATORS.values()}})
-    decimal = _one_of(table, "decimal", {",": ",", ".": ".", "comma": ",", "point": "."})
-    thousands = table.text("thousands") if "thousands" in table else None
-    if thousands is not None and thousands not in _THOUSANDS:
-        raise table.fault("thousands", f"is {value_in_words(thousands)}", '",", ".", "\'", a blank, or "" for none')
-    if decimal and thousands == decimal:
-        raise table.fault(
-            "thousands", f"is {value_in_words(thousands)}, the same as decimal", "the two marks must differ"
-        )
-    pins = TablePins(
-        separator=separator,
+@dataclass(frozen=True, kw_only=True)
+class CsvTable:
+    """[csv]: the parts of a table's dialect that are set; the others are found in each file."""
+
+    separator: Annotated[
+        Literal["comma", "semicolon", "tab", "pipe", "blanks", ",", ";", "\t", "|", " "] | None,
+        setting("between the columns"),
+    ] = None
+    decimal: Annotated[Literal["comma", "point", ",", "."] | None, setting("the decimal mark")] = None
+    thousands: Annotated[
+        Literal["", ",", ".", "'", " ", "\u00a0", "\u202f"] | None,
+        setting("between groups of three digits", hint='",", ".", "\'", a blank, or "" for none'),
+    ] = None
+    encoding: Annotated[str, setting("utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")] = ""
+    header: _LINE = None
+    units: _LINE = None
+    skip_lines: Annotated[CountFromZero, setting("lines above the table that are not read")] = 0
+    comment: Annotated[str | None, setting("mark at the beginning of a line that is not read")] = None
+    missing: Annotated[tuple[str, ...], setting("texts that stand for a missing value")] = ()
+    time_format: Annotated[str, setting("number, excel, or a layout such as %d.%m.%Y %H:%M:%S.%f")] = ""
+
+
+def read_pins(values: Mapping[str, Any], place: Place) -> TablePins:
+    """Return the pins of `[csv]`, with the mistakes in `place`."""
+    table = read(CsvTable, values, place)
+    if table is None:
+        return TablePins()
+    for name in ("header", "units"):
+        if getattr(table, name) is True:
+            place.note(name, "is true", "the number of its line, counted from 1, or false")
+    if table.header is False and table.units:
+        place.note("units", f"is {table.units}, but header is false", "units need a header")
+    decimal = _DECIMALS.get(table.decimal or "", table.decimal or "")
+    if decimal and table.thousands == decimal:
+        place.note("thousands", f"is '{decimal}', the same as decimal", "the two marks must differ")
+    return TablePins(
+        separator=_SEPARATORS.get(table.separator or "", table.separator or ""),
         decimal=decimal,
-        thousands=thousands,
-        encoding=_encoding(table),
-        header=_line(table, "header"),
-        units=_line(table, "units"),
-        skip_lines=table.whole("skip_lines", 0, minimum=0),
-        comment=table.text("comment") if "comment" in table else None,
-        missing=table.texts("missing", ()),
-        time_format=_time_format(table),
+        thousands=table.thousands,
+        encoding=place.tried("", _encoding, table.encoding, place),
+        header=table.header,
+        units=table.units,
+        skip_lines=table.skip_lines,
+        comment=table.comment,
+        missing=table.missing,
+        time_format=place.tried("", _time_format, table.time_format, place),
     )
-    if pins.header is False and isinstance(pins.units, int) and pins.units is not False:
-        raise table.fault("units", f"is {pins.units}, but header is false", "units need a header")
-    table.finish()
-    return pins
 
 
-def _one_of(table: Table, name: str, meaning: dict[str, str]) -> str:
-    if name not in table:
-        return ""
-    given = table.text(name)
-    if given not in meaning:
-        words = ", ".join(repr(word) for word in meaning)
-        raise table.fault(name, f"is {value_in_words(given)}", f"one of {words}")
-    return meaning[given]
-
-
-def _line(table: Table, name: str) -> int | bool | None:
-    value = table.raw(name)
-    if value is None or value is False:
-        return value
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise table.fault(name, f"is {value_in_words(value)}", "the number of its line, counted from 1, or false")
-    return value
-
-
-def _encoding(table: Table) -> str:
-    name = table.text("encoding", "")
+def _encoding(name: str, place: Place) -> str:
     if not name:
         return ""
     try:
@@ -72,21 +80,20 @@ def _encoding(table: Table) -> str:
         # Also the codec of host names agrees with ASCII, but it cannot replace what it cannot decode.
         narrow = "1,2\n".encode(known) == b"1,2\n" == b"1,2\n".decode(known, "replace").encode()
     except (LookupError, UnicodeError, AssertionError):
-        raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252") from None
+        raise place.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252") from None
     # Numbers are read byte by byte: their bytes must be ASCII, or the encoding must be one that is recoded to UTF-8.
     known = {"iso8859-1": "latin-1"}.get(known, known)
     if not narrow and known not in UNIT_BYTES:
-        raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")
+        raise place.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")
     return known
 
 
-def _time_format(table: Table) -> str:
-    value = table.text("time_format", "")
+def _time_format(value: str, place: Place) -> str:
     if value in _TIME_WORDS:
         return value
     problem = check_pattern(value) if "%" in value else "is not a layout"
     if problem:
-        raise table.fault(
+        raise place.fault(
             "time_format", f"is '{value}': {problem}", "number, excel, or a layout such as %d.%m.%Y %H:%M:%S.%f"
         )
     return value
