@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.remote.remote_path import location
-from cdtool.base.tables import Table, read_toml
+from cdtool.base.settings import NotNegative, Place, Positive, read
+from cdtool.base.tables import read_toml
 from cdtool.formats.machine_file import MachineFile
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import SpeedController
@@ -28,6 +31,98 @@ from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS, JointMachi
 _DRIVE_FREQUENCY = 10.0
 _LOOP_FREQUENCY = 2.0
 _GRAVITY = 9.80665
+
+
+# A number that has a default, which depends on the machine and is reported.
+_Above = Positive | None
+_AtLeast = NotNegative | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactTable:
+    """[impact]: the contact; SI units, at the contact."""
+
+    speed: _Above = None
+    stiffness: _Above = None
+    damping_factor: _AtLeast = None
+    window: _Above = None
+    first_frequency: _Above = None
+    lever: _Above = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveTable:
+    """[drive]: between motor and load."""
+
+    stiffness: _Above = None
+    damping_ratio: _AtLeast = None
+    rated_force: _Above = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerTable:
+    """[controller]: of the speed."""
+
+    proportional: _Above = None
+    integral: _AtLeast = None
+    actuator_time: _Above = None
+    derivative: _AtLeast = None
+    derivative_time: _Above = None
+    slew_limit: _Above = None
+    force_limit: _Above = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceSensorTable:
+    """[sensors.NAME] of a force or torque."""
+
+    noise: _AtLeast = None
+    resolution: _AtLeast = None
+    bandwidth: _Above = None
+    sample_rate: _Above = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccelerometerTable:
+    """[sensors.accelerometer]."""
+
+    bandwidth: _Above = None
+    noise_density: _AtLeast = None
+    vibration: _AtLeast = None
+    resolution: _AtLeast = None
+    sample_rate: _Above = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class EncoderTable:
+    """[sensors.encoder]."""
+
+    counts_per_turn: Annotated[float, Meta(ge=1.0)] | None = None
+    sample_rate: _Above = None
+    speed_bandwidth: _Above = None
+    speed_noise: _AtLeast = None
+    position_noise: _AtLeast = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorsTable:
+    """[sensors]."""
+
+    load_cell: ForceSensorTable = ForceSensorTable()
+    torque_sensor: ForceSensorTable = ForceSensorTable()
+    accelerometer: AccelerometerTable = AccelerometerTable()
+    encoder: EncoderTable = EncoderTable()
+    motor_torque: ForceSensorTable = ForceSensorTable()
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyTable:
+    """A study file as it is written; docs/study.md has the meaning of each key and its default."""
+
+    impact: ImpactTable = ImpactTable()
+    drive: DriveTable = DriveTable()
+    controller: ControllerTable = ControllerTable()
+    sensors: SensorsTable = SensorsTable()
 
 
 @dataclass(frozen=True)
@@ -52,13 +147,15 @@ def read_study(
     for name, value in options.items():
         if not 0.0 < value < math.inf:
             raise UsageError(f"{name} is {value:g}", "give a number above 0")
-    root = Table(_merged(read_toml(location(file), "a study file") if file else {}, options), str(file or "study"))
-    reader = StudyReader(root)
+    place = Place(str(file or "study"))
+    table = read(StudyTable, _merged(read_toml(location(file), "a study file") if file else {}, options), place)
+    place.finish()
+    assert table is not None
+    reader = StudyReader(table)
     part = _studied_joint(machine, joint, reader)
     case = _case(part, reader)
     frequency = reader.optional("impact", "first_frequency", "the load is rigid except for its drive")
     sensors = _sensors(part, reader)
-    reader.finish()
     return Study(part.name, case, sensors, frequency, tuple(reader.assumed))
 
 
@@ -73,16 +170,16 @@ def _merged(values: dict[str, Any], options: Mapping[str, float]) -> dict[str, A
 
 
 def _case(part: StudiedJoint, reader: StudyReader) -> ImpactCase:
-    speed = reader.number("impact", "speed", 0.2, "m/s", "at the contact", above=0.0)
-    stiffness = reader.number("impact", "stiffness", 5e5, "N/m", above=0.0)
-    factor = reader.number("impact", "damping_factor", 0.0, "s/m", minimum=0.0)
+    speed = reader.number("impact", "speed", 0.2, "m/s", "at the contact")
+    stiffness = reader.number("impact", "stiffness", 5e5, "N/m")
+    factor = reader.number("impact", "damping_factor", 0.0, "s/m")
     obstacle = HuntCrossley(stiffness, factor * stiffness, 1.0)
-    window = reader.number("impact", "window", 0.5, "s", "length of the simulation", above=0.0)
+    window = reader.number("impact", "window", 0.5, "s", "length of the simulation")
     angular = 2.0 * math.pi * _DRIVE_FREQUENCY
     why = f"the load oscillates at {_DRIVE_FREQUENCY:g} Hz on the drive with the motor at rest"
     default = part.load_mass * angular**2 * part.square
-    drive = reader.number("drive", "stiffness", default, part.unit("N/m"), why, above=0.0) / part.square
-    ratio = reader.number("drive", "damping_ratio", 0.05, "", "of that oscillation", minimum=0.0)
+    drive = reader.number("drive", "stiffness", default, part.unit("N/m"), why) / part.square
+    ratio = reader.number("drive", "damping_ratio", 0.05, "", "of that oscillation")
     square = part.ratio**2
     transmission = ElasticTransmission(
         part.motor_inertia,
@@ -108,14 +205,13 @@ def _controller(part: StudiedJoint, reader: StudyReader) -> SpeedController:
     angular = 2.0 * math.pi * _LOOP_FREQUENCY
     why = f"a speed loop of {_LOOP_FREQUENCY:g} Hz for the whole mass"
     default = part.mass * angular * part.square
-    proportional = reader.number("controller", "proportional", default, part.unit("N s/m"), why, above=0.0)
+    proportional = reader.number("controller", "proportional", default, part.unit("N s/m"), why)
     default = 0.25 * angular * proportional
-    integral = reader.number("controller", "integral", default, part.unit("N/m"), "critically damped", minimum=0.0)
-    lag = reader.number("controller", "actuator_time", 0.002, "s", "lag of the current loop", above=0.0)
-    derivative = reader.number("controller", "derivative", 0.0, part.unit("N s2/m"), minimum=0.0)
-    filtered = reader.number("controller", "derivative_time", 0.002, "s", "low-pass of the derivative", above=0.0)
-    table = reader.table("controller")
-    slew = table.number("slew_limit", above=0.0) if "slew_limit" in table else math.inf
+    integral = reader.number("controller", "integral", default, part.unit("N/m"), "critically damped")
+    lag = reader.number("controller", "actuator_time", 0.002, "s", "lag of the current loop")
+    derivative = reader.number("controller", "derivative", 0.0, part.unit("N s2/m"))
+    filtered = reader.number("controller", "derivative_time", 0.002, "s", "low-pass of the derivative")
+    slew = reader.tables["controller"].slew_limit or math.inf
     limit = reader.optional("controller", "force_limit", "the drive is not stopped") or math.inf
     to_motor, to_torque = part.ratio**2 / part.square, part.ratio / part.lever
     return SpeedController(
@@ -137,7 +233,7 @@ def _sensors(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, ...]:
     """
     lever = part.lever
     why = f"accelerates the whole mass by 1 m/s2{' at the contact' if part.rotary else ''}"
-    rated = reader.number("drive", "rated_force", part.mass * lever, part.unit("N"), why, above=0.0) / lever
+    rated = reader.number("drive", "rated_force", part.mass * lever, part.unit("N"), why) / lever
     torque = (part, reader, rated, lever)
     return (
         _force_sensor("load_cell", "at the contact", "contact_force", (part, reader, rated, 1.0), 0.001, 500.0),
@@ -164,32 +260,32 @@ def _force_sensor(
         place,
         quantity,
         "N",
-        reader.number(table, "noise", share * rated * lever, unit, why, minimum=0.0) / lever,
-        reader.number(table, "resolution", 0.0, unit, minimum=0.0) / lever,
-        reader.number(table, "bandwidth", bandwidth, "Hz", above=0.0),
-        reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0),
+        reader.number(table, "noise", share * rated * lever, unit, why) / lever,
+        reader.number(table, "resolution", 0.0, unit) / lever,
+        reader.number(table, "bandwidth", bandwidth, "Hz"),
+        reader.number(table, "sample_rate", 1000.0, "Hz"),
     )
 
 
 def _accelerometer(reader: StudyReader) -> Sensor:
     table, unit = "sensors.accelerometer", "m/s2"
-    bandwidth = reader.number(table, "bandwidth", 100.0, "Hz", above=0.0)
-    density = reader.number(table, "noise_density", 300e-6 * _GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)", minimum=0.0)
-    vibration = reader.number(table, "vibration", 0.1, unit, "of the moving structure, rms", minimum=0.0)
+    bandwidth = reader.number(table, "bandwidth", 100.0, "Hz")
+    density = reader.number(table, "noise_density", 300e-6 * _GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)")
+    vibration = reader.number(table, "vibration", 0.1, unit, "of the moving structure, rms")
     # A first-order low-pass has a noise bandwidth of pi/2 times its corner frequency.
     noise = math.hypot(density * math.sqrt(0.5 * math.pi * bandwidth), vibration)
-    resolution = reader.number(table, "resolution", _GRAVITY / 4096, unit, "1/4096 g", minimum=0.0)
-    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
+    resolution = reader.number(table, "resolution", _GRAVITY / 4096, unit, "1/4096 g")
+    rate = reader.number(table, "sample_rate", 1000.0, "Hz")
     return Sensor("accelerometer", "on the load", "load_acceleration", unit, noise, resolution, bandwidth, rate)
 
 
 def _encoder(part: StudiedJoint, reader: StudyReader) -> tuple[Sensor, Sensor]:
     table = "sensors.encoder"
-    counts = reader.number(table, "counts_per_turn", 4096.0, "", "12 bit, on the motor", minimum=1.0)
-    rate = reader.number(table, "sample_rate", 1000.0, "Hz", above=0.0)
-    bandwidth = reader.number(table, "speed_bandwidth", 60.0, "Hz", "low-pass after the difference", above=0.0)
-    speed_noise = reader.number(table, "speed_noise", 0.0, "m/s", "ripple of the speed", minimum=0.0)
-    noise = reader.number(table, "position_noise", 0.0, "m", "variation of the impact-free position", minimum=0.0)
+    counts = reader.number(table, "counts_per_turn", 4096.0, "", "12 bit, on the motor")
+    rate = reader.number(table, "sample_rate", 1000.0, "Hz")
+    bandwidth = reader.number(table, "speed_bandwidth", 60.0, "Hz", "low-pass after the difference")
+    speed_noise = reader.number(table, "speed_noise", 0.0, "m/s", "ripple of the speed")
+    noise = reader.number(table, "position_noise", 0.0, "m", "variation of the impact-free position")
     step = 2.0 * math.pi * part.ratio / counts
     return (
         Sensor("motor_position", "on the motor", "motor_position", "m", noise, step, math.inf, rate),
@@ -270,46 +366,35 @@ def _load_inertia(machine: Axis | CoupledMachine, at: int) -> float:
 
 
 def _lever(machine: JointMachine, rotary: bool, reader: StudyReader) -> float:
-    given = "lever" in reader.table("impact")
+    given = reader.tables["impact"].lever is not None
     if not rotary:
         if given:
             raise UsageError("a lever is given for a linear axis", "use it only for a rotary axis")
         return 1.0
     if not given and not isinstance(machine, Axis):
         raise UsageError("no lever is given", "give --lever, the distance from the joint's axis to the contact [m]")
-    return reader.number("impact", "lever", 1.0, "m", "contact to axis", above=0.0)
+    return reader.number("impact", "lever", 1.0, "m", "contact to axis")
 
 
 class StudyReader:
-    """Tables by their names; `assumed` has a line for every default used."""
+    """Tables of a study by their names; `assumed` has a line for every default used."""
 
-    def __init__(self, root: Table) -> None:
-        self._tables = {"": root}
+    def __init__(self, table: StudyTable) -> None:
+        self.tables: dict[str, Any] = {name: getattr(table, name) for name in ("impact", "drive", "controller")}
+        self.tables |= {f"sensors.{item.name}": getattr(table.sensors, item.name) for item in fields(SensorsTable)}
         self.assumed: list[str] = []
 
-    def table(self, name: str) -> Table:
-        """Return a table such as sensors.encoder, always the same object."""
-        if name not in self._tables:
-            above, _, last = name.rpartition(".")
-            self._tables[name] = self.table(above).table(last)
-        return self._tables[name]
-
-    def number(self, table: str, key: str, default: float, unit: str, why: str = "", **bounds: float) -> float:
+    def number(self, table: str, key: str, default: float, unit: str, why: str = "") -> float:
         """Return a number of a table; a default is reported with its reason."""
-        part = self.table(table)
-        if key not in part:
+        given: float | None = getattr(self.tables[table], key)
+        if given is None:
             self.assumed.append(f"{table}.{key} = {default:.4g} {unit}".rstrip() + (f": {why}" if why else ""))
-        return part.number(key, default, **bounds)
+            return default
+        return given
 
     def optional(self, table: str, key: str, none: str) -> float | None:
         """Return a positive number that may be missing; the consequence of a missing one is reported."""
-        part = self.table(table)
-        if key in part:
-            return part.number(key, above=0.0)
-        self.assumed.append(f"{table}.{key} = none: {none}")
-        return None
-
-    def finish(self) -> None:
-        """Raise ConfigurationError if a table has a key that was not read."""
-        for table in self._tables.values():
-            table.finish()
+        given: float | None = getattr(self.tables[table], key)
+        if given is None:
+            self.assumed.append(f"{table}.{key} = none: {none}")
+        return given
