@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.base.tables import Table
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.recordings.recording import Recording, Series
 
@@ -33,7 +32,7 @@ class Run:
 def gate() -> LinearAxis:
     """A gate of 1.15 t with known viscous friction."""
     values = {"load_mass": 620.0, "motor_inertia": 9.5e-4, "transmission_ratio": 1.333e-3, "viscous_friction": 2.67e-4}
-    return LinearAxis.from_table(Table(values, "benchmark"))
+    return LinearAxis.of(values)
 
 
 def viscous(machine: LinearAxis) -> float:

@@ -27,7 +27,6 @@ import numpy as np
 from arrays import PERIOD, Array, gate
 from timing import Spread, main, ratio, table, verdict
 
-from cdtool.base.tables import Table
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.detection import Signal
 from cdtool.machines.planar_arm import PlanarArm
@@ -61,7 +60,7 @@ iyy="{inertia}" izz="{inertia}" ixy="0" ixz="0" iyz="0"/></inertial></link><join
 
 def measure(machines: list[str], names: list[str], rounds: int) -> bool:
     detectors = {name: DETECTORS.load(name)() for name in names or DETECTORS.names()}
-    known = {"gate": gate, "arm": lambda: PlanarArm.from_table(Table(_ARM, "benchmark")), "robot": _robot}
+    known = {"gate": gate, "arm": lambda: PlanarArm.of(_ARM), "robot": _robot}
     held = True
     for name in machines or known:
         machine = known[name]()
@@ -138,7 +137,7 @@ def _robot() -> Any:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "six.urdf").write_text("\n".join([*parts, "</robot>"]), encoding="utf-8")
         values = {"urdf": "six.urdf", "joints": joints, "drive_inertia": 0.3, "viscous_friction": 5.0}
-        return UrdfRobot.from_table(Table(values, str(Path(folder) / "machine.toml")))
+        return UrdfRobot.of(values, str(Path(folder) / "machine.toml"))
 
 
 def _swinging(machine: Any, samples: int, clocks: str) -> Recording:

@@ -33,7 +33,6 @@ sys.path.insert(0, str(ROOT))
 import cdtool  # noqa: E402
 from cdtool.alarms.activation import Activation  # noqa: E402
 from cdtool.alarms.pipeline import detect_operation, run_detector  # noqa: E402
-from cdtool.base.tables import Table  # noqa: E402
 from cdtool.commands.identify.axis.speed_controller import identify_controller  # noqa: E402
 from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
 from cdtool.commands.identify.contact.contact_fit import ContactSettings, identify_contacts, with_contacts  # noqa: E402
@@ -301,7 +300,7 @@ def compare_plain(
     reaction = ControllerReaction.KNOWN if model.controller else ControllerReaction.FROZEN
     names = [name for name in names if refusal(DETECTORS.load(name).needs, model, reaction) is None]
     table = {"name": "gate", "coordinates": "load", "load_mass": model.drive.total_mass}
-    machine = LinearAxis.from_table(Table(table, "machine.toml"))
+    machine = LinearAxis.of(table)
     return {
         stiffness: compare(
             machine,

@@ -15,10 +15,10 @@ from typing import Annotated, Any
 
 from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import location
 from cdtool.base.settings import Place, read, setting
-from cdtool.base.tables import read_toml
 from cdtool.base.value_words import value_in_words
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource, channel_maps
 from cdtool.machines.dynamics import Gain, Machine
@@ -121,10 +121,10 @@ def read_machine_file(path: str | Path) -> MachineFile:
     ('gate', ('gate',), 'N')
     """
     file = location(path)
-    values = read_toml(file, "a machine file")
+    place = Place(str(file))
+    values = read_toml(file, "a machine file", place)
     if isinstance(values.get("machine"), str):
         raise ConfigurationError(f"{file}: is a benchmark file, not a machine file", f"give {values['machine']}")
-    place = Place(str(file))
     machine = place.tried(None, _machine, values, place)
     written = {name: value for name, value in values.items() if name not in ("machine", "operations")}
     table = read(MachineTable, written, place)

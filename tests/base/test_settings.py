@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cdtool.base.errors import ConfigurationError, MistakesError, UsageError
+from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.settings import NOT_A_KEY, Count, NotNegative, Place, Positive, check, keys_of, read, setting
 
 
@@ -165,3 +166,13 @@ def test_another_day_is_refused(written):
     read(Day, {"day": written}, place)
     (mistake,) = place.mistakes
     assert mistake.hint == "give a day as 2026-03-31"
+
+
+def test_a_broken_line_is_one_mistake_and_the_rest_of_the_file_is_read(tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_text('mass_kg = -1\ncount =\n[inner\nrate_hz = 3\n[groups.a]\nrate_hz = "x"\n', encoding="utf-8")
+    place = Place("m.toml")
+    read(Outer, read_toml(path, "a machine file", place), place)
+    lines = [str(mistake) for mistake in place.mistakes]
+    assert ["at line 2" in lines[0], "at line 3" in lines[1]] == [True, True]
+    assert [line.split(": ")[1] for line in lines[2:]] == ["mass_kg", "groups.a.rate_hz"]

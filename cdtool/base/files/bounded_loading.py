@@ -17,12 +17,16 @@ import tomllib
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdtool.base.errors import CdtoolError
+from cdtool.base.errors import CdtoolError, ConfigurationError
+from cdtool.base.files.kinds import kind_of
 from cdtool.base.remote.storage import StorageError
+
+if TYPE_CHECKING:
+    from cdtool.base.settings import Place
 
 MIB = 2**20
 # Text written by a person: a machine, benchmark, label or trigger file, a URDF.
@@ -35,6 +39,9 @@ MOST_KEY_PARTS = 32
 _MOST_TOML_WORDS = 200_000
 _MOST_TOML_ENTRIES = 50_000
 _MOST_WORD = 1000
+#: More broken lines are another kind of file.
+_MOST_BROKEN_LINES = 20
+_SWAPPED = ("a signature file", "a machine file")  # given, needed: commands take both
 # Upper bound of the memory for JSON as Python values: bytes per character (as bytes and text), element, list, object.
 _PER_CHARACTER, _PER_ELEMENT, _PER_LIST, _PER_OBJECT = 2, 40, 60, 200
 # A file may need this much memory, and this multiple of its size on disk; only hostile files need more.
@@ -129,6 +136,51 @@ def parse_toml(text: str) -> dict[str, Any]:
         if not -_LARGEST_INTEGER <= number < _LARGEST_INTEGER:
             raise ContentError(f"{key} is a whole number of {len(str(abs(number)))} digits: more than 64 bits")
     return values
+
+
+def read_toml(path: Path, what: str, place: Place | None = None) -> dict[str, Any]:
+    """Return the tables of a TOML file; raises ConfigurationError with the file and the line.
+
+    `what` the file should be, such as "a machine file", is stated if it is something else. With `place` a line that is
+    not TOML is a mistake there, and the rest of the file is read without it; below a broken [table] nothing is read
+    until the next one.
+    """
+    text = read_text(path, ConfigurationError, most=MOST_TOML)
+    lines = text.splitlines()
+    for _ in range(_MOST_BROKEN_LINES):
+        try:
+            return parse_toml("\n".join(lines) + "\n")
+        except ContentError as fault:
+            error, line = _not_toml(path, text, what, fault), _line_of(fault, lines)
+            if place is None or line is None or _other_kind(text):
+                raise error from fault
+            place.mistakes.append(error)
+            broken_header = lines[line].lstrip().startswith("[")
+            lines[line] = ""
+            while broken_header and line + 1 < len(lines) and not lines[line + 1].lstrip().startswith("["):
+                line += 1
+                lines[line] = ""
+    raise place.mistakes[-1] if place else ConfigurationError(f"{path}: not valid TOML")
+
+
+def _line_of(fault: ContentError, lines: list[str]) -> int | None:
+    """Return the index of the line that an error of tomllib names; None if it names another place, such as the end."""
+    found = re.search(r"at line (\d+)", str(fault))
+    return int(found[1]) - 1 if found and int(found[1]) <= len(lines) and lines[int(found[1]) - 1].strip() else None
+
+
+def _other_kind(text: str) -> str:
+    """Return what a text is that is not meant to be TOML; empty for one that is, and for one that is not known."""
+    kind = kind_of(text.encode())
+    return "" if kind.endswith(("machine file", "benchmark file")) else kind
+
+
+def _not_toml(path: Path, text: str, what: str, fault: ContentError) -> ConfigurationError:
+    kind = _other_kind(text)
+    if not kind:
+        return ConfigurationError(f"{path}: not valid TOML: {fault}", "write texts in quotes, decimals with a point")
+    swapped = "; it may be swapped with the signature" if (kind, what) == _SWAPPED else ""
+    return ConfigurationError(f"{path}: is {kind}, not {what}", f"give {what}{swapped}")
 
 
 def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:

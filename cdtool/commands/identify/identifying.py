@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
-from cdtool.base.files.bounded_loading import read_text
+from cdtool.base.files.bounded_loading import read_text, read_toml
 from cdtool.base.files.writing import replaced
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
-from cdtool.base.tables import read_toml
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
 from cdtool.commands.identify.axis.speed_controller import ControllerFit, ControllerSettings, identify_controller
 from cdtool.commands.identify.axis.torque_constant import TorqueScale

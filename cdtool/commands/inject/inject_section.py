@@ -17,10 +17,10 @@ import numpy as np
 from msgspec import Meta
 
 from cdtool.base.errors import ConfigurationError, RecordingError, UsageError, nearest
+from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import joined
 from cdtool.base.settings import Count, CountFromZero, NotNegative, Place, Positive, read, setting
-from cdtool.base.tables import read_toml
 from cdtool.commands.inject.assumption import Assumption
 from cdtool.commands.inject.robot_contact import StruckPoint
 from cdtool.commands.judging.named_logs import LogsOf

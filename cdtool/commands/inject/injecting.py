@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.files.writing import replaced_folder
 from cdtool.base.log_names import log_stem
 from cdtool.base.remote.remote_path import location
-from cdtool.base.tables import read_toml
 from cdtool.base.version import __version__
 from cdtool.commands.inject.inject_section import InjectSection
 from cdtool.commands.inject.injected_logs import CONTACTS, InjectedLogs, write_injected, write_recording

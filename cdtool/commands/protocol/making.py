@@ -8,8 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from cdtool.base.errors import ConfigurationError
+from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.remote.remote_path import joined, location
-from cdtool.base.tables import read_toml
 from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, judge

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cdtool.base.errors import ConfigurationError, UsageError
-from cdtool.base.files.bounded_loading import read_bytes
+from cdtool.base.files.bounded_loading import read_bytes, read_toml
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import Place, read, setting
-from cdtool.base.tables import read_toml
 from cdtool.commands.protocol.assessment.plan import MeasuringPoint, TestPlan
 from cdtool.truth.force.limits import ForceProfile, profile_of, read_force_limits
 
@@ -84,7 +83,8 @@ def read_protocol_file(path: str | Path) -> ProtocolFile:
     [('closing edge', 4), ('closing edge with bumper', 4)]
     """
     file = location(path)
-    values, place = read_toml(file, "a protocol file"), Place(str(file))
+    place = Place(str(file))
+    values = read_toml(file, "a protocol file", place)
     if not isinstance(values.get(TABLE), dict):
         raise ConfigurationError(f"{file}: has no table [protocol]", "draft one: cdtool protocol init BENCHMARK")
     is_benchmark = "machine" in values

@@ -12,12 +12,11 @@ from typing import Annotated, Any, Literal, Protocol
 
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
-from cdtool.base.files.bounded_loading import read_bytes
+from cdtool.base.files.bounded_loading import read_bytes, read_toml
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import NotNegative, Place, Positive, read, setting
-from cdtool.base.tables import read_toml
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_logs
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
@@ -376,11 +375,11 @@ def read_benchmark_file(
     `also_known`. `settings` take the place of keys of the file, as "activation.debounce".
     """
     file = location(path)
-    values = read_toml(file, "a benchmark file")
+    place = Place(str(file), by_option=frozenset(settings or ()), root=BenchmarkTable)
+    values = read_toml(file, "a benchmark file", place)
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
-    place = Place(str(file), by_option=frozenset(settings or ()), root=BenchmarkTable)
     table = read(BenchmarkTable, apply_settings(values, settings or {}), place)
     if table is None:
         place.finish()

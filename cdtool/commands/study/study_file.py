@@ -15,9 +15,9 @@ from typing import Annotated, Any
 from msgspec import Meta
 
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.remote.remote_path import location
 from cdtool.base.settings import NotNegative, Place, Positive, read
-from cdtool.base.tables import read_toml
 from cdtool.formats.machine_file import MachineFile
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import SpeedController

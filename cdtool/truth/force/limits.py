@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.settings import NOT_A_KEY, Count, NotNegative, Place, Positive, Text, read, setting
-from cdtool.base.tables import read_toml
 from cdtool.base.value_words import value_in_words
 
 _SHIPPED = Path(__file__).with_name("limits.toml")
@@ -185,7 +185,8 @@ def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
     """
     file = _SHIPPED if path is None else path
     where = str(file) if path else "the shipped limits.toml"
-    values, place = read_toml(file, "a file of force limits"), Place(where)
+    place = Place(where)
+    values = read_toml(file, "a file of force limits", place)
     if not values:
         raise ConfigurationError(
             f"{where}: contains no profile", "write one table per profile, see docs/force-limits.md"

@@ -37,7 +37,7 @@ IMPORTS = (
     "cdtool.commands.app",
     "cdtool.commands.console.console",
     "cdtool.formats.channels.reading",
-    "cdtool.base.tables",
+    "cdtool.base.settings",
     "cdtool.base.kernels",
 )
 
