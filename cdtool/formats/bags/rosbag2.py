@@ -187,7 +187,7 @@ def _standard_definition(kind: str) -> str:
     package, _, rest = kind.partition("/")
     name = kind if rest.startswith("msg/") else f"{package}/msg/{rest}"
     if name in DEFINITIONS:
-        return DEFINITIONS[name].text
+        return DEFINITIONS[name]
     from rosbags.typesys import Stores, get_typestore
 
     try:

@@ -79,7 +79,7 @@ def test_other_encodings_are_refused_by_name(message, schema, text):
 
 def test_a_survey_lists_every_number_except_the_header_stamp():
     def fields(name):
-        return decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].text.encode()).fields(batch_of([]))
+        return decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].encode()).fields(batch_of([]))
 
     assert fields("geometry_msgs/msg/WrenchStamped") == [f"wrench.{a}.{b}" for a in ("force", "torque") for b in "xyz"]
     assert fields("sensor_msgs/msg/JointState") == ["position[:]", "velocity[:]", "effort[:]"]
@@ -100,7 +100,7 @@ def test_a_survey_lists_every_number_except_the_header_stamp():
 )
 def test_a_missing_field_is_reported_with_the_fields_that_exist(field, problem, known):
     name = "geometry_msgs/msg/WrenchStamped"
-    decoder = decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].text.encode())
+    decoder = decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].encode())
     (field_values,) = decoder.decode(batch_of([b"\0\1\0\0" + bytes(64)]), fields_of(field)).fields
     assert (field_values.fault.problem, field_values.fault.known) == (problem, known)
     assert field_values.state.tolist() == [2]
