@@ -39,8 +39,8 @@ def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, sche
             from cdtool.formats.messages.sequential import walk_cdr, walk_ros1
 
             is_cdr = message_encoding == "cdr"
-            schema = parse_definitions(schema_name, schema_data, 2 if is_cdr else 1)
-            return SchemaDecoder(schema, walk_cdr if is_cdr else walk_ros1)
+            layout = parse_definitions(schema_name, schema_data, 2 if is_cdr else 1)
+            return SchemaDecoder(layout, walk_cdr if is_cdr else walk_ros1)
         case "protobuf", "protobuf":
             from cdtool.formats.messages.protobuf import protobuf_decoder
 
