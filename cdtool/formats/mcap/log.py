@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,7 +55,7 @@ class Log(TopicLog):
 
         Raises RecordingError if no message can be read, or if a CRC shows that values are wrong but not which ones.
         """
-        with self._file:
+        with closing(self._file):
             try:
                 for number, block in enumerate(self.section.blocks()):
                     self.origin = self.origin if number else self.section.first_time or 0

@@ -113,9 +113,8 @@ class Topic:
         for text, each in self.fields.items():
             each.add(fields[text], whole, stamps, exact)
             if each.elsewhere and not each.names:
-                first = batch.rows(slice(_FIRST))
-                contents = self.decoders.attempt(stream, first, lambda decoder, first=first: decoder.contents(first))  # type: ignore[misc]
-                each.names = sorted({name for content in contents or () for name in element_names(content)})
+                contents = self.decoders.contents(stream, batch.rows(slice(_FIRST)))
+                each.names = sorted({name for content in contents for name in element_names(content)})
 
     def _check(self, decoded: DecodedBatch, whole: BoolArray) -> None:
         """Raise RecordingError for the first message without a field or without the header's time stamp.
