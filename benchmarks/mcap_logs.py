@@ -21,7 +21,7 @@ import numpy.typing as npt
 from mcap.writer import CompressionType, Writer
 
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
-from cdtool.formats.messages.schemas import DEFINITIONS, Definition
+from cdtool.formats.messages.schemas import DEFINITIONS
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 10**9
@@ -106,8 +106,8 @@ geometry_msgs/Vector3 linear
 geometry_msgs/Vector3 angular
 {_SEPARATOR}
 MSG: geometry_msgs/WrenchStamped
-{DEFINITIONS["geometry_msgs/msg/WrenchStamped"].text}"""
-_DEFINITIONS = DEFINITIONS | {"robot_msgs/msg/RobotState": Definition(_ROBOT_STATE, ())}
+{DEFINITIONS["geometry_msgs/msg/WrenchStamped"]}"""
+_DEFINITIONS = DEFINITIONS | {"robot_msgs/msg/RobotState": _ROBOT_STATE}
 _FIELDS = dict((*FLAT.topics.values(), *NESTED.topics.values()))  # by type
 Array = npt.NDArray[np.float64]
 
@@ -146,14 +146,14 @@ def _signal(rng: np.random.Generator, count: int, size: int) -> Array:
 
 
 def _cdr(kind: str, values: Mapping[str, Array], count: int) -> tuple[tuple[str, bytes], Iterator[bytes]]:
-    text = _DEFINITIONS[kind].text
+    text = _DEFINITIONS[kind]
     # Unique numbers show the position of each field.
     places = {name: np.arange(array[0].size) + 1e6 * (k + 1) + 0.5 for k, (name, array) in enumerate(values.items())}
     message = _nested(
         {name: place.tolist() if values[name].ndim == 2 else float(place[0]) for name, place in places.items()}
     )
     stamp = {"sec": 0x01020304, "nanosec": 0x05060708}
-    if _DEFINITIONS[kind].header:
+    if _DEFINITIONS[kind].startswith("std_msgs/Header"):
         message["header"] = {"stamp": stamp, "frame_id": "base_link"}
     if "position" in values:
         message["name"] = list(JOINTS)
@@ -163,7 +163,7 @@ def _cdr(kind: str, values: Mapping[str, Array], count: int) -> tuple[tuple[str,
         at = template.index(places[name].astype("<f8").tobytes())
         raw = np.ascontiguousarray(array.reshape(count, -1), "<f8").view(np.uint8).reshape(count, -1)
         table[:, at : at + raw.shape[1]] = raw
-    if _DEFINITIONS[kind].header:
+    if _DEFINITIONS[kind].startswith("std_msgs/Header"):
         at = template.index(struct.pack("<iI", *stamp.values()))
         times = START_NS + np.arange(count) * STEP_NS
         parts = np.column_stack((times // 10**9, times % 10**9)).astype("<u4")
@@ -198,7 +198,7 @@ def _messages(kind: str, values: Mapping[str, Array], count: int) -> Iterator[di
     columns = {name: array.tolist() for name, array in values.items()}
     for i in range(count):
         message = _nested({name: column[i] for name, column in columns.items()})
-        if _DEFINITIONS[kind].header:
+        if _DEFINITIONS[kind].startswith("std_msgs/Header"):
             sec, nanosec = divmod(START_NS + i * STEP_NS, 10**9)
             message["header"] = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": "base_link"}
         if "position" in values:
@@ -249,7 +249,7 @@ def protobuf_message(kind: str) -> tuple[bytes, Callable[[], Any]]:
                 made_field.type_name = kind_name
 
     root = file.message_type.add(name=name)
-    if _DEFINITIONS[kind].header:
+    if _DEFINITIONS[kind].startswith("std_msgs/Header"):
         stamp = file.message_type.add(name="Stamp")
         add(stamp, "sec", field.TYPE_INT64)
         add(stamp, "nanosec", field.TYPE_UINT32)

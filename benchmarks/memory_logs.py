@@ -82,7 +82,7 @@ def write_log(path: Path, run: Recording, seconds: float, size: float, compressi
 
 
 def _channel(writer: Writer, topic: str, kind: str) -> int:
-    schema = writer.register_schema(kind, "ros2msg", DEFINITIONS[kind].text.encode())
+    schema = writer.register_schema(kind, "ros2msg", DEFINITIONS[kind].encode())
     return writer.register_channel(topic, "cdr", schema)
 
 

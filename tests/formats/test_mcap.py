@@ -5,14 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from cdtool.base.errors import RecordingError, UsageError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.write import Stream
 from cdtool.formats.messages.fields import FieldMissingError, parse_field
 from cdtool.formats.source import TopicDetails
 from tests.base.findings.facts import fact_of
 from tests.data_folder import DATA, data, needs_data
-from tests.formats.mcap_files import JOINTS, START, STREAMS, TIME, N, by_hand, wanted, written
+from tests.formats.mcap_files import JOINTS, START, TIME, N, by_hand, wanted, written
 
 __all__ = ["by_hand", "written"]
 
@@ -172,22 +171,6 @@ def test_json_null_is_nan_and_a_text_is_refused(by_hand):
     assert np.isnan(Mcap().columns(path, wanted(("/a", "x"))).columns["/a x"].values[1])
     with pytest.raises(RecordingError, match="contains 'up', not a number"):
         Mcap().columns(path, wanted(("/a", "s")))
-
-
-def test_writing_refuses_fields_that_the_message_type_does_not_have(written):
-    def stream(schema="sensor_msgs/msg/Imu", **fields):
-        return Stream("/a", schema, TIME, fields)
-
-    with pytest.raises(UsageError, match=r"did you mean linear_acceleration\.x"):
-        written([Stream("/a", "sensor_msgs/msg/Imu", TIME, {"linear_aceleration.x": TIME})])
-    with pytest.raises(UsageError, match="unknown message type"):
-        written([stream("sensor_msgs/Imu")])
-    with pytest.raises(UsageError, match="3 values at 200 times"):
-        written([stream("std_msgs/msg/Float64", data=np.zeros(3))])
-    with pytest.raises(UsageError, match="number them from 0"):
-        written([Stream("/a", "sensor_msgs/msg/JointState", TIME, {"position[1]": TIME})])
-    with pytest.raises(UsageError, match="several streams have the same topic"):
-        written([STREAMS[3], STREAMS[3]])
 
 
 @pytest.mark.parametrize("text", ["a b.c", "x[0].y", "a[b.c].d"])

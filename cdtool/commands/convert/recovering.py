@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
@@ -144,7 +145,7 @@ def _copy_extras(log: Log, clean: CleanFile) -> None:
     from cdtool.formats.mcap.file_bytes import FileBytes
     from cdtool.formats.mcap.records import PREFIX, Opcode, parse
 
-    with FileBytes(log.path) as file:
+    with closing(FileBytes(log.path)) as file:
         for opcode, at, length in log.section.extras:
             content = file.read(at + PREFIX, length - PREFIX)
             record = parse(opcode, content)

@@ -54,7 +54,10 @@ class Bag(TopicLog):
                     yield [Messages(each, _batch(some)) for each, some in buffered.values()]
                     buffered, size = {}, 0
         yield [Messages(each, _batch(some)) for each, some in buffered.values()]
-        self.topic_details = {topic: TopicDetails(kind, count) for topic, (kind, count) in self.counts.items()}
+        self.topic_details = {
+            topic: TopicDetails(kind, max(count, self.read.get(topic, 0)))
+            for topic, (kind, count) in self.counts.items()
+        }
 
     def findings(self) -> list[Finding]:
         """Return the findings on messages that cannot be read, and those that the reader noted."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from cdtool.base.errors import RecordingError
 from cdtool.formats.bags.bag import Bag, one_line
 from cdtool.formats.bags.topic_log import IsWanted, TopicFormat
 from cdtool.formats.containers.container_checks import one_line_errors
@@ -30,9 +29,7 @@ class Rosbag(TopicFormat):
             return file.read(len(_BAG)) == _BAG
 
     def log(self, path: Path, is_wanted: IsWanted | None = None) -> Bag:
-        """Open a bag; raises RecordingError if the file is not one."""
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a ROS bag", "see cdtool list formats")
+        """Open a bag."""
         return _Ros1Bag(path, is_wanted)
 
 

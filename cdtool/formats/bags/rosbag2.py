@@ -58,9 +58,7 @@ class Rosbag2(TopicFormat):
         return b"messages" in head or (_is_filled(journal) and b"messages" in _head(journal))
 
     def log(self, path: Path, is_wanted: IsWanted | None = None) -> Bag:
-        """Open a bag; raises RecordingError if the file is not one."""
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a ROS 2 bag", "see cdtool list formats")
+        """Open a bag."""
         return _Ros2Bag(path, is_wanted)
 
 
@@ -77,7 +75,7 @@ class _Ros2Bag(Bag):
                 base = stack.enter_context(closing(_connect(file)))
                 tables = {name for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
                 kinds = _topics(self.path, base, tables)
-                is_counted = self._count(base, kinds)
+                self._count(base, kinds)
                 streams = self._streams(kinds, _definitions(base) if "message_definitions" in tables else {})
             unwanted, damaged = kinds.keys() - streams.keys(), 0
             for topic, time, raw in self._rows(base, file.stat().st_size // _ROW_BYTES):
@@ -91,8 +89,6 @@ class _Ros2Bag(Bag):
                     yield streams[topic], time, content
             if damaged:
                 self.noted.append(Finding("damaged_rows", "", {"count": damaged}))
-            if not is_counted:
-                self.counts = {name: (kind, self.read.get(name, 0)) for name, (kind, _) in self.counts.items()}
 
     def _rows(self, base: sqlite3.Connection, most: int) -> Iterator[tuple[Any, Any, Any]]:
         """Yield the rows of the table of messages, to its end or to the first damage; at most `most`."""
@@ -126,8 +122,8 @@ class _Ros2Bag(Bag):
                 self.noted.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
             yield copy
 
-    def _count(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> bool:
-        """Set the topics with their numbers of messages, and the origin; return False if the bag is too damaged."""
+    def _count(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> None:
+        """Set the topics with their numbers of messages (0 if the bag is too damaged), and the origin."""
         self.counts = {name: (kind, 0) for name, kind, _ in kinds.values()}
         try:
             counted = base.execute("SELECT topic_id, count(*), min(timestamp) FROM messages GROUP BY topic_id")
@@ -135,13 +131,12 @@ class _Ros2Bag(Bag):
         except sqlite3.DatabaseError:
             first = base.execute("SELECT timestamp FROM messages LIMIT 1").fetchone()
             self.origin = first[0] if first is not None and _is_stamp(first[0]) else 0
-            return False
+            return
         for topic, count, _ in rows:
             if topic in kinds:
                 name, kind, _ = kinds[topic]
                 self.counts[name] = (kind, self.counts[name][1] + count)
         self.origin = min((first for _, _, first in rows if _is_stamp(first)), default=0)
-        return True
 
     def _streams(
         self, kinds: Mapping[int, tuple[str, str, str]], own: Mapping[str, tuple[str, str]]
@@ -187,7 +182,7 @@ def _standard_definition(kind: str) -> str:
     package, _, rest = kind.partition("/")
     name = kind if rest.startswith("msg/") else f"{package}/msg/{rest}"
     if name in DEFINITIONS:
-        return DEFINITIONS[name].text
+        return DEFINITIONS[name]
     from rosbags.typesys import Stores, get_typestore
 
     try:

@@ -12,12 +12,12 @@ from __future__ import annotations
 import struct
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator
 
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.formats.bags.topic_log import Messages
 from cdtool.formats.mcap import messages
 from cdtool.formats.mcap.chunks import (
     HEADER_LENGTH,
@@ -34,7 +34,6 @@ from cdtool.formats.mcap.losses import Loss, Losses
 from cdtool.formats.mcap.messages import Positions, Walk
 from cdtool.formats.mcap.records import LARGEST, MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
 from cdtool.formats.mcap.summary import McapSummary, matches_header
-from cdtool.formats.messages.batch import Batch
 
 _LONGEST_TEXT = 1 << 16
 
@@ -65,19 +64,8 @@ _SPARE = 8  # bytes after the last message in memory, so that all messages can b
 _WINDOW = 1 << 20  # bytes of records outside of chunks that are read at once
 _SEARCHED = 1 << 20  # bytes that are searched at once for the next chunk
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+Block = list[Messages]
 _INDEX_HEAD = PREFIX + 6  # before the entries of a message index: prefix, channel id, length of the entries
-
-
-@dataclass(frozen=True)
-class Block:
-    """Messages in one memory block, by channel, in the order of the file.
-
-    `covered`: a CRC covers their bytes. `cuts` maps channels to the byte where their definition changes.
-    """
-
-    batches: tuple[tuple[int, Batch], ...]
-    covered: bool
-    cuts: Mapping[int, int]
 
 
 class DataSection:
@@ -85,8 +73,7 @@ class DataSection:
 
     Chunks without a wanted topic, at the bytes `unwanted`, are not read if what follows them agrees with the summary;
     `skipped` are their messages by channel. `extras` are (opcode, byte, length) of complete attachments and metadata;
-    `other_times` counts chunks whose header has other times than their messages. `first_time` [ns] is the log time of
-    the first message with a valid one.
+    `first_time` [ns] is the log time of the first message with a valid one.
     """
 
     def __init__(self, file: FileBytes, summary: McapSummary, definitions: Definitions, unwanted: set[int]) -> None:
@@ -94,20 +81,19 @@ class DataSection:
         self.chunks: dict[int, ChunkHeader] = {}
         self.extras: dict[tuple[int, int, int], None] = {}
         self.data_crc = 0  # that the end record states
-        self.end_at, self.is_ended, self.other_times = 0, False, 0
+        self.end_at, self.is_ended = 0, False
         self.first_time: int | None = None
         self._file, self._summary, self._definitions, self._unwanted = file, summary, definitions, unwanted
         self.skipped: Counter[int] = Counter()
         self._memory = np.empty(0, np.uint8)
         self._size, self._covered = 0, False  # of what is in memory
         self._found: list[Positions] = []
-        self._cuts: dict[int, int] = {}
         self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
 
     def blocks(self) -> Iterator[Block]:
-        """Yield all messages that can be read."""
+        """Yield all messages that can be read, channel by channel in each memory block."""
         yield from self._records()
         yield from self._flush()
 
@@ -186,10 +172,6 @@ class DataSection:
         self._add(content, walked, header.at)
         if walked.reason:
             self.losses.add(Loss(header.at, len(content) - walked.end, f"in a chunk: {walked.reason}"))
-        elif len(walked.records):
-            times = messages.log_times(content, walked.records)
-            span = header.message_start_time, header.message_end_time
-            self.other_times += (int(times.min()), int(times.max())) != span
         return end
 
     def _is_indexed(self, header: ChunkHeader) -> bool:
@@ -280,28 +262,40 @@ class DataSection:
 
     def _add(self, content: Bytes, walked: Walk, at: int) -> None:
         """Add the messages of a chunk or window at byte `at`, which is the next in memory."""
+        cuts = dict.fromkeys(self._definitions.ambiguous, 0)  # channels, and the byte from which on they are ambiguous
         for opcode, start, size in walked.definitions:
-            body = content[start : start + size].tobytes()
-            if self._definitions.is_known(opcode, body, self._covered):
-                continue
-            before = set(self._definitions.ambiguous)
             try:
-                self._definitions.add(opcode, body, self._covered)
+                self._definitions.add(opcode, content[start : start + size].tobytes(), self._covered)
             except DamageError as fault:
                 self.losses.add(Loss(at, 0, f"a definition: {fault}"))
-            self._cuts.update(dict.fromkeys(set(self._definitions.ambiguous) - before, self._size + start))
-        if len(walked.records):
-            self._note_first_time(messages.log_times(content, walked.records))
-            self._found.append(walked.records + self._size)
+            for channel in self._definitions.ambiguous.keys() - cuts.keys():
+                cuts[channel] = start
+        records = walked.records
+        if len(records):
+            self._note_first_time(messages.log_times(content, records))
+        for channel, cut in cuts.items():
+            lost = (records >= cut) & (messages.channel_ids(content, records) == channel)
+            if lost.any():
+                self.losses.messages[self._definitions.ambiguous[channel]] += int(np.count_nonzero(lost))
+                records = records[~lost]
+        self._found.append(records + self._size)
         self._size += len(content)
 
     def _flush(self) -> Iterator[Block]:
         """Yield the messages in memory, and release the memory."""
-        data, found, cuts = self._memory[: self._size + _SPARE], self._found, self._cuts
-        self._memory, self._size, self._found, self._cuts = np.empty(0, np.uint8), 0, [], {}
-        if found:
-            all_cuts = {channel: cuts.get(channel, 0) for channel in self._definitions.ambiguous}
-            yield Block(tuple(messages.by_channel(data, np.concatenate(found))), self._covered, all_cuts)
+        data, found = self._memory[: self._size + _SPARE], np.concatenate([np.empty(0, np.int64), *self._found])
+        self._memory, self._size, self._found = np.empty(0, np.uint8), 0, []
+        if len(found):
+            yield list(self._by_stream(data, found))
+
+    def _by_stream(self, data: Bytes, found: Positions) -> Iterator[Messages]:
+        for channel, batch in messages.by_channel(data, found):
+            try:
+                stream = self._definitions.stream(channel)
+            except DamageError as fault:
+                self.losses.messages[str(fault)] += len(batch)
+            else:
+                yield Messages(stream, batch, self._covered and stream.covered)
 
     def _note_first_time(self, times: npt.NDArray[np.uint64]) -> None:
         """Set the first time; a valid one replaces an invalid one."""

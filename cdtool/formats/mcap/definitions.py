@@ -35,17 +35,16 @@ class Definitions:
         self._streams: dict[int, DefinedStream | DamageError] = {}
         self._latest: dict[tuple[int, bytes, bool], bytes] = {}
 
-    def is_known(self, opcode: int, body: bytes, covered: bool) -> bool:
-        """Return whether a definition repeats an earlier one.
-
-        Writers repeat definitions, and half a million of them can be compressed to 8 kB.
-        """
-        if opcode == Opcode.CHANNEL and len(body) > 1 and int.from_bytes(body[:2], "little") in self.ambiguous:
-            return True
-        return self._latest.get((opcode, body[:2], covered)) == body
-
     def add(self, opcode: int, body: bytes, covered: bool) -> None:
-        """Add a definition of the data section; raises DamageError if its bytes are not a definition."""
+        """Add a definition of the data section; raises DamageError if its bytes are not a definition.
+
+        Writers repeat definitions, and half a million of them can be compressed to 8 kB: only the first is parsed.
+        """
+        is_ambiguous = (
+            opcode == Opcode.CHANNEL and len(body) > 1 and int.from_bytes(body[:2], "little") in self.ambiguous
+        )
+        if is_ambiguous or self._latest.get((opcode, body[:2], covered)) == body:
+            return
         self._latest[opcode, body[:2], covered] = body
         record = parse(opcode, body)
         if opcode == Opcode.SCHEMA:

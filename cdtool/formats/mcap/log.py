@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.formats.bags.topic_log import IsWanted, Messages, TopicLog
-from cdtool.formats.mcap.data_section import Block, DataSection
+from cdtool.formats.mcap.data_section import DataSection
 from cdtool.formats.mcap.definitions import Definitions
 from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_origin
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss
-from cdtool.formats.mcap.messages import NO_DATE
 from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, parse
 from cdtool.formats.mcap.summary import between_chunks, matches_header, read_summary, unwanted_chunks
-from cdtool.formats.messages.batch import Batch
 from cdtool.formats.source import TopicDetails
 
 _LONGEST_HEADER = 1 << 12
@@ -51,7 +48,6 @@ class Log(TopicLog):
         if origin is not None:
             self.exact, self.exact_origin = EXACT_TIME, origin
         self.counts: Counter[int] = Counter()
-        self._writers: Counter[str] = Counter()  # channels with messages by topic
         self.unverified = 0
 
     def blocks(self) -> Generator[Sequence[Messages], None, None]:
@@ -59,53 +55,25 @@ class Log(TopicLog):
 
         Raises RecordingError if no message can be read, or if a CRC shows that values are wrong but not which ones.
         """
-        with self._file:
+        with closing(self._file):
             try:
                 for number, block in enumerate(self.section.blocks()):
-                    self.origin = self.origin if number else self._first_valid_time()
-                    yield tuple(self._usable(block))
+                    self.origin = self.origin if number else self.section.first_time or 0
+                    yield [each for each in block if self._is_read(each)]
                 self._finish()
             except (OSError, DamageError) as fault:  # a lost drive, or a file that shrinks while it is read
                 raise RecordingError(f"{self.path}: cannot be read to its end: {fault}", "read a copy of it") from fault
-
-    def _first_valid_time(self) -> int:
-        """Return the time [ns] of the log's first message; the first valid time may be far behind it."""
-        first = self.section.first_time or 0
-        if first < NO_DATE:
-            return first
-        log = Log(self.path)
-        with log._file:
-            for _ in log.section.blocks():
-                pass
-        return log.section.first_time or 0
 
     @property
     def count(self) -> int:
         """Return the number of messages that were read."""
         return sum(self.counts.values())
 
-    def _usable(self, block: Block) -> Iterator[Messages]:
-        for channel, batch in block.batches:
-            if channel in block.cuts:
-                unambiguous = int(np.searchsorted(batch.start, block.cuts[channel]))
-                if unambiguous < len(batch):
-                    reason = self._definitions.ambiguous[channel]
-                    self.section.losses.messages[reason] += len(batch) - unambiguous
-                batch = batch.rows(slice(unambiguous))
-            if len(batch):
-                yield from self._counted(channel, len(batch), block.covered, batch)
-
-    def _counted(self, channel: int, count: int, covered: bool, batch: Batch) -> Iterator[Messages]:
-        try:
-            stream = self._definitions.stream(channel)
-        except DamageError as fault:
-            self.section.losses.messages[str(fault)] += count
-            return
-        self.counts[channel] += count
-        covered = covered and stream.covered
-        self.unverified += 0 if covered else count
-        if self.is_wanted(stream.topic):
-            yield Messages(stream, batch, covered)
+    def _is_read(self, messages: Messages) -> bool:
+        """Count the messages, and return whether they are wanted."""
+        self.counts[messages.stream.id] += len(messages.batch)
+        self.unverified += 0 if messages.covered else len(messages.batch)
+        return self.is_wanted(messages.stream.topic)
 
     def _finish(self) -> None:
         self._file.check_unchanged()
@@ -116,9 +84,7 @@ class Log(TopicLog):
             schema = stream.schema.name if stream.schema is not None else "no schema"
             topic = details.get(stream.topic, TopicDetails(schema, 0, stream.encoding))
             details[stream.topic] = replace(topic, messages=topic.messages + self.counts[stream.id])
-            self._writers[stream.topic] += bool(self.counts[stream.id])
         self.topic_details = details
-        self.origin = section.first_time or 0
         self._check_data_crc()
         self._check_appended_data()
         if self._strict and not self.count and section.losses:
@@ -171,9 +137,10 @@ class Log(TopicLog):
         findings += self._differences()
         if self.unverified:
             findings.append(Finding("unverified", "", {"count": self.unverified, "messages": self.count}))
+        writers = Counter(stream.topic for stream in self._definitions.streams() if self.counts[stream.id])
         findings += [
             Finding("several_writers", topic, {"channels": channels})
-            for topic, channels in self._writers.items()
+            for topic, channels in writers.items()
             if channels > 1 and self.is_wanted(topic)
         ]
         if not self.count:
@@ -186,26 +153,23 @@ class Log(TopicLog):
         if section.losses or summary.problem:
             return []
         findings: list[Finding] = []
-        chunks = section.chunks
-        if summary.chunks:
-            missing = len(chunks.keys() - summary.chunks.keys())
-            absent = len(summary.chunks.keys() - chunks.keys())
-            both = chunks.keys() & summary.chunks.keys()
-            other = sum(not matches_header(summary.chunks[at], chunks[at]) for at in both)
-            differences = {"not indexed": missing, "only indexed": absent, "other values": other}
+        chunks, indexes = section.chunks, summary.chunks
+        if indexes:
+            other = sum(not matches_header(indexes[at], chunks[at]) for at in chunks.keys() & indexes.keys())
+            differences = {
+                "not indexed": len(chunks.keys() - indexes.keys()),
+                "only indexed": len(indexes.keys() - chunks.keys()),
+                "other values": other,
+            }
             findings += [
                 Finding("index_disagrees", "", {"count": count, "how": how})
                 for how, count in differences.items()
                 if count
             ]
-        if section.other_times:
-            findings.append(Finding("chunk_times_differ", "", {"chunks": section.other_times}))
         statistics = summary.statistics
-        if statistics is not None and statistics.channel_message_counts:
-            stated = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
-            read = {channel: count for channel, count in self.counts.items() if count}
-            if stated != read and statistics.message_count == self.count:
-                findings.append(Finding("channel_counts_differ"))
+        if statistics is not None and statistics.message_count == self.count:
+            stated = Counter(statistics.channel_message_counts)
+            findings += [Finding("channel_counts_differ")] if stated and stated != self.counts else []
         return findings + [Finding("defined_otherwise", topic) for topic in self._definitions.redefined_topics()]
 
 

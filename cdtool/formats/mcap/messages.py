@@ -94,16 +94,21 @@ def walk_by_indexes(content: Bytes, records: Positions) -> Walk:
 
 def by_channel(data: Bytes, records: Positions) -> Iterator[tuple[int, Batch]]:
     """Yield the messages with these records channel by channel, in the file's order."""
-    channels = numbers_at(data, records + PREFIX, "<u2")
+    channels = channel_ids(data, records)
     order = np.argsort(channels, kind="stable")
     records, channels = records[order], channels[order]
-    times = numbers_at(data, records + PREFIX + 6, "<u8")
+    times = log_times(data, records)
     lengths = numbers_at(data, records + 1, "<u8").astype(np.int64) - _HEADER
     starts = records + PREFIX + _HEADER
     borders = np.flatnonzero(np.append(len(channels) > 0, channels[1:] != channels[:-1]))
     for begin, end in zip(borders, np.append(borders[1:], len(channels)), strict=True):
         rows = slice(begin, end)
         yield int(channels[begin]), Batch(data, starts[rows], lengths[rows], times[rows])
+
+
+def channel_ids(content: Bytes, records: Positions) -> npt.NDArray[Any]:
+    """Return the channels of the messages with these records."""
+    return numbers_at(content, records + PREFIX, "<u2")
 
 
 def log_times(content: Bytes, records: Positions) -> npt.NDArray[Any]:

@@ -22,20 +22,10 @@ MAGIC = b"\x89MCAP0\r\n"
 PREFIX = 9  # opcode (uint8) and content length (uint64)
 # The largest size of a record, compressed or not [bytes]: writers make chunks of 1 to 8 MB.
 LARGEST = 128 << 20
-# The records that are parsed whole, by their opcode.
+# The records that are parsed whole, by their opcode; the package names both alike (CHUNK_INDEX, ChunkIndex).
+_WALKED = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.MESSAGE_INDEX)
 _KINDS: dict[int, Any] = {
-    Opcode.HEADER: records.Header,
-    Opcode.FOOTER: records.Footer,
-    Opcode.SCHEMA: records.Schema,
-    Opcode.CHANNEL: records.Channel,
-    Opcode.CHUNK_INDEX: records.ChunkIndex,
-    Opcode.ATTACHMENT: records.Attachment,
-    Opcode.ATTACHMENT_INDEX: records.AttachmentIndex,
-    Opcode.METADATA_INDEX: records.MetadataIndex,
-    Opcode.SUMMARY_OFFSET: records.SummaryOffset,
-    Opcode.STATISTICS: records.Statistics,
-    Opcode.METADATA: records.Metadata,
-    Opcode.DATA_END: records.DataEnd,
+    opcode: getattr(records, opcode.name.title().replace("_", "")) for opcode in Opcode if opcode not in _WALKED
 }
 
 

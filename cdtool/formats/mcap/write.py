@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import UsageError, nearest
-from cdtool.formats.messages.schemas import DEFINITIONS, Definition
+from cdtool.formats.messages.schemas import DEFINITIONS
 
 _SECOND = 10**9
 # What no recording contains: the number from which the marks of a layout are made, and the stamp of a layout.
@@ -29,8 +28,8 @@ _MARK, _STAMP = 1.2345678987654321e287, b"\x5a\xa5\x3c\x12\x69\x96\xc3\x0f"
 class Stream:
     """One topic: the sample of `fields` at each `time` [s] is written as one message of the type `schema`.
 
-    Fields have the same names as in reading: `data`, `wrench.force.z`, `position[0]`; `position` or `position[:]` with
-    (n, k) values fills a whole array. `names` are the joints of a JointState (default joint_0, ...).
+    Fields have the same names as in reading: `data`, `wrench.force.z`, `position[0]`; `position` with (n, k) values
+    fills a whole array. `names` are the joints of a JointState (default joint_0, ...).
     """
 
     topic: str
@@ -41,23 +40,20 @@ class Stream:
 
 
 def write_mcap(path: Path, streams: Sequence[Stream], start_ns: int = 0) -> None:
-    """Write the streams in the order of their times; `start_ns` is the log time of time 0. Raises UsageError."""
+    """Write the streams in the order of their times; `start_ns` is the log time of time 0."""
     from mcap.writer import Writer
 
-    topics = [stream.topic for stream in streams]
-    if len(set(topics)) != len(topics):
-        raise UsageError(f"{path}: several streams have the same topic: {', '.join(topics)}", "one stream per topic")
     stamps = [start_ns + np.rint(stream.time * _SECOND).astype(np.int64) for stream in streams]
     messages = [_messages(stream, own) for stream, own in zip(streams, stamps, strict=True)]
     with path.open("wb") as file:
         writer: Any = Writer(file)
         writer.start(profile="ros2", library="cdtool")
         names = dict.fromkeys(stream.schema for stream in streams)
-        schemas = {name: writer.register_schema(name, "ros2msg", DEFINITIONS[name].text.encode()) for name in names}
+        schemas = {name: writer.register_schema(name, "ros2msg", DEFINITIONS[name].encode()) for name in names}
         channels: dict[int, int] = {}
         for which, index, stamp in merged(stamps):
             if which not in channels:
-                channels[which] = writer.register_channel(topics[which], "cdr", schemas[streams[which].schema])
+                channels[which] = writer.register_channel(streams[which].topic, "cdr", schemas[streams[which].schema])
             writer.add_message(channels[which], stamp, messages[which][index].tobytes(), stamp, index)
         writer.finish()
 
@@ -74,26 +70,22 @@ def _messages(stream: Stream, stamps: npt.NDArray[np.int64]) -> npt.NDArray[np.u
     """Return the message of each sample in CDR (n, bytes)."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    definition = DEFINITIONS.get(stream.schema)
-    if definition is None:
-        raise UsageError(f"{stream.topic}: unknown message type '{stream.schema}'", nearest(stream.schema, DEFINITIONS))
-    fields = _grouped(stream, definition)
     store = get_typestore(Stores.EMPTY)
-    store.register(get_types_from_msg(definition.text, stream.schema))
+    store.register(get_types_from_msg(DEFINITIONS[stream.schema], stream.schema))
     message = _of_zeros(store, stream.schema)
-    if definition.header:
-        message.header.stamp.sec, message.header.stamp.nanosec = struct.unpack("<iI", _STAMP)
     columns: list[tuple[bytes, npt.NDArray[Any]]] = []
-    for name, values in fields.items():
+    width = 0
+    for name, values in _grouped(stream.fields).items():
         table = np.atleast_2d(values.T)
+        width = max(width, len(table))
         marks = _MARK * (1.0 + 1e-9 * (len(columns) + np.arange(len(table))))
         columns += [(mark.tobytes(), column.astype("<f8")) for mark, column in zip(marks, table, strict=True)]
         *parents, leaf = name.split(".")
         setattr(reduce(getattr, parents, message), leaf, marks if values.ndim == 2 else float(marks[0]))
-    if "position" in definition.arrays:
-        width = max((values.shape[1] for values in fields.values()), default=0)
+    if hasattr(message, "name"):
         message.name = list(stream.names) or [f"joint_{i}" for i in range(width)]
-    if definition.header:
+    if hasattr(message, "header"):
+        message.header.stamp.sec, message.header.stamp.nanosec = struct.unpack("<iI", _STAMP)
         columns.append((_STAMP, np.column_stack(np.divmod(stamps, _SECOND)).astype("<i4")))
     template = bytes(store.serialize_cdr(message, stream.schema))
     rows = np.tile(np.frombuffer(template, np.uint8), (len(stamps), 1))
@@ -113,36 +105,18 @@ def _of_zeros(store: Any, schema: str) -> Any:
             values[name] = _of_zeros(store, detail)
         elif kind == Nodetype.BASE:
             values[name] = "" if detail[0] == "string" else 0
-        elif detail[0][0] == Nodetype.BASE and detail[0][1][0] != "string":
-            values[name] = np.zeros(detail[1] if kind == Nodetype.ARRAY else 0, detail[0][1][0])
         else:
-            values[name] = []
+            values[name] = np.zeros(detail[1] if kind == Nodetype.ARRAY else 0)
     if schema == "geometry_msgs/msg/Quaternion":
         values["w"] = 1.0  # the default of its definition
     return store.types[schema](**values)
 
 
-def _grouped(stream: Stream, definition: Definition) -> dict[str, FloatArray]:
+def _grouped(fields: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Return the values by field; elements such as `position[0]`, `position[1]` are joined to one (n, k) array."""
     grouped: dict[str, FloatArray] = {}
-    elements: dict[str, dict[int, FloatArray]] = {}
-    for field, values in stream.fields.items():
-        if len(values) != len(stream.time):
-            raise UsageError(
-                f"{stream.topic} {field}: {len(values)} values at {len(stream.time)} times", "one value per time"
-            )
-        name, _, index = field.removesuffix("]").partition("[")
-        if name in definition.arrays and index.isdigit():
-            elements.setdefault(name, {})[int(index)] = values
-        elif name in definition.arrays and index in ("", ":") and values.ndim == 2:
-            grouped[name] = values
-        elif field in definition.numbers and values.ndim == 1:
-            grouped[field] = values
-        else:
-            known = [*definition.numbers, *(f"{array}[:]" for array in definition.arrays)]
-            raise UsageError(f"{stream.topic}: no field '{field}' in {stream.schema}", nearest(field, known))
-    for name, parts in elements.items():
-        if sorted(parts) != list(range(len(parts))):
-            raise UsageError(f"{stream.topic}: elements {sorted(parts)} of '{name}'", "number them from 0 without gaps")
-        grouped[name] = np.column_stack([parts[i] for i in range(len(parts))])
+    for field, values in fields.items():
+        name, is_element, _ = field.partition("[")
+        table = values[:, np.newaxis] if is_element else values
+        grouped[name] = np.column_stack((grouped[name], table)) if name in grouped else table
     return grouped

@@ -21,7 +21,7 @@ from cdtool.formats.columns import as_float64
 from cdtool.formats.messages.batch import Batch
 from cdtool.formats.messages.decoded_batch import MOST_FIELDS, ByteArray, Decoder, IntArray, MessageGroup
 from cdtool.formats.messages.fields import Field, FieldMissingError
-from cdtool.formats.messages.layout import Schema
+from cdtool.formats.messages.layout import Layout
 
 # Layouts that others are compared with: writers have a few, such as one for each length of a varint.
 _MOST_LAYOUTS = 64
@@ -157,17 +157,17 @@ class _Alike(MessageGroup):
 class SchemaDecoder(Decoder):
     """Decoder of messages whose schema defines every field; `walk` reads one of them."""
 
-    schema: Schema
-    walk: Callable[[Schema, bytes], Example]
+    layout: Layout
+    walk: Callable[[Layout, bytes], Example]
     _known: list[Example] = field(default_factory=list)  # of the last batches, the last one first
 
     def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema defines them, not the messages)
         """Return every numeric field except the header's stamp, in schema order; arrays only if they may be short."""
-        return list(islice(self.schema.numeric_names(), MOST_FIELDS))
+        return list(islice(self.layout.numeric_names(), MOST_FIELDS))
 
     def absent(self, field: Field) -> FieldMissingError | None:
         """Return why no message can have a field."""
-        return self.schema.missing(field)
+        return self.layout.missing(field)
 
     def groups(self, batch: Batch) -> tuple[list[MessageGroup], dict[int, str]]:
         """Return the messages that are alike, and the reasons for those that are damaged by row."""
@@ -179,7 +179,7 @@ class SchemaDecoder(Decoder):
         while len(remaining):
             row = int(remaining[0])
             try:
-                example = self.walk(self.schema, batch.payload(row))
+                example = self.walk(self.layout, batch.payload(row))
             except DamagedMessageError as fault:
                 reasons[row], remaining = str(fault), remaining[1:]
                 continue

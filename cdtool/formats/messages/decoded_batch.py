@@ -104,8 +104,18 @@ class Decoder(ABC):
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> DecodedBatch:
         """Decode the wanted fields of all messages; whole arrays with named elements are in the order of `joints`."""
-        groups, reasons = self.wanted_groups(batch, wanted, joints, stamps)
-        n = len(batch)
+        return self._values(len(batch), *self.groups(batch), wanted, joints, stamps)
+
+    def _values(
+        self,
+        n: int,
+        groups: Sequence[MessageGroup],
+        reasons: dict[int, str],
+        wanted: Sequence[Field],
+        joints: Sequence[str],
+        stamps: bool,
+    ) -> DecodedBatch:
+        """Return the wanted fields of the n messages of these groups, and of those that are damaged for a reason."""
         fields = tuple(
             absent_field(n, fault) if (fault := self.absent(each)) else field_values(n, groups, each, joints)
             for each in wanted
@@ -114,16 +124,6 @@ class Decoder(ABC):
         status[list(reasons)] = DAMAGED
         reason = reasons[min(reasons)] if reasons else ""
         return DecodedBatch(fields, status, reason, *(_header_times(n, groups) if stamps else ()))
-
-    def wanted_groups(
-        self,
-        batch: Batch,
-        wanted: Sequence[Field],  # noqa: ARG002
-        joints: Sequence[str],  # noqa: ARG002
-        stamps: bool,  # noqa: ARG002
-    ) -> tuple[list[MessageGroup], dict[int, str]]:
-        """Return the groups of `groups`, or some that hold only what is wanted of the messages."""
-        return self.groups(batch)
 
 
 def absent_field(n: int, fault: FieldMissingError) -> FieldValues:

@@ -6,7 +6,7 @@ The decoder of a channel, by the encodings of its messages and of its schema.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -39,8 +39,8 @@ def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, sche
             from cdtool.formats.messages.sequential import walk_cdr, walk_ros1
 
             is_cdr = message_encoding == "cdr"
-            schema = parse_definitions(schema_name, schema_data, 2 if is_cdr else 1)
-            return SchemaDecoder(schema, walk_cdr if is_cdr else walk_ros1)
+            layout = parse_definitions(schema_name, schema_data, 2 if is_cdr else 1)
+            return SchemaDecoder(layout, walk_cdr if is_cdr else walk_ros1)
         case "protobuf", "protobuf":
             from cdtool.formats.messages.protobuf import protobuf_decoder
 
@@ -85,15 +85,15 @@ class Decoders:
             self._fail(len(batch), str(fault))
             return None
 
+    def contents(self, stream: Stream, batch: Batch) -> list[dict[str, Any]]:
+        """Return the messages that can be decoded, as objects of the field language."""
+        return self.attempt(stream, batch, lambda decoder: decoder.contents(batch)) or []
+
     def element_names(self, stream: Stream, batch: Batch) -> tuple[str, ...] | None:
         """Return the texts of the array `name` of the first decodable message; None if no message is decodable."""
         for row in range(len(batch)):
-            one = batch.rows(slice(row, row + 1))
-            contents = self.attempt(stream, one, lambda decoder, one=one: decoder.contents(one))  # type: ignore[misc]
-            if contents is None:
-                return None
-            if contents:
-                return tuple(element_names(contents[0]))
+            for content in self.contents(stream, batch.rows(slice(row, row + 1))):
+                return tuple(element_names(content))
         return None
 
     def keep(self, decoded: DecodedBatch) -> npt.NDArray[np.bool_]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.messages.batch import Batch
-from cdtool.formats.messages.decoded_batch import MOST_FIELDS, Decoder, MessageGroup, UndecodableError
+from cdtool.formats.messages.decoded_batch import MOST_FIELDS, DecodedBatch, Decoder, MessageGroup, UndecodableError
 from cdtool.formats.messages.fields import (
     STAMPS,
     Field,
@@ -52,14 +52,15 @@ class JsonDecoder(Decoder):
         rows = np.array(list(messages), np.int64)
         return [_Single(rows[k : k + 1], message) for k, message in enumerate(messages.values())], reasons
 
-    def wanted_groups(
-        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool
-    ) -> tuple[list[MessageGroup], dict[int, str]]:
-        """Return all messages as one group, if none needs the rules of the field language."""
+    def decode(
+        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
+    ) -> DecodedBatch:
+        """Decode all messages as one group, if none needs the rules of the field language."""
         try:
-            return [_alike(batch, wanted, joints, stamps)], {}
+            alike = _alike(batch, wanted, joints, stamps)
         except Exception:  # a message that cannot be read, or is not like the first: the field language says which
-            return self.groups(batch)
+            return super().decode(batch, wanted, joints, stamps)
+        return self._values(len(batch), [alike], {}, wanted, joints, stamps)
 
 
 class _Single(MessageGroup):

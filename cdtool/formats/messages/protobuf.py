@@ -17,11 +17,13 @@ from cdtool.base.errors import installing
 from cdtool.formats.messages.alike import DamagedMessageError, Example, SchemaDecoder
 from cdtool.formats.messages.decoded_batch import UndecodableError
 from cdtool.formats.messages.fields import NO_MESSAGE
-from cdtool.formats.messages.layout import Array, Layout, Member, Message, Number, Schema, SchemaError, Tag, TextType
+from cdtool.formats.messages.layout import TEXT, Layout, Member, SchemaError
 
 # FieldDescriptor.TYPE_*: the names of the types by number, and numpy's code of those with a fixed size.
-_TYPES = ("double", "float", "int64", "uint64", "int32", "fixed64", "fixed32", "bool", "string", "group", "message")
-_MORE_TYPES = ("bytes", "uint32", "enum", "sfixed32", "sfixed64", "sint32", "sint64")
+_TYPES = (
+    *("double", "float", "int64", "uint64", "int32", "fixed64", "fixed32", "bool", "string", "group", "message"),
+    *("bytes", "uint32", "enum", "sfixed32", "sfixed64", "sint32", "sint64"),
+)
 _FIXED = {"double": "<f8", "fixed64": "<u8", "sfixed64": "<i8", "float": "<f4", "fixed32": "<u4", "sfixed32": "<i4"}
 # Wire types.
 _VARINT, _EIGHT, _BLOCK, _FOUR = 0, 1, 2, 5
@@ -46,9 +48,7 @@ def protobuf_decoder(name: str, data: bytes) -> SchemaDecoder:
     except Exception as fault:
         reason = " ".join(str(fault).split())[:120]
         raise SchemaError(f"its descriptors do not define '{name}': {reason}") from fault
-    layouts: dict[str, Layout] = {}
-    _add_layout(root, layouts)
-    return SchemaDecoder(Schema(layouts[root.full_name], layouts), walk_protobuf)
+    return SchemaDecoder(_layout(root, {}), walk_protobuf)
 
 
 def _add(files: dict[str, Any], name: str, pool: Any) -> None:
@@ -60,54 +60,47 @@ def _add(files: dict[str, Any], name: str, pool: Any) -> None:
     pool.Add(file)
 
 
-def _add_layout(message: Any, layouts: dict[str, Layout]) -> None:
-    entry = message.GetOptions().map_entry
-    layouts[message.full_name] = Layout(message.full_name, tuple(map(_member, message.fields)), entry)
+def _layout(message: Any, layouts: dict[str, Layout]) -> Layout:
+    if message.full_name in layouts:
+        return layouts[message.full_name]
+    layout = layouts[message.full_name] = Layout(message.full_name, is_entry=message.GetOptions().map_entry)
     for field in message.fields:
-        if field.message_type is not None and field.message_type.full_name not in layouts:
-            _add_layout(field.message_type, layouts)
+        wire = _TYPES[field.type - 1]
+        kind: str | Layout = _FIXED.get(wire, "<i8")[1:]
+        if field.message_type is not None:
+            kind = _layout(field.message_type, layouts)
+        elif wire in ("string", "bytes"):
+            kind = TEXT
+        layout.members.append(Member(field.name, kind, field.is_repeated, descriptor=field))
+    return layout
 
 
-def _member(field: Any) -> Member:
-    wire = (*_TYPES, *_MORE_TYPES)[field.type - 1]
-    kind: Number | TextType | Message = Number(_FIXED.get(wire, "<i8")[1:])
-    if field.message_type is not None:
-        kind = Message(field.message_type.full_name)
-    elif wire in ("string", "bytes"):
-        kind = TextType()
-    oneof = field.containing_oneof
-    others = () if oneof is None else tuple(other.name for other in oneof.fields if other.name != field.name)
-    array = Array() if field.is_repeated else None
-    return Member(field.name, kind, array, Tag(field.number, wire, field.has_presence, others))
-
-
-def walk_protobuf(schema: Schema, payload: bytes) -> Example:
+def walk_protobuf(layout: Layout, payload: bytes) -> Example:
     """Return the layout of a message; raises DamagedMessageError."""
-    walk = _FieldWalk(schema, payload)
-    walk.example.content = walk.empty(schema.root)
-    walk.message(schema.root, walk.example.content, len(payload), 0)
+    walk = _FieldWalk(payload)
+    walk.example.content = walk.empty(layout)
+    walk.message(layout, walk.example.content, len(payload), 0)
     return walk.example
 
 
 class _FieldWalk:
     """A walk over the fields of one message; `at` is the byte that it has reached."""
 
-    def __init__(self, schema: Schema, payload: bytes) -> None:
+    def __init__(self, payload: bytes) -> None:
         self.example = Example(payload)
-        self._schema, self._payload, self._at = schema, payload, 0
+        self._payload, self._at = payload, 0
 
     def empty(self, layout: Layout) -> dict[str, Any]:
         """Return a message without any field."""
         return {member.name: self._absent(member) for member in layout.members}
 
     def _absent(self, member: Member) -> Any:
-        if member.array is not None:
+        if member.array:
             # The entries of a map have no order: none can be selected by number.
-            is_map = isinstance(member.kind, Message) and self._schema.layouts[member.kind.name].entry
-            return {} if is_map else []
-        if isinstance(member.kind, Number):
-            return math.nan if member.tag is None or member.tag.presence else 0
-        return NO_MESSAGE if isinstance(member.kind, Message) else ""
+            return {} if isinstance(member.kind, Layout) and member.kind.is_entry else []
+        if member.is_number:
+            return math.nan if member.descriptor.has_presence else 0
+        return "" if member.kind == TEXT else NO_MESSAGE
 
     def message(self, layout: Layout, content: dict[str, Any], end: int, depth: int) -> None:
         """Read fields up to byte `end` into `content`."""
@@ -117,19 +110,18 @@ class _FieldWalk:
             key = self._varint(end)
             begin, size = self._value(key & 7 if key >> 3 else -1, end)
             member = layout.by_number.get(key >> 3)
-            if member is None or member.tag is None:
+            if member is None:
                 continue
-            for other in member.tag.oneof:
-                content[other] = self._absent(next(each for each in layout.members if each.name == other))
-            if isinstance(member.kind, Number):
-                found = self._numbers(member.tag.wire, member.array is not None, key & 7, begin, size)
-                before = content[member.name] if member.array is not None else None
+            content.update({other.name: self._absent(other) for other in layout.alternatives(member)})
+            if member.is_number:
+                found = self._numbers(_TYPES[member.descriptor.type - 1], member.array, key & 7, begin, size)
+                before = content[member.name] if member.array else None
                 content[member.name] = found[0] if before is None else [*before, *found] if before else found
             elif key & 7 != _BLOCK:
                 raise self._other_type()
-            elif isinstance(member.kind, Message):
-                self._nested(member, self._schema.layouts[member.kind.name], content, begin, size, depth)
-            elif member.array is None:
+            elif isinstance(member.kind, Layout):
+                self._nested(member, member.kind, content, begin, size, depth)
+            elif not member.array:
                 content[member.name] = self._payload[begin : self._at].decode(errors="replace")
             else:
                 content[member.name].append(self._payload[begin : self._at].decode(errors="replace"))
@@ -158,11 +150,11 @@ class _FieldWalk:
         self, member: Member, layout: Layout, content: dict[str, Any], begin: int, size: int, depth: int
     ) -> None:
         inner = content[member.name]
-        if member.array is not None or inner is NO_MESSAGE:
+        if member.array or inner is NO_MESSAGE:
             inner = self.empty(layout)
-            if member.array is None:
+            if not member.array:
                 content[member.name] = inner
-            elif not layout.entry:
+            elif not layout.is_entry:
                 content[member.name].append(inner)
         self._at = begin
         self.message(layout, inner, begin + size, depth + 1)

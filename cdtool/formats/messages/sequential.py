@@ -13,7 +13,7 @@ from typing import Any
 
 from cdtool.formats.messages.alike import DamagedMessageError, Example
 from cdtool.formats.messages.decoded_batch import UndecodableError
-from cdtool.formats.messages.layout import Layout, Member, Message, Number, Schema, TextType
+from cdtool.formats.messages.layout import TEXT, Layout, Member
 
 _HEADER = 4
 PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a multiple of 4
@@ -21,33 +21,33 @@ PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a
 _MOST_MEMBERS = 20_000
 
 
-def walk_cdr(schema: Schema, payload: bytes) -> Example:
+def walk_cdr(layout: Layout, payload: bytes) -> Example:
     """Return the layout of a message; raises DamagedMessageError."""
     if len(payload) < _HEADER or payload[0] or payload[1] > 1:
         raise DamagedMessageError(f"not plain CDR (starts with {payload[:4].hex() or 'nothing'})")
-    walk = _Walk(schema, payload, _HEADER, is_big=not payload[1])
+    walk = _Walk(layout, payload, _HEADER, is_big=not payload[1])
     walk.example.share(0, 2)
     return walk.finished()
 
 
-def walk_ros1(schema: Schema, payload: bytes) -> Example:
+def walk_ros1(layout: Layout, payload: bytes) -> Example:
     """Return the layout of a message; raises DamagedMessageError."""
-    return _Walk(schema, payload, 0, is_big=False).finished()
+    return _Walk(layout, payload, 0, is_big=False).finished()
 
 
 class _Walk:
     """A walk over the members of one message; `at` is the byte that it has reached."""
 
-    def __init__(self, schema: Schema, payload: bytes, header: int, is_big: bool) -> None:
+    def __init__(self, layout: Layout, payload: bytes, header: int, is_big: bool) -> None:
         self.example = Example(payload)
         self.at = header
-        self._schema, self._payload, self._header = schema, payload, header
+        self._layout, self._payload, self._header = layout, payload, header
         self._order, self._code = ("big", ">") if is_big else ("little", "<")
         self._left = _MOST_MEMBERS + len(payload)
 
     def finished(self) -> Example:
         """Walk the whole message; raises DamagedMessageError, or UndecodableError for a schema that is too large."""
-        self.example.content = self._message(self._schema.root)
+        self.example.content = self._message(self._layout)
         over = len(self._payload) - self.at
         if over > (PADDING if self._header else 0):
             raise DamagedMessageError(
@@ -64,17 +64,17 @@ class _Walk:
     def _member(self, member: Member) -> Any:
         self._left -= 1
         if self._left < 0:
-            raise UndecodableError(f"schema '{self._schema.root.name}' is too large")
+            raise UndecodableError(f"schema '{self._layout.name}' is too large")
         kind = member.kind
-        if member.array is None:
-            if isinstance(kind, Number):
-                return self._numbers(kind, 1)[0]
-            return self._text(member) if isinstance(kind, TextType) else self._message(self._schema.layouts[kind.name])
-        count = self._length() if member.array.length is None else member.array.length
-        if isinstance(kind, Number):
+        if not member.array:
+            if isinstance(kind, Layout):
+                return self._message(kind)
+            return self._text(member) if kind == TEXT else self._numbers(kind, 1)[0]
+        count = self._length() if member.length is None else member.length
+        if isinstance(kind, Layout):
+            return self._messages(kind, count)
+        if kind != TEXT:
             return self._numbers(kind, count) if count else range(0)
-        if isinstance(kind, Message):
-            return self._messages(self._schema.layouts[kind.name], count)
         self._check(count)  # every string has at least four bytes
         return [self._text(member) for _ in range(count)]
 
@@ -96,17 +96,18 @@ class _Walk:
         self.at = at
         return self._message(layout)
 
-    def _numbers(self, kind: Number, count: int) -> range:
-        self._align(kind.size)
+    def _numbers(self, kind: str, count: int) -> range:
+        size = int(kind[1:] or 1)  # which is also the alignment
+        self._align(size)
         begin = self.at
-        self._advance(count * kind.size)
-        return self.example.numbers(begin, count, kind.code if kind.code == "?" else self._code + kind.code, kind.size)
+        self._advance(count * size)
+        return self.example.numbers(begin, count, kind if kind == "?" else self._code + kind, size)
 
     def _text(self, member: Member) -> str:
         size = self._length()
         begin = self.at
         self._advance(size)
-        if member.array is not None and member.name == "name":  # it may name the elements of an array
+        if member.array and member.name == "name":  # it may name the elements of an array
             self.example.share(begin, size)
         text = self._payload[begin : self.at]
         return (text.removesuffix(b"\0") if self._header else text).decode(errors="replace")

@@ -26,16 +26,6 @@ from cdtool.recordings.recording import GROUND_TRUTH
 
 # The messages in which the names of other joints are looked for.
 _FIRST = 10
-# A field's values in a batch, and which messages name other joints only. Values are None for an array that has been
-# empty so far, so that its width is unknown; the mask is None if no message names other joints only.
-Values = tuple[FloatArray | None, BoolArray | None]
-
-
-class BatchValues(NamedTuple):
-    """The time stamps [ns] of a batch's messages, and each field's values."""
-
-    stamps: Stamps
-    values: dict[str, Values]
 
 
 class FieldRows(NamedTuple):
@@ -43,11 +33,11 @@ class FieldRows(NamedTuple):
 
     stamps: Stamps
     exact: FloatArray | None
-    values: FloatArray | None
+    values: FloatArray
 
 
 class WantedField:
-    """A wanted field and the counts of its messages so far.
+    """A wanted field, its rows, and the counts of its messages so far.
 
     `found` messages have the field, `elsewhere` name only other joints; `widths` counts the arrays by width.
     """
@@ -57,23 +47,30 @@ class WantedField:
         self.found = self.elsewhere = 0
         self.names: list[str] = []  # of the other joints
         self.widths: Counter[int] = Counter()
-        self.width: int | None = None  # of the first array that is not empty
+        self.rows: list[FieldRows] = []
 
-    def add(self, field_values: FieldValues, whole: BoolArray) -> Values:
-        """Return the values of a batch's decoded messages (`whole`), and count them."""
-        values, other = field_values.values[whole], field_values.state[whole] == OTHER_JOINTS
-        elsewhere = int(np.count_nonzero(other))
-        self.elsewhere += elsewhere
-        self.found += len(values) - elsewhere
-        if field_values.count is None:
-            return values, other if elsewhere else None
-        widths = count_values(field_values.count[whole][~other])
-        self.widths.update(widths)
-        if self.width is None:
-            self.width = next((width for width in widths if width > 0), None)
-        if self.width is not None and values.shape[1:] != (self.width,):
-            values = np.full((len(values), self.width), np.nan)
-        return None if self.width is None else values, other if elsewhere else None
+    def add(self, field_values: FieldValues, whole: BoolArray, stamps: Stamps, exact: FloatArray | None) -> None:
+        """Add a batch, of which the messages `whole` are decoded."""
+        named = whole & (field_values.state != OTHER_JOINTS)
+        found = int(np.count_nonzero(named))
+        self.found += found
+        self.elsewhere += int(np.count_nonzero(whole)) - found
+        rows = slice(None) if found == len(named) else named  # all of them, without a copy
+        if field_values.count is not None:
+            self.widths.update(count_values(field_values.count[rows]))
+        self.rows.append(FieldRows(stamps[rows], None if exact is None else exact[rows], field_values.values[rows]))
+
+    def values(self) -> FloatArray:
+        """Return the values of all rows.
+
+        An array has the width of the first one that is not empty; those of another width are NaN.
+        """
+        shape = (next((width for width in self.widths if width > 0), 1),) if self.field.whole else ()
+        tables = (
+            part.values if part.values.shape[1:] == shape else np.full((len(part.stamps), *shape), np.nan)
+            for part in self.rows
+        )
+        return np.concatenate([np.empty((0, *shape)), *tables])
 
 
 class Topic:
@@ -93,7 +90,6 @@ class Topic:
         self.decoders, self.orders = Decoders(), StampOrders(topic)
         self.first_stamp: int | None = None  # [ns], by the chosen clock
         self.origin = 0  # [ns], the zero of its columns' times
-        self._batches: list[BatchValues] = []
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None  # of fields that every message has
 
     def add(self, stream: Stream, batch: Batch) -> None:
@@ -109,27 +105,16 @@ class Topic:
         stamps: Stamps = batch.log_time if self.clock == "log" else batch.publish_time
         if by_header and decoded.stamps is not None:
             stamps = decoded.stamps
-        stamps = stamps[whole]
-        self.orders.add(stream.id, stamps)
-        if self.first_stamp is None and len(stamps):
-            self.first_stamp = int(stamps[0])
-        values: dict[str, Values] = {}
-        for (text, each), field_values in zip(self.fields.items(), decoded.fields, strict=True):
-            values[text] = each.add(field_values, whole)
+        self.orders.add(stream.id, stamps[whole])
+        if self.first_stamp is None and whole.any():
+            self.first_stamp = int(stamps[whole.argmax()])
+        fields = dict(zip(self.fields, decoded.fields, strict=True))
+        exact = fields[self.exact].values if self.exact else None
+        for text, each in self.fields.items():
+            each.add(fields[text], whole, stamps, exact)
             if each.elsewhere and not each.names:
-                first = batch.rows(slice(_FIRST))
-                contents = self.decoders.attempt(stream, first, lambda decoder, first=first: decoder.contents(first))  # type: ignore[misc]
-                each.names = sorted({name for content in contents or () for name in element_names(content)})
-        self._batches.append(BatchValues(stamps, values))
-
-    def _rows_of(self, decoded: BatchValues, text: str) -> FieldRows:
-        """Return one field of the messages that name its joints."""
-        (values, other), stamps = decoded.values[text], decoded.stamps
-        exact = decoded.values[self.exact][0] if self.exact else None
-        if other is not None:
-            stamps = stamps[~other]
-            values, exact = (None if each is None else each[~other] for each in (values, exact))
-        return FieldRows(stamps, exact, values)
+                contents = self.decoders.contents(stream, batch.rows(slice(_FIRST)))
+                each.names = sorted({name for content in contents for name in element_names(content)})
 
     def _check(self, decoded: DecodedBatch, whole: BoolArray) -> None:
         """Raise RecordingError for the first message without a field or without the header's time stamp.
@@ -155,19 +140,14 @@ class Topic:
         """Return a field as a column in the order of its times, and its findings; raises RecordingError."""
         findings = self._findings(text)
         each, name = self.fields[text], f"{self.topic} {text}"
-        parts = [self._rows_of(batch, text) for batch in self._batches]
-        for batch in self._batches if text != self.exact else ():
-            del batch.values[text]  # so that at most one column exists twice in memory
-        shape = (each.width or 1,) if each.widths else ()
-        tables = (np.full((len(stamps), *shape), np.nan) if part is None else part for stamps, _, part in parts)
-        values = np.concatenate([np.empty((0, *shape)), *tables])
-        is_whole = len(values) == sum(len(batch.stamps) for batch in self._batches)
-        clock = self._clock if is_whole else None
+        values, clock = each.values(), None if each.elsewhere else self._clock
         if clock is None:
-            exact = np.concatenate([part.exact for part in parts if part.exact is not None]) if self.exact else None
-            clock = sort_times(np.concatenate([part.stamps for part in parts]), self.origin, exact)
-        if is_whole:
+            exact = [part.exact for part in each.rows if part.exact is not None]
+            stamps = np.concatenate([part.stamps for part in each.rows])
+            clock = sort_times(stamps, self.origin, np.concatenate(exact) if exact else None)
+        if not each.elsewhere:
             self._clock = clock
+        each.rows = []  # so that at most one column exists twice in memory
         time, order = clock
         findings += rounding_finding(name, rounded_integers(values))
         return Column(name, values if order is None else values[order], time), findings

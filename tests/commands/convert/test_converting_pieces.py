@@ -27,7 +27,7 @@ def shuffled(path: Path) -> Path:
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=2000)
         writer.start()
-        text = DEFINITIONS["std_msgs/msg/Float64"].text.encode()
+        text = DEFINITIONS["std_msgs/msg/Float64"].encode()
         schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", text)
         channels = [writer.register_channel(f"/{name}", "cdr", schema) for name in "ab"]
         for row in order.tolist():

@@ -387,7 +387,7 @@ def test_info_and_convert_take_a_bag_as_any_other_log(tmp_path):
 def test_definitions_of_the_standard_packages_are_known_and_others_are_not():
     from cdtool.formats.bags.rosbag2 import _standard_definition
 
-    assert all(_standard_definition(kind) == DEFINITIONS[kind].text for kind in DEFINITIONS)
-    assert _standard_definition("std_msgs/Float64") == DEFINITIONS[FLOAT].text
+    assert all(_standard_definition(kind) == DEFINITIONS[kind] for kind in DEFINITIONS)
+    assert _standard_definition("std_msgs/Float64") == DEFINITIONS[FLOAT]
     assert _standard_definition("std_msgs/msg/Float32").split() == ["float32", "data"]
     assert _standard_definition("machine_msgs/msg/Axis") == ""

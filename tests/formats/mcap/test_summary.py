@@ -121,7 +121,7 @@ def test_a_file_with_more_messages_than_in_its_summary_is_read_completely(tmp_pa
 
 
 @pytest.mark.parametrize("field", ["start", "end"])
-def test_a_chunk_whose_times_differ_from_its_messages_is_reported(tmp_path, field):
+def test_a_chunk_whose_times_differ_from_the_summary_is_reported(tmp_path, field):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     whole = bytearray(path.read_bytes())
@@ -130,9 +130,7 @@ def test_a_chunk_whose_times_differ_from_its_messages_is_reported(tmp_path, fiel
     path.write_bytes(whole)
     messages, findings, _ = read(path)
     assert messages == sent
-    facts = [fact_of(finding) for finding in findings]
-    assert ("index_disagrees", {"count": 1, "how": "other values"}) in facts
-    assert ("chunk_times_differ", {"chunks": 1}) in facts
+    assert ("index_disagrees", {"count": 1, "how": "other values"}) in [fact_of(finding) for finding in findings]
 
 
 def test_a_damaged_summary_is_reported_and_the_data_are_read_without_it(tmp_path):

@@ -16,22 +16,36 @@ from cdtool.formats.messages.schemas import DEFINITIONS
 START = 1_700_000_000_000_000_000
 
 
+def vectors(*names: str) -> list[str]:
+    return [f"{name}.{axis}" for name in names for axis in "xyz"]
+
+
+# The numbers and the arrays that are filled, by message type.
+FIELDS: dict[str, tuple[list[str], list[str]]] = {
+    "sensor_msgs/msg/JointState": ([], ["position", "velocity", "effort"]),
+    "sensor_msgs/msg/Imu": ([*vectors("orientation", "angular_velocity", "linear_acceleration"), "orientation.w"], []),
+    "geometry_msgs/msg/WrenchStamped": (vectors("wrench.force", "wrench.torque"), []),
+    "std_msgs/msg/Float64": (["data"], []),
+    "std_msgs/msg/Float64MultiArray": ([], ["data"]),
+}
+
+
 def stream_of(schema: str, count: int) -> Stream:
     rng = np.random.default_rng(count)
-    definition = DEFINITIONS[schema]
     time = np.sort(rng.random(count))
-    fields = {name: rng.normal(size=count) for name in definition.numbers}
-    fields |= {name: rng.normal(size=(count, 3)) for name in definition.arrays}
+    numbers, arrays = FIELDS[schema]
+    fields = {name: rng.normal(size=count) for name in numbers}
+    fields |= {name: rng.normal(size=(count, 3)) for name in arrays}
     for values in fields.values():
         values[0] = np.nan
         values[-1] = np.inf
-    return Stream("/topic", schema, time, fields, ("hip", "knee", "größe") if "position" in definition.arrays else ())
+    return Stream("/topic", schema, time, fields, ("hip", "knee", "größe") if "position" in arrays else ())
 
 
 def content(stream: Stream, index: int, stamp: int) -> dict[str, object]:
     """Return one message of a stream as the library's writer takes it."""
     message: dict[str, object] = {"name": list(stream.names)} if stream.names else {}
-    if DEFINITIONS[stream.schema].header:
+    if DEFINITIONS[stream.schema].startswith("std_msgs/Header"):
         message["header"] = {"stamp": dict(zip(("sec", "nanosec"), divmod(stamp, 10**9), strict=True))}
     for name, values in stream.fields.items():
         *parents, leaf = name.split(".")
@@ -45,7 +59,7 @@ def content(stream: Stream, index: int, stamp: int) -> dict[str, object]:
 def encoded_one_by_one(stream: Stream) -> list[bytes]:
     file = BytesIO()
     writer = Writer(file)
-    schema = writer.register_msgdef(stream.schema, DEFINITIONS[stream.schema].text)
+    schema = writer.register_msgdef(stream.schema, DEFINITIONS[stream.schema])
     for index, stamp in enumerate((START + np.rint(stream.time * 1e9).astype(np.int64)).tolist()):
         writer.write_message("/topic", schema, content(stream, index, stamp), stamp, stamp, index)
     writer.finish()
