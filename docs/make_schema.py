@@ -1,4 +1,4 @@
-"""Make docs/results.schema.json: python docs/make_schema.py"""
+"""Make docs/results.schema.json, and the schemas of files that people write: python docs/make_schema.py"""
 
 from __future__ import annotations
 
@@ -10,15 +10,23 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from cdtool.base.files.strict_json import strict_json
+from cdtool.commands.schema.json_schema import KINDS, schema_of
 from cdtool.results.results import SCHEMA_VERSION, Results
 
 FILE = Path(__file__).with_name("results.schema.json")
+WRITTEN = {kind: FILE.with_name(f"{kind}.schema.json") for kind in KINDS}
 TYPES = {str: "string", float: "number", int: "integer", bool: "boolean"}
 
 
 def schema_text() -> str:
     """The file's content."""
     return json.dumps(results_schema(), indent=1) + "\n"
+
+
+def written_text(kind: str) -> str:
+    """The schema of a machine, benchmark or protocol file, as `cdtool schema` prints it."""
+    return strict_json(schema_of(kind)) + "\n"
 
 
 def results_schema() -> dict[str, Any]:
@@ -72,3 +80,5 @@ def _schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
 
 if __name__ == "__main__":
     FILE.write_text(schema_text(), encoding="utf-8")
+    for kind, file in WRITTEN.items():
+        file.write_text(written_text(kind), encoding="utf-8")

@@ -113,6 +113,7 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "study sensors": _ALWAYS,
     "study figures": _ALWAYS,
     "list": _CAN_LOSE,
+    "schema": _ALWAYS,
 }
 """The statuses with which each command can exit, apart from an interruption; shown in its --help."""
 

@@ -46,6 +46,7 @@ COMMANDS: Mapping[str, str] = {
     "recover": "cdtool.commands.convert.recover_command:recover",
     "list": "cdtool.commands.list_known.command:list_known",
     "signature": "cdtool.commands.signature.command:signature",
+    "schema": "cdtool.commands.schema.command:schema",
     "store": "cdtool.commands.store.command:store",
     "simulate": "cdtool.commands.simulate.command:simulate",
     "study": "cdtool.commands.study.command:study",

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from cdtool.base.errors import ConfigurationError, OutputError
 from cdtool.base.files.writing import replaced_folder
@@ -64,6 +64,8 @@ class InjectedGroups:
     """The groups of [inject], a `MadeGroups` of a benchmark file."""
 
     section: InjectSection
+
+    table: ClassVar[type[InjectTable]] = InjectTable
 
     @classmethod
     def read(

@@ -10,7 +10,7 @@ from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import plain
 from cdtool.commands.protocol.assessment.protocol import Protocol
 from cdtool.commands.protocol.document.names import protocol_names
-from cdtool.commands.protocol.protocol_file import has_protocol, read_protocol_file
+from cdtool.commands.protocol.protocol_file import ProtocolTable, has_protocol, read_protocol_file
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.results.evaluated import Evaluated
@@ -22,6 +22,8 @@ class ProtocolOfBenchmark:
     `given` is the protocol file; None: [protocol] of the benchmark file. Raises UsageError for a protocol without a
     file, or a file without a protocol to write. With `force` a file that cdtool did not write is replaced.
     """
+
+    table = ProtocolTable
 
     def __init__(self, benchmark: Path, given: Path | None, outputs: Sequence[Path], force: bool) -> None:
         self._force = force

@@ -63,6 +63,11 @@ class ModelTable:
 
     parts: ClassVar[dict[str, type[Any]]] = _PARTS
 
+    @staticmethod
+    def tables() -> dict[str, type[Any]]:
+        """Return the model of each section by its name."""
+        return _SECTIONS
+
     @classmethod
     def read(cls, table: Mapping[str, Any], joints: int, place: Place) -> ModelTable:
         """Return [model], with the mistakes in `place`; a number is that of all joints, or a list has one for each."""
