@@ -307,7 +307,7 @@ def _join(path: Path, tables: list[_Sheet], wanted: ChannelMap | None) -> Source
     missing = [key for key in keys if key not in columns]
     if wanted is not None and missing:
         raise RecordingError(f"column '{missing[0]}' has cells that are not numbers", "see cdtool info")
-    origin = common_origin([] if start else [clock for clock, _ in clock_of.values()])
+    origin = common_origin({} if start else {key: clock for key, (clock, _) in clock_of.items()}, findings)
     times = {key: clock.times(0, count, origin) for key, (clock, count) in clock_of.items()}
     shown = {key: replace(column, name=key, time=times.get(key)) for key, column in columns.items() if key in {*keys}}
     return Source(path, Xlsx.name, shown, start or float(origin), tuple(findings), names=names)

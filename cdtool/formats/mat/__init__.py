@@ -134,7 +134,7 @@ class _Reader:
         read = ((name, self._values(name, self._layout.columns[name])) for name in names)
         stamps = {name: raw for name, raw in read if raw is not None and len(raw)}
         clocks = {name: self._clock(name, raw) for name, raw in stamps.items()}
-        origin = common_origin(clocks.values())
+        origin = common_origin(clocks, self.findings)
         self.origin = float(origin)
         return {name: clock.times(0, len(stamps[name]), origin) for name, clock in clocks.items()}
 
