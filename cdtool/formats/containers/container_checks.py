@@ -9,16 +9,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy.typing as npt
-
-from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError, RecordingError, installing
 from cdtool.base.findings import Finding, Severity
-from cdtool.formats.columns import as_float64
 
 # A file that unpacks to more than this many bytes and to more than this multiple of its own size is refused.
 _FREE, _RATIO = 256 * 2**20, 200
-_LARGEST_EXACT = 2**53
 _MOST_MESSAGES = 5
 # HDF5 filters that do not compress: shuffle, Fletcher32 checksum.
 _FILTERS_WITHOUT_COMPRESSION = (2, 3)
@@ -64,15 +59,6 @@ def one_line_errors(kind: str) -> Iterator[None]:
     except Exception as fault:  # damaged bytes cause errors of any type
         reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
         raise RecordingError(f"damaged or not {kind}: {reason}", "copy or save it again") from fault
-
-
-def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> FloatArray:
-    """Return integers, booleans or floats as float64; add a finding if float64 cannot represent all integers."""
-    if values.dtype.kind in "iu" and values.size:
-        largest = max(abs(int(values.min())), abs(int(values.max())))
-        if largest > _LARGEST_EXACT:
-            findings.append(Finding("rounded_column", name))
-    return as_float64(values)
 
 
 def left_out_finding(name: str, kind: str) -> Finding:
