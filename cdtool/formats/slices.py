@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -18,7 +18,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
-from cdtool.formats.column_names import requested_keys
+from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.columns import Categories, Column, Piece, as_float64
 from cdtool.formats.containers.container_checks import check_size, left_out_finding
 from cdtool.formats.epoch_clock import EpochClock, common_origin
@@ -58,6 +58,11 @@ class Container:
     details: dict[str, str] = field(default_factory=dict)
     origin: float = 0.0
 
+    @property
+    def has_own_clocks(self) -> bool:
+        """Return whether its columns have its own clocks: a clock that a machine file names is that of all columns."""
+        return self.wanted is None or self.wanted.time.column == OWN_CLOCK
+
     def leave_out(self, column: str, kind: str) -> None:
         """Add the note on a column that is left out because its values are not numbers."""
         self.findings.append(left_out_finding(column, kind))
@@ -76,7 +81,7 @@ class SlicedFormat(PiecewiseFormat):
         container = Container(path, wanted)
         with self._open(container):
             names = tuple(container.columns)
-            keys = [key for key in requested_keys(wanted, names) if some is None or key in some]
+            keys = requested_keys(wanted, names)
             opened = {key: container.columns[key]() for key in keys}
             columns = {key: column for key, column in opened.items() if column is not None}
             if wanted is not None and len(columns) < len(keys):
@@ -84,9 +89,12 @@ class SlicedFormat(PiecewiseFormat):
                 raise RecordingError(f"column '{left_out}' is not numeric", "map another column")
             if not columns:
                 raise RecordingError("has no column of numbers", "see cdtool info")
-            check_size(path, sum(column.rows for column in columns.values()))
+            if not container.has_own_clocks:
+                columns = {key: replace(column, clock=None) for key, column in columns.items()}
             clocks = {key: column.clock for key, column in columns.items() if column.clock is not None}
             origin = common_origin(clocks, container.findings)
+            columns = {key: column for key, column in columns.items() if some is None or key in some}
+            check_size(path, sum(column.rows for column in columns.values()))
             rounded = Counter[str]()
             yield from _interleave(columns, origin, container.findings, rounded)
             container.findings += [note for key in columns for note in rounding_finding(key, rounded[key])]

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 import cdtool
 from cdtool.formats.channels.reading import read_recording, survey
-from cdtool.formats.containers.hdf5 import Packing, times_since
+from cdtool.formats.containers.hdf5 import Hdf5, Packing, times_since
 from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.machine_file import read_machine_file
+from cdtool.formats.pieces import join_pieces
 from tests.base.findings.facts import fact_of
 
 h5py = pytest.importorskip("h5py")
@@ -233,3 +234,15 @@ def test_missing_first_stamps_hide_no_epoch(saved):
     stamps[0] = -1
     source = survey(saved(time=(stamps, {"unit": "ms", "_FillValue": np.int64(-1)}), q=(np.arange(9.0), {})))
     assert source.origin == 1_700_000_000.001 and source.columns["q"].time[1:3].tolist() == [0.0, 0.001]
+
+
+def test_some_columns_are_read_in_pieces_at_the_times_that_they_have_among_all(saved):
+    path = saved(
+        a__time=(1_700_000_000_000 + np.arange(9), {"unit": "ms"}),
+        a__q=(np.arange(9.0), {}),
+        b__time=(1_700_000_002_000 + np.arange(9), {"unit": "ms"}),
+        b__f=(np.arange(9.0), {}),
+    )
+    source = join_pieces(Hdf5().pieces(path, {"b/f"}), sort=False)
+    assert list(source.columns) == ["b/f"] and source.origin == 1.7e9
+    assert source.columns["b/f"].time[0] == 2.0
