@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from io import StringIO
 from os import SEEK_CUR
 from pathlib import Path
@@ -91,27 +91,22 @@ class _EndCheck:
 
 
 def _check_formats(path: Path, pyulog: Any) -> None:
-    """Raise RecordingError if a message has more fields than any of PX4; messages inside of messages multiply them."""
+    """Raise RecordingError if a message has more fields than any of PX4; messages inside of messages multiply them.
+
+    Raises RecursionError if a message contains itself.
+    """
     with path.open("rb") as file:
         header = pyulog.ULog(_EndCheck(file), parse_header_only=True)
     formats: Mapping[str, Any] = header.message_formats
-    known: dict[str, int] = {}
 
-    def count(name: str, inside: tuple[str, ...]) -> int:
-        if name in inside or len(inside) > _MOST_FIELDS:
-            raise RecordingError(f"damaged: message '{name}' contains itself", "copy it again")
-        if name not in known:
-            sizes = (
-                max(1, size) * (count(kind, (*inside, name)) if kind in formats else 1)
-                for kind, size, _ in formats[name].fields
-            )
-            known[name] = sum(sizes)
-        if known[name] > _MOST_FIELDS:
-            raise RecordingError(f"message '{name}' has more than {_MOST_FIELDS} fields: refused", "is it a log?")
-        return known[name]
+    @cache
+    def count(name: str) -> int:
+        fields = formats[name].fields
+        return sum(max(1, size) * (count(kind) if kind in formats else 1) for kind, size, _ in fields)
 
-    for name in formats:
-        count(name, ())
+    widest = max(formats, key=count, default="")
+    if widest and count(widest) > _MOST_FIELDS:
+        raise RecordingError(f"message '{widest}' has more than {_MOST_FIELDS} fields: refused", "is it a log?")
 
 
 def _losses(log: Any, ends: _EndCheck) -> list[Finding]:
