@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -42,6 +43,16 @@ class SlicedColumn:
     clock: EpochClock | None = None
     unit: str | None = None
     categories: Categories | None = None
+
+    @classmethod
+    def of(cls, values: Any, clock: EpochClock | None, unit: str | None = None) -> SlicedColumn:
+        """Return a column of values (n,) in memory, or of a library's object that is sliced like them."""
+        return cls(len(values), partial(rows_of, values), clock, unit)
+
+
+def rows_of(values: Any, start: int, end: int) -> Any:
+    """Return the rows from `start` to before `end`."""
+    return values[start:end]
 
 
 @dataclass

@@ -23,7 +23,7 @@ from cdtool.formats.columns import Column
 from cdtool.formats.containers.container_checks import library, messages_of, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, with_plausible_unit
 from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys
-from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
+from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat, rows_of
 from cdtool.recordings.units import find_unit
 
 _MAGIC = b"TDSm"
@@ -98,13 +98,13 @@ def _column(
     channel: Any, channels: Sequence[Any], waveform_of: Callable[..., EpochClock], clock_of: Callable[..., Any]
 ) -> SlicedColumn:
     """Return a channel as a column, with the clock of its waveform or of the channel of times in its group."""
-    rows, step = len(channel), _step(channel)
+    step = _step(channel)
     if step is not None:
         offset = float(channel.properties.get("wf_start_offset", 0.0))
-        return SlicedColumn(rows, partial(_raw, channel), waveform_of(_start(channel), offset, step), _unit(channel))
-    beside = [other for other in channels if other.group_name == channel.group_name and len(other) >= rows]
+        return SlicedColumn.of(channel, waveform_of(_start(channel), offset, step), _unit(channel))
+    beside = [other for other in channels if other.group_name == channel.group_name and len(other) >= len(channel)]
     clocks = (clock_of(other) for other in beside if channel.name not in _CLOCK_NAMES)
-    return SlicedColumn(rows, partial(_raw, channel), next(filter(None, clocks), None), _unit(channel))
+    return SlicedColumn.of(channel, next(filter(None, clocks), None), _unit(channel))
 
 
 def _waveform(start: Fraction | None, offset: float, step: float) -> EpochClock:
@@ -117,12 +117,8 @@ def _stated_clock(container: Container, channel: Any) -> EpochClock | None:
     unit = find_unit(stated)
     if channel.name not in _CLOCK_NAMES or unit is None or unit.si != "s":
         return None
-    clock = EpochClock(partial(_raw, channel), unit.factor)
+    clock = EpochClock(partial(rows_of, channel), unit.factor)
     return with_plausible_unit(clock, stated, container.findings, channel.name)
-
-
-def _raw(channel: Any, start: int, end: int) -> Any:
-    return channel[start:end]
 
 
 def _step(channel: Any) -> float | None:

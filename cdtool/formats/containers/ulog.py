@@ -18,7 +18,7 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.formats.containers.container_checks import library, messages_of, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock
-from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
+from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat, rows_of
 
 _MAGIC = b"ULog\x01\x12\x35"
 _CLOCK, _PADDING = "timestamp", "_padding"
@@ -140,18 +140,13 @@ def _add_topic(container: Container, topic: Any, name: str) -> None:
     if stamps is None or stamps.dtype.kind not in "iu":
         container.leave_out(name, "a topic without time stamps")
         return
-    clock = EpochClock(partial(_rows_of, np.ascontiguousarray(stamps)), 1e-6)
+    clock = EpochClock(partial(rows_of, np.ascontiguousarray(stamps)), 1e-6)
     texts = []
     for field in topic.field_data:
         values = topic.data[field.field_name]
         if field.type_str == "char":
             texts.append(field.field_name.partition("[")[0])
         elif field.field_name != _CLOCK and not field.field_name.rpartition(".")[2].startswith(_PADDING):
-            read = partial(_rows_of, values)
-            container.columns[f"{name}/{field.field_name}"] = partial(SlicedColumn, len(values), read, clock)
+            container.columns[f"{name}/{field.field_name}"] = partial(SlicedColumn.of, values, clock)
     for text in dict.fromkeys(texts):
         container.leave_out(f"{name}/{text}", "a text")
-
-
-def _rows_of(values: Any, start: int, end: int) -> Any:
-    return values[start:end]

@@ -22,7 +22,7 @@ from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
 from cdtool.formats.mat.layout import MatLayout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables
-from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
+from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat, rows_of
 
 # So many single numbers and texts of a file are shown.
 _MOST_DETAILS = 60
@@ -81,13 +81,13 @@ def _column(
     container.findings.append(Finding("days_of_matlab", name, {"start": str(np.datetime64(round(first * 1000), "ms"))}))
     if clock_of is None:
         container.origin = container.origin or first
-    return SlicedColumn(column.rows, lambda start, end: seconds[start:end], clock, "s")
+    return SlicedColumn.of(seconds, clock, "s")
 
 
 def _clock(container: Container, layout: MatLayout, name: str) -> EpochClock:
     stamps = layout.columns[name].values
     if is_datenum(stamps):
-        return EpochClock(lambda start, end: stamps[start:end], DAY_S, Fraction(-DAY_1970 * int(DAY_S)))
+        return EpochClock(partial(rows_of, stamps), DAY_S, Fraction(-DAY_1970 * int(DAY_S)))
     return assumed_clock(name, stamps, container.findings)
 
 
