@@ -24,7 +24,7 @@ import numpy.typing as npt
 from cdtool.base.findings import Finding
 from cdtool.formats.containers.container_checks import library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock
-from cdtool.formats.groups import Group, Parts, WrittenNames, prefix_keys, require_clocks
+from cdtool.formats.groups import Group, Parts, WrittenNames, names_of, prefix_keys, require_clocks
 from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
 from cdtool.recordings.units import find_unit
 
@@ -143,7 +143,6 @@ def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Map
     """Write MDF 4.10: one channel per column with its unit, one group per clock; provenance as the file's comment."""
     asammdf = library("asammdf", "mdf")
     require_clocks(groups)
-    shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with asammdf.MDF(version="4.10") as log:
         # The log's own start, or the epoch: with the time of writing the same log would give different bytes.
         start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=float(provenance.get("origin_s", "0")))
@@ -161,7 +160,4 @@ def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Map
                     log.extend(number, [(values, None) for values in (part.time, *part.flat)])
         with path.open("wb+") as file:  # given a path, asammdf would change the suffix
             log.save(file)
-    return [
-        [[f"{number}/{p.name}" if shared[p.name] > 1 else p.name for p in parts] for parts in group.flat]
-        for number, group in enumerate(groups)
-    ]
+    return names_of(groups, [str(number) for number in range(len(groups))])

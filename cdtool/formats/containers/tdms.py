@@ -22,7 +22,7 @@ from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.columns import Column
 from cdtool.formats.containers.container_checks import library, messages_of, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, with_plausible_unit
-from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys
+from cdtool.formats.groups import Group, Part, Parts, WrittenNames, names_of, prefix_keys
 from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat, rows_of
 from cdtool.recordings.units import find_unit
 
@@ -145,8 +145,6 @@ def _unit(channel: Any) -> str | None:
 def write_tdms(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
     """Write one channel per column with its unit, one group per clock with its `time`, and one segment per part."""
     nptdms = library("nptdms", "tdms")
-    many = len(groups) > 1
-    shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with nptdms.TdmsWriter(str(path)) as writer:
         objects = [nptdms.RootObject(properties=prefix_keys(provenance))]
         objects += [nptdms.GroupObject(group.name) for group in groups]
@@ -154,13 +152,7 @@ def write_tdms(path: Path, groups: Sequence[Group], parts: Parts, provenance: Ma
         for ready in parts:
             rows = [_channel_rows(nptdms, group, part) for group, part in zip(groups, ready, strict=True)]
             writer.write_segment(list(chain(*rows)))
-    return [
-        [
-            [f"{group.name}/{part.name}" if many and shared[part.name] > 1 else part.name for part in parts]
-            for parts in group.flat
-        ]
-        for group in groups
-    ]
+    return names_of(groups, [group.name for group in groups])
 
 
 def _channel_rows(nptdms: Any, group: Group, part: Part | None) -> list[Any]:

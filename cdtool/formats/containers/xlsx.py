@@ -34,8 +34,6 @@ from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
 from cdtool.formats.source import Source
 
 _MAGIC, _WORKBOOK, _SEPARATOR = b"PK\x03\x04", "xl/workbook.xml", "\t"
-# The texts of a workbook are held in memory.
-_MOST_TEXT = 64 * 2**20
 # Excel has at most so many rows; a log has no more columns than this.
 _MOST_ROWS, _MOST_COLUMNS = 1_048_576, 4096
 # A cell with a formula but without a value, and its place in its attributes.
@@ -227,7 +225,7 @@ def _moment(value: Any) -> str:
 def _read_sheets(path: Path, openpyxl: Any, folder: Path) -> list[_Sheet]:
     """Return the sheets of a workbook, their texts in files of a folder; raises RecordingError."""
     with zipfile.ZipFile(path) as archive:
-        _check_archive(path, archive)
+        check_size(path, sum(part.file_size for part in archive.infolist()) // 8)
     sheets = list[_Sheet]()
     with _opened(openpyxl, path) as workbook:
         # Dates as numbers of days, since the library rounds moments to milliseconds.
@@ -262,15 +260,6 @@ def _opened(openpyxl: Any, path: Path) -> Iterator[Any]:
             yield workbook
         finally:
             workbook.close()
-
-
-def _check_archive(path: Path, archive: zipfile.ZipFile) -> None:
-    """Raise RecordingError if the parts of a workbook are far larger than the file."""
-    parts = archive.infolist()
-    check_size(path, sum(part.file_size for part in parts) // 8)
-    for part in parts:
-        if part.filename.endswith("sharedStrings.xml") and part.file_size > _MOST_TEXT:
-            raise RecordingError(f"contains {part.file_size >> 20} MiB of texts: refused", "save it as CSV")
 
 
 @dataclass(frozen=True)
