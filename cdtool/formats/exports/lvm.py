@@ -47,6 +47,7 @@ from cdtool.formats.exports.timed_text import (
     TimedText,
     details_of,
     dialect_of_rows,
+    number_in_head,
 )
 from cdtool.formats.source import Source
 
@@ -127,9 +128,8 @@ class _Head:
 
     def number(self, key: str, column: int, default: float = 0.0) -> float:
         """Return the number that a key states about a channel."""
-        cell = self.cell(key, column)
-        value = number(cell, "," if "," in cell else ".")  # whatever the decimal mark of the rows is
-        return value if value is not None and np.isfinite(value) else default
+        value = number_in_head(self.cell(key, column))
+        return default if value is None else value
 
     def samples(self, column: int, default: int = 0) -> int:
         """Return how many samples of a channel are stated."""
@@ -309,7 +309,7 @@ def _groups(
             findings.append(Finding("derived_times", "", {"channels": tuple(columns)}))
             start = (offset - offsets[lead] - absolute if absolute else offset) + first - head.number("X0", lead)
             clock, times = 0, partial(_derived, rows, of_packet or rows, step - head.number("Delta_X", lead), start)
-        yield ClockGroup([*columns], clock, times, sparse=True)
+        yield ClockGroup(columns, clock, times, sparse=True)
 
 
 def _counted(rows: int, samples: int, step: float, start: float, numbers: npt.NDArray[Any]) -> FloatArray:

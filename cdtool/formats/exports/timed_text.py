@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,26 +20,25 @@ from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.columns import Column
-from cdtool.formats.csv.cell_values import RequestedColumns
-from cdtool.formats.csv.cells import SEPARATORS, kind
+from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
+from cdtool.formats.csv.cells import SEPARATORS, kind, number
 from cdtool.formats.csv.rows import RowReader
-from cdtool.formats.csv.table import read_table
 from cdtool.formats.csv.text import Text
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.source import Source
 
 # No recording has more columns; each row may be completed with as many empty cells.
 _MOST_COLUMNS = 1 << 14
-
 # A clock's step may differ from the stated period by this share of it.
 _SAME_PERIOD = 0.01
 
 
 @dataclass(frozen=True)
 class ClockGroup:
-    """Columns that share a clock, by name.
+    """Columns that share a clock. `columns`: their names, with the number of the column in the table.
 
     `times` returns the times [s] of all rows from the cells (n,) of the column `clock`, or without one from the numbers
     of the rows; NaN is no time. `ticks`: these cells are integers with more digits than float64 can represent,
@@ -48,7 +46,7 @@ class ClockGroup:
     the one before is no sample either. `period` [s] is the period that the head states (0: none).
     """
 
-    columns: Sequence[str]
+    columns: Mapping[str, int]
     clock: int | None
     times: Callable[[npt.NDArray[Any]], FloatArray]
     ticks: bool = False
@@ -57,32 +55,33 @@ class ClockGroup:
     period: float = 0.0
 
     def samples(
-        self, table: Mapping[str, FloatArray], stamps: npt.NDArray[Any], findings: list[Finding]
+        self, cells: Mapping[int, npt.NDArray[Any]], rows: int, findings: list[Finding]
     ) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Return times and values of the columns that are in the table; the findings on them are added."""
-        values = {key: table[key] for key in self.columns if key in table}
-        if not values:
-            return {}
+        """Return times and values of the columns of which there are `cells`; the findings on them are added."""
+        values = {key: cells[column] for key, column in self.columns.items() if column in cells}
         with np.errstate(over="ignore", invalid="ignore"):  # of damaged stamps, which are then no times
-            time = self.times(stamps)
+            time = self.times(np.arange(rows) if self.clock is None else cells[self.clock])
         timed = np.isfinite(time)
         untimed = {key: int(np.count_nonzero(np.isfinite(column[~timed]))) for key, column in values.items()}
         findings += [Finding("values_without_time", key, {"count": count}) for key, count in untimed.items() if count]
-        if self.sparse:
+        if self.sparse and values:
             timed &= np.logical_or.reduce([np.isfinite(column) for column in values.values()])
         time, values = time[timed], {key: column[timed] for key, column in values.items()}
-        if self.held:
+        if self.held and values:
             new = np.full(len(time), False)
             for column in (time, *values.values()):
                 new[1:] |= (column[1:] != column[:-1]) & ~(np.isnan(column[1:]) & np.isnan(column[:-1]))
             new[:1] = True
-            if count := int(np.count_nonzero(~new)):
-                findings.append(Finding("repeated_rows", self.columns[0], {"count": count}))
+            if not new.all():
+                count = int(np.count_nonzero(~new))
+                findings.append(Finding("repeated_rows", next(iter(values)), {"count": count}))
             time, values = time[new], {key: column[new] for key, column in values.items()}
         step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-        if self.period and step and abs(step / self.period - 1.0) > _SAME_PERIOD:
+        if values and self.period and step and abs(step / self.period - 1.0) > _SAME_PERIOD:
             fact = {"stated": self.period, "step": step}
-            findings.append(Finding("stated_period_differs", self.columns[0], fact))
+            findings.append(Finding("stated_period_differs", next(iter(values)), fact))
+        for key, column in values.items():
+            findings += rounding_finding(key, rounded_integers(column))
         return {key: (time, column) for key, column in values.items()}
 
 
@@ -91,47 +90,45 @@ class Segment:
     """Rows below a head: their dialect, the channels by clock, and how many rows the head states (0: none)."""
 
     dialect: Dialect
-    groups: Sequence[ClockGroup]
+    groups: tuple[ClockGroup, ...]
     stated: int = 0
 
     def read(
-        self, keys: Collection[str], wanted: ChannelMap | None, findings: list[Finding]
-    ) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Return times and values of those channels `keys` that have numbers; findings are added.
+        self, keys: Collection[str], survey: bool, findings: list[Finding]
+    ) -> tuple[dict[str, tuple[FloatArray, FloatArray]], set[str]]:
+        """Return times and values of the channels `keys`, and which of these are left out; findings are added.
 
-        Raises RecordingError if a line cannot be read, or the words are those of a clock or, with a map, of a channel.
+        Raises RecordingError if a line cannot be read, the words are those of a clock, or, without `survey`, those of a
+        channel.
         """
-        names = self.dialect.names
-        groups = [replace(each, columns=[key for key in each.columns if key in keys]) for each in self.groups]
-        groups = [group for group in groups if group.columns]
-        if not groups:
-            return {}
-        clocks = [group.clock for group in groups if group.clock is not None and not group.ticks]
-        asked = {*chain(*(group.columns for group in groups)), *(names[clock] for clock in clocks)}
-        table = read_table(self.dialect, asked, wanted=wanted)
-        findings += table.findings
-        for clock in clocks:
-            if names[clock] not in table.values:
-                raise RecordingError(f"column {clock} has words, but is the clock of a channel", "repair the file")
-        count = len(next(iter(table.values.values())))
-        if count < self.stated:
-            cut = {"line": self.dialect.first_line, "stated": self.stated, "rows": count}
-            findings.append(Finding("segment_cut_off", "", cut))
-        stamps: dict[int | None, npt.NDArray[Any]] = {clock: table.values[names[clock]] for clock in clocks}
-        stamps |= self._ticks([group.clock for group in groups if group.clock is not None and group.ticks], count)
-        stamps[None] = np.arange(count)
-        return {
-            key: both
-            for group in groups
-            for key, both in group.samples(table.values, stamps[group.clock], findings).items()
+        dialect = self.dialect
+        asked = [replace(each, columns={k: at for k, at in each.columns.items() if k in keys}) for each in self.groups]
+        groups = [group for group in asked if group.columns]
+        columns = {key: at for group in groups for key, at in group.columns.items()}
+        worded = {
+            at: not_numeric(key, dialect.words[at].line, dialect.words[at].text)
+            for key, at in columns.items()
+            if survey and at in dialect.words
         }
-
-    def _ticks(self, columns: Sequence[int], rows: int) -> dict[int | None, npt.NDArray[Any]]:
-        """Return columns of large integers, which are read once more."""
-        if not columns:
-            return {}
-        blocks = [*RowReader(self.dialect, RequestedColumns((), whole=columns), survey=True).pieces()]
-        return {column: np.concatenate([block.whole[column] for block in blocks])[:rows] for column in columns}
+        clocks = {group.clock for group in groups if group.clock is not None and not group.ticks}
+        numeric = sorted({*columns.values()} - worded.keys() | clocks)
+        ticks = sorted({group.clock for group in groups if group.clock is not None and group.ticks})
+        reader = RowReader(dialect, RequestedColumns(numeric, left_out=worded, whole=ticks), survey)
+        blocks = [*reader.pieces()]
+        findings += reader.findings
+        read, lost = reader.values.numeric, {*numeric} - {*reader.values.numeric} | worded.keys()
+        for column in sorted(lost & clocks):
+            raise RecordingError(str(reader.values.left_out[column]), "it is the clock of a channel")
+        cells: dict[int, npt.NDArray[Any]] = {
+            **{column: np.concatenate([rows.numbers[column] for rows in blocks]) for column in read},
+            **{column: np.concatenate([rows.whole[column] for rows in blocks]) for column in ticks},
+        }
+        count = reader.lines.rows
+        samples = {key: both for group in groups for key, both in group.samples(cells, count, findings).items()}
+        if count < self.stated:
+            cut = {"line": dialect.first_line, "stated": self.stated, "rows": count}
+            findings.append(Finding("segment_cut_off", "", cut))
+        return samples, {key for key, at in columns.items() if at in lost}
 
 
 @dataclass(frozen=True)
@@ -150,8 +147,8 @@ class TimedText:
         findings, left_out = [*self.findings], set[str]()
         parts: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
         for each in self.segments:
-            samples = each.read(keys, wanted, findings)
-            left_out |= {key for group in each.groups for key in group.columns} - samples.keys()
+            samples, words = each.read(keys, wanted is None, findings)
+            left_out |= words
             for key, both in samples.items():
                 parts.setdefault(key, []).append(both)
         columns: dict[str, Column] = {}
@@ -204,6 +201,12 @@ def dialect_of_rows(
         words=words,
         short_rows=True,
     )
+
+
+def number_in_head(cell: str) -> float | None:
+    """Return a number of the head, whose decimal mark may not be that of the rows; None for any other cell."""
+    value = number(cell, "," if "," in cell else ".") if cell else None
+    return value if value is not None and np.isfinite(value) else None
 
 
 def details_of(text: Text, separator: str, decimal: str) -> dict[str, str]:

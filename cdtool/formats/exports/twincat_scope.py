@@ -27,7 +27,7 @@ from cdtool.base.errors import RecordingError, naming
 from cdtool.base.plain_text import counted
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.cells import kind, number, split_line
+from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text, open_table
 from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.csv_dialect.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
@@ -37,6 +37,7 @@ from cdtool.formats.exports.timed_text import (
     TimedText,
     details_of,
     dialect_of_rows,
+    number_in_head,
 )
 from cdtool.formats.source import Source
 
@@ -134,7 +135,7 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     named = [columns.get(at, "") for at in range(width)]
     dialect = dialect_of_rows(text, pins, (head.separator, decimal), (head.line, head.start), named, head.rows)
     ticks = [int(row[at]) for row in head.rows for at in clocks if _is_tick(row, at)]
-    first, groups, units = min(ticks, default=0), list[ClockGroup](), dict[str, str | None]()
+    first, groups = min(ticks, default=0), list[ClockGroup]()
 
     def times(stamps: npt.NDArray[Any]) -> FloatArray:
         # The difference of ticks is exact before it is rounded; missing ones are negative.
@@ -142,15 +143,16 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
 
     for at, end in zip(clocks, [*clocks[1:], width], strict=True):
         members = {columns[i]: i for i in range(at + 1, end) if i in columns}
+        stated = {number_in_head(head.cell((_PERIOD, "SampleTime"), i)) or 0.0 for i in members.values()}
+        period = max(stated.pop() / 1000.0, 0.0) if len(stated) == 1 else 0.0
         if members:
-            stated = {number(head.cell((_PERIOD, "SampleTime"), i).replace(",", "."), ".") for i in members.values()}
-            period = (stated.pop() or 0.0) / 1000.0 if len(stated) == 1 else 0.0
-            groups.append(ClockGroup([*members], at, times, ticks=bool(ticks), held=True, period=period))
-            units |= {key: _unit(head.cell((_UNIT,), i)) for key, i in members.items()}
+            groups.append(ClockGroup(members, at, times, ticks=bool(ticks), held=True, period=period))
     details = details_of(text, head.separator, decimal) | {
         "times": "FILETIME" if ticks else "ms since the start of the export",
         "columns of times": str(len(groups)),
     }
+    of_groups = {key: at for group in groups for key, at in group.columns.items()}
+    units = {key: _unit(head.cell((_UNIT,), at)) for key, at in of_groups.items()}
     origin = (first - _TICKS_1970) / _TICKS_PER_S if ticks else _start(head)
     return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, ())
 
