@@ -5,7 +5,7 @@ Nanoseconds since 1970 have 19 digits and float64 has 16, so that only their dif
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -19,34 +19,46 @@ from cdtool.formats.columns import as_float64
 from cdtool.recordings.clock import EPOCH
 from cdtool.recordings.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
 
+# The first stamps may be missing: so many are searched.
+_SEARCHED = 1000
+
 
 @dataclass(frozen=True)
 class EpochClock:
     """The stamps of a file: `read(start, end)` returns them without conversion, integers as integers.
 
-    A stamp is a multiple of `factor` [s], counted from `base` [s] after 1970 or after an unknown start. Stamps that are
-    equal to one of `missing` are missing.
+    A stamp is a multiple of `factor` [s], counted from `base` [s] after 1970 (`dated`) or after an unknown start.
+    Stamps that are equal to one of `missing` are missing.
     """
 
     read: Callable[[int, int], npt.NDArray[Any]]
     factor: float
     base: Fraction = Fraction(0)
     missing: tuple[float, ...] = ()
+    dated: bool = False
     first: Fraction | None = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "first", _exact(self.read(0, 1)[0]))
+        stamps = (stamp for stamp in self.read(0, _SEARCHED) if np.isfinite(stamp) and stamp not in self.missing)
+        first = next(stamps, None)
+        exact = int(first) if isinstance(first, np.integer) else None if first is None else float(first)
+        object.__setattr__(self, "first", None if exact is None else Fraction(exact))
 
     @property
     def start(self) -> Fraction | None:
-        """Return the first stamp [s] without rounding; None if it is not a finite number."""
+        """Return the first stamp [s] without rounding; None if the first ones are not finite numbers."""
         return None if self.first is None else self.base + self.first * _decimal(self.factor)
 
+    @property
+    def is_since_1970(self) -> bool:
+        """Return whether the stamps are known to count from 1970."""
+        return self.start is not None and (self.dated or self.start > EPOCH)
+
     def times(self, start: int, end: int, origin: Fraction) -> FloatArray:
-        """Return times [s] after `origin`; NaN where the stamp is missing."""
+        """Return times [s] after `origin` if the stamps count from 1970; NaN where the stamp is missing."""
         raw = self.read(start, end)
-        if not origin or self.start is None:
-            times = as_float64(raw) * self.factor + float(self.base - origin)
+        if self.start is None or not self.is_since_1970:
+            times = as_float64(raw) * self.factor + float(self.base)
         else:
             times = _since(raw, self.first or Fraction(0)) * self.factor + float(self.start - origin)
         if self.missing:
@@ -70,11 +82,16 @@ def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding],
     return EpochClock(clock.read, SECONDS[meant], missing=clock.missing)
 
 
-def common_origin(clocks: Iterable[EpochClock]) -> Fraction:
-    """Return the earliest first stamp [s], to be subtracted, if all clocks count from an epoch; 0 otherwise."""
-    starts = [clock.start for clock in clocks if clock.start is not None]
-    earliest = min(starts, default=Fraction(0))
-    return earliest if earliest > EPOCH else Fraction(0)
+def common_origin(clocks: Mapping[str, EpochClock], findings: list[Finding]) -> Fraction:
+    """Return the earliest first stamp [s] of the clocks, by column, that count from 1970; 0 without one.
+
+    It is to be subtracted. The other clocks are assumed to start with it, which is a finding.
+    """
+    starts = [clock.start for clock in clocks.values() if clock.start is not None and clock.is_since_1970]
+    unknown = tuple(column for column, clock in clocks.items() if not clock.is_since_1970)
+    if starts and unknown:
+        findings.append(Finding("no_start_time", "", {"channels": unknown}))
+    return min(starts, default=Fraction(0))
 
 
 def _since(raw: npt.NDArray[Any], first: Fraction) -> FloatArray:
@@ -84,12 +101,6 @@ def _since(raw: npt.NDArray[Any], first: Fraction) -> FloatArray:
     if raw.dtype.kind == "i":
         return (raw.astype(np.int64) - np.int64(int(first))).astype(np.float64)
     return as_float64(raw) - float(first)
-
-
-def _exact(stamp: Any) -> Fraction | None:
-    if isinstance(stamp, np.integer):
-        return Fraction(int(stamp))
-    return Fraction(float(stamp)) if np.isfinite(float(stamp)) else None
 
 
 def _decimal(factor: float) -> Fraction:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 
 # float64 represents every integer up to the first value; 64-bit integers are below the second.
-_EXACT, _WIDEST = 2.0**53, 2.0**64
+_EXACT, _WIDEST = 2**53, 2**64
 
 
-def rounded_integers(values: FloatArray) -> int:
+def rounded_integers(values: npt.NDArray[Any]) -> int:
     """Return how many values may be integers rounded by float64: from 2^53 up to the largest 64-bit integer."""
-    if not ((values > _EXACT).any() or (values < -_EXACT).any()):  # the usual case, without a copy
+    above, below = values > _EXACT, values < -_EXACT
+    if not (above.any() or below.any()):  # the usual case
         return 0
-    size = np.abs(values)
-    return int(np.count_nonzero((size > _EXACT) & (size <= _WIDEST)))
+    return int(np.count_nonzero((above & (values <= _WIDEST)) | (below & (values >= -_WIDEST))))
 
 
 def rounding_finding(column: str, count: int, severity: Literal["note", "warning"] = "warning") -> list[Finding]:

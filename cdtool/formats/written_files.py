@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
-from cdtool.base.files.bounded_loading import ContentError, parse_toml, read_text
+from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.remote.remote_path import joined, relative_name
 from cdtool.formats.columns import Column
 from cdtool.formats.groups import Group, GroupWriter, WrittenNames
@@ -28,8 +26,6 @@ WRITERS = {
     ".tdms": "cdtool.formats.containers.tdms:write_tdms",
 }
 ONE_CLOCK = (".csv",)
-_HEADER = re.compile(r"^\s*\[\[?\s*(?P<name>[^\[\]]+?)\s*\]\]?\s*(#.*)?$")
-_URDF = re.compile(r"^(\s*urdf\s*=\s*).*$", re.MULTILINE)
 
 
 def writer_of(target: Path) -> GroupWriter:
@@ -54,17 +50,17 @@ def machine_text(
     machine_file: MachineFile, log: Path, groups: Sequence[Group], names: WrittenNames, target: Path
 ) -> str:
     """Return the text of `target`: the machine file without its channels, then those of the converted log."""
-    text = read_text(machine_file.path, ConfigurationError)
-    kept = _without_channels(text)
-    if not _same(text, kept):  # the tables cannot be separated line by line: write only the channels
-        kept = f"# Put [machine] of {machine_file.path.name} here.\n"
-    urdf = _stated_urdf(text)
-    if urdf and machine_file.path.parent.resolve() != target.parent.resolve():
-        place = relative_name(joined(machine_file.path.parent, urdf), target.parent)
-        kept = _URDF.sub(lambda match: f"{match[1]}{_text(place)}", kept)
+    import tomlkit
+
+    document = tomlkit.parse(read_text(machine_file.path, ConfigurationError))
+    document.pop("channels", None)
+    machine = document.get("machine", {})
+    if "urdf" in machine and machine_file.path.parent.resolve() != target.parent.resolve():
+        urdf = joined(machine_file.path.parent, str(machine["urdf"]))
+        machine["urdf"] = relative_name(urdf, target.parent)
     mapped = machine_file.topics if machine_file.topics.sources else machine_file.columns
     kinds = next((item.kinds for item in mapped.sources if item.channel == "label"), ())
-    return f"{kept.rstrip()}\n\n{_channels(log, groups, names, mapped.speed_low_pass, kinds)}"
+    return f"{tomlkit.dumps(document).rstrip()}\n\n{_channels(log, groups, names, mapped.speed_low_pass, kinds)}"
 
 
 def _channels(
@@ -96,33 +92,6 @@ def _field(field: str, column: Column) -> str:
         return f"field = {_text(field)}"
     elements = [_text(field.replace("[:]", f"[{axis}]")) for axis in range(column.values.shape[1])]
     return f"fields = [{', '.join(elements)}]"
-
-
-def _without_channels(text: str) -> str:
-    kept, skipping = [], False
-    for line in text.splitlines():
-        header = _HEADER.match(line)
-        if header is not None:
-            name = header["name"].replace('"', "").replace(" ", "")
-            skipping = name == "channels" or name.startswith("channels.")
-        if not skipping:
-            kept.append(line)
-    return "\n".join(kept) + "\n"
-
-
-def _same(text: str, kept: str) -> bool:
-    """Whether the remaining text is valid TOML and contains everything but the channels."""
-    try:
-        before, after = parse_toml(text), parse_toml(kept)
-    except ContentError:
-        return False
-    before.pop("channels", None)
-    return before == after
-
-
-def _stated_urdf(text: str) -> str:
-    machine: dict[str, Any] = parse_toml(text).get("machine", {})
-    return str(machine.get("urdf", ""))
 
 
 def _text(value: str) -> str:

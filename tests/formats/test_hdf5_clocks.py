@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 import cdtool
 from cdtool.formats.channels.reading import read_recording, survey
-from cdtool.formats.containers.hdf5 import Packing, times_since
+from cdtool.formats.containers.hdf5 import Hdf5, Packing, times_since
 from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.machine_file import read_machine_file
+from cdtool.formats.pieces import join_pieces
 from tests.base.findings.facts import fact_of
 
 h5py = pytest.importorskip("h5py")
@@ -205,11 +206,43 @@ def test_clocks_of_groups_without_a_unit_are_a_warning(saved):
     assert not [fact for _, fact in alone if fact.kind == "clocks_without_unit"]
 
 
-def test_the_epoch_is_subtracted_if_every_clock_has_one():
+def test_the_epoch_that_is_subtracted_is_the_earliest():
     clocks = [
         EpochClock(lambda a, b, x=x: np.array([x, x + 1])[a:b], 1e-3) for x in (1_700_000_000_250, 1_700_000_000_000)
     ]
-    origin = common_origin(clocks)
-    assert origin == 1_700_000_000
+    findings = []
+    origin = common_origin({"a": clocks[0], "b": clocks[1]}, findings)
+    assert origin == 1_700_000_000 and not findings
     assert [clock.times(0, 2, origin).tolist() for clock in clocks] == [[0.25, 0.251], [0.0, 0.001]]
-    assert common_origin([*clocks, EpochClock(lambda a, b: np.array([0.5, 1.5])[a:b], 1.0)]) == 0
+
+
+def test_a_clock_without_an_epoch_keeps_its_times_and_is_reported(saved):
+    path = saved(
+        drive__time=(1_700_000_000_000 + np.arange(9), {"unit": "ms"}),
+        drive__q=(np.arange(9.0), {}),
+        cell__t=(0.5 + np.arange(9.0), {"unit": "s"}),
+        cell__f=(np.arange(9.0), {}),
+    )
+    source = survey(path)
+    assert source.origin == 1.7e9 and source.columns["drive/q"].time[0] == 0.0
+    assert source.columns["cell/f"].time.tolist() == (0.5 + np.arange(9.0)).tolist()
+    assert ("", ("no_start_time", {"channels": ("cell/f", "cell/t")})) in facts(source)
+
+
+def test_missing_first_stamps_hide_no_epoch(saved):
+    stamps = 1_700_000_000_000 + np.arange(9)
+    stamps[0] = -1
+    source = survey(saved(time=(stamps, {"unit": "ms", "_FillValue": np.int64(-1)}), q=(np.arange(9.0), {})))
+    assert source.origin == 1_700_000_000.001 and source.columns["q"].time[1:3].tolist() == [0.0, 0.001]
+
+
+def test_some_columns_are_read_in_pieces_at_the_times_that_they_have_among_all(saved):
+    path = saved(
+        a__time=(1_700_000_000_000 + np.arange(9), {"unit": "ms"}),
+        a__q=(np.arange(9.0), {}),
+        b__time=(1_700_000_002_000 + np.arange(9), {"unit": "ms"}),
+        b__f=(np.arange(9.0), {}),
+    )
+    source = join_pieces(Hdf5().pieces(path, {"b/f"}), sort=False)
+    assert list(source.columns) == ["b/f"] and source.origin == 1.7e9
+    assert source.columns["b/f"].time[0] == 2.0

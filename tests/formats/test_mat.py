@@ -91,7 +91,7 @@ def test_a_cut_file_is_one_clear_error(saved, size, compressed):
 
 
 def test_a_file_without_numbers_is_refused(saved):
-    with pytest.raises(RecordingError, match="no vector or matrix"):
+    with pytest.raises(RecordingError, match="has no column of numbers"):
         Mat().columns(saved({"w": "words"}))
 
 

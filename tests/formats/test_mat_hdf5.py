@@ -113,7 +113,7 @@ def test_a_requested_complex_column_is_an_error(tmp_path):
 
 
 def test_a_file_without_a_vector_is_refused(tmp_path):
-    with pytest.raises(RecordingError, match="has no vector or matrix of numbers"):
+    with pytest.raises(RecordingError, match="has no column of numbers"):
         Mat().columns(save_v73(tmp_path / "a.mat", {"s": {"a": 1.0}}))
 
 

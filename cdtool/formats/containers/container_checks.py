@@ -9,16 +9,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy.typing as npt
-
-from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError, RecordingError, installing
-from cdtool.base.findings import Finding
-from cdtool.formats.columns import as_float64
+from cdtool.base.findings import Finding, Severity
 
 # A file that unpacks to more than this many bytes and to more than this multiple of its own size is refused.
 _FREE, _RATIO = 256 * 2**20, 200
-_LARGEST_EXACT = 2**53
+_MOST_MESSAGES = 5
 # HDF5 filters that do not compress: shuffle, Fletcher32 checksum.
 _FILTERS_WITHOUT_COMPRESSION = (2, 3)
 
@@ -65,15 +61,15 @@ def one_line_errors(kind: str) -> Iterator[None]:
         raise RecordingError(f"damaged or not {kind}: {reason}", "copy or save it again") from fault
 
 
-def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> FloatArray:
-    """Return integers, booleans or floats as float64; add a finding if float64 cannot represent all integers."""
-    if values.dtype.kind in "iu" and values.size:
-        largest = max(abs(int(values.min())), abs(int(values.max())))
-        if largest > _LARGEST_EXACT:
-            findings.append(Finding("rounded_column", name))
-    return as_float64(values)
-
-
 def left_out_finding(name: str, kind: str) -> Finding:
     """Return the note on a column that is left out because its values are not numbers."""
     return Finding("column_left_out", "", {"column": name, "what": kind})
+
+
+def messages_of(library: str, printed: str, severity: Severity = "warning") -> list[Finding]:
+    """Return the first lines that a library printed about a file, each once."""
+    lines = dict.fromkeys(" ".join(line.split())[:200] for line in printed.splitlines() if line.strip())
+    return [
+        Finding("library_message", "", {"library": library, "text": line}, severity)
+        for line in list(lines)[:_MOST_MESSAGES]
+    ]

@@ -3,35 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.channels.channel_map import ChannelMap
-from cdtool.formats.column_names import requested_keys
 from cdtool.formats.columns import Categories, as_float64
 from cdtool.formats.containers.container_checks import (
     check_chunks,
-    check_size,
-    left_out_finding,
     library,
     one_line_errors,
 )
-from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
-from cdtool.formats.large_integers import rounded_integers, rounding_finding
-from cdtool.formats.pieces import Pieces, PiecewiseFormat
-from cdtool.formats.slices import SlicedColumn, header_of, interleave
-from cdtool.formats.source import Source
+from cdtool.formats.epoch_clock import EpochClock, with_plausible_unit
+from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
 from cdtool.recordings.units import find_unit
 
 _KEYS = ("scale_factor", "add_offset")
@@ -39,9 +32,8 @@ _MISSING = ("_FillValue", "missing_value")
 # Units of a time since a date, without a plural, that are in no table of units.
 _UNITS = {"nsec": 1e-9, "usec": 1e-6, "msec": 1e-3, "min": 60.0, "hr": 3600.0, "d": 86400.0, "day": 86400.0}
 _SINCE = re.compile(r"\s*(?P<unit>[a-z]+)\s+since\s+(?P<date>.+?)\s*", re.IGNORECASE)
-# A single digit, to which ISO 8601 has a zero; what it has not between date and zone; decimals of a second.
-_DIGIT, _ZONE = re.compile(r"(?<![0-9.])[0-9](?![0-9])"), re.compile(r"\s+(?=[+-])|\s*(UTC|GMT|Z)$")
-_DECIMALS = re.compile(r"[.,]([0-9]*)")
+# A year and a month; a zone that pandas does not know.
+_DATE, _ZONE = re.compile(r"[0-9]{4}-[0-9]"), re.compile(r"\s*(UTC|GMT|Z)$")
 _CALENDARS = ("", "standard", "gregorian", "proleptic_gregorian")
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNIT_KEYS = ("unit", "units", "Unit", "Units")
@@ -69,8 +61,10 @@ class Packing:
         )
         return cls(scale[0], offset[0], tuple(value for key in _MISSING for value in _numbers(attributes, key)))
 
-    def unpacked(self, raw: npt.NDArray[Any]) -> FloatArray:
+    def unpacked(self, raw: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the unpacked numbers; NaN where a number is missing."""
+        if self == Packing():
+            return raw
         values = as_float64(raw)
         values = values.copy() if np.may_share_memory(values, raw) else values
         if self.scale != 1.0:
@@ -102,15 +96,17 @@ def times_since(unit: str, calendar: str) -> tuple[float, Fraction] | None:
         factor = known.factor
     if match is None or factor is None:
         return None
-    date, decimals = " ".join(match["date"].split()), _DECIMALS.search(match["date"])
     try:
-        moment = datetime.fromisoformat(_DIGIT.sub(r"0\g<0>", _ZONE.sub("", _DECIMALS.sub("", date))))
-        since_1970 = moment.replace(tzinfo=moment.tzinfo or UTC) - datetime(1970, 1, 1, tzinfo=UTC)
-    except (ValueError, OverflowError):
+        if _DATE.match(match["date"]) is None:  # pandas would also read the day or the month of today
+            raise ValueError
+        moment = pd.Timestamp(_ZONE.sub("", match["date"].replace(",", ".")))
+        utc = moment.tz_localize("UTC") if moment.tz is None else moment
+    except ValueError:
         raise ValueError(f"the date of '{unit}' cannot be read") from None
     if calendar.lower() not in _CALENDARS:
         raise ValueError(f"its calendar '{calendar}' is not the Gregorian calendar")
-    return factor, since_1970 // timedelta(seconds=1) + Fraction(f"0.{decimals[1]}" if decimals else 0)
+    seconds = int(utc.asm8.astype("M8[s]").astype(np.int64))
+    return factor, seconds + Fraction(utc.microsecond * 1000 + utc.nanosecond, 10**9)
 
 
 def _numbers(attributes: Mapping[str, Any], key: str) -> tuple[float, ...]:
@@ -123,7 +119,7 @@ def _numbers(attributes: Mapping[str, Any], key: str) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True)
-class Hdf5(PiecewiseFormat):
+class Hdf5(SlicedFormat):
     """HDF5 files: a column is a dataset's path, `drive/torque`; a matrix `q` is `q[0]`, `q[1]` and so on.
 
     A dataset `time`, `t` or `timestamp` with a unit of time (`s`, `seconds since 2024-01-01`) is the clock of the
@@ -142,58 +138,34 @@ class Hdf5(PiecewiseFormat):
                     return True
         return False
 
-    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
+    @contextmanager
+    def _open(self, container: Container) -> Iterator[None]:
         h5py = library("h5py", "hdf5")
-        findings: list[Finding] = []
-        with one_line_errors("an HDF5 file"), h5py.File(path, "r") as file:
-            tree = _Datasets(path, h5py, file, findings, wanted.worded if wanted is not None else ())
-            names = tuple(tree.locations)
-            keys = [key for key in requested_keys(wanted, names) if some is None or key in some]
-            if not keys:
-                raise RecordingError("has no dataset of numbers", "list its contents with h5dump -n")
-            check_size(path, sum(tree.rows(key) for key in keys))
-            for name in dict.fromkeys(tree.locations[key][0] for key in keys):
-                check_chunks(path, name, tree.datasets[name])
-            origin = tree.set_origin(keys)
-            columns = [tree.column(key) for key in keys]
-            yield from interleave(columns)
-            findings += [finding for key in keys for finding in rounding_finding(key, tree.rounded[key])]
-            findings += tree.clocks_without_unit()
-            origin += float(file.attrs.get("cdtool.origin_s", 0.0))
-        words = {key: each.words for key, each in tree.categories.items()}
-        headers = {column.name: replace(header_of(column), words=words.get(column.name, {})) for column in columns}
-        details = {"datasets": str(len(tree.datasets))}
-        return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, names)
+        with one_line_errors("an HDF5 file"), h5py.File(container.path, "r") as file:
+            datasets = _Datasets(container, h5py, file)
+            container.details = {"datasets": str(len(datasets.packings))}
+            container.origin = float(file.attrs.get("cdtool.origin_s", 0.0))
+            yield
+            container.findings += datasets.clocks_without_unit()
 
 
 class _Datasets:
-    """The datasets of numbers of an open file.
+    """The datasets of numbers of an open file, each with its packing, and those of texts that the map names."""
 
-    `locations` maps a column to its dataset and to the index of the column in it. The datasets `worded` may contain
-    texts, which are read as `categories`.
-    """
-
-    def __init__(
-        self, path: Path, h5py: Any, file: Any, findings: list[Finding], worded: Collection[str | int] = ()
-    ) -> None:
-        self.path, self.h5py, self.findings = path, h5py, findings
-        self.categories: dict[str, Categories] = {}
-        self._worded = worded
-        self.datasets: dict[str, Any] = {}
+    def __init__(self, container: Container, h5py: Any, file: Any) -> None:
+        self._container, self._h5py, self._file = container, h5py, file
+        self._worded = container.wanted.worded if container.wanted is not None else ()
         self.packings: dict[str, Packing] = {}
-        self.locations: dict[str, tuple[str, int]] = {}
-        self.rounded: Counter[str] = Counter()
-        self._clocks: dict[str, EpochClock | None] = {}
-        self._origin = Fraction(0)
+        self._clock_at = cache(self._as_clock)
         # Hard links only: a soft or external link may form a cycle, or point to another file.
         file.visititems(self._visit)
 
     def _visit(self, name: str, node: Any) -> None:
-        if not isinstance(node, self.h5py.Dataset):
+        columns, findings = self._container.columns, self._container.findings
+        if not isinstance(node, self._h5py.Dataset):
             return
-        if name in self._worded and node.ndim == 1 and self.h5py.check_string_dtype(node.dtype) is not None:
-            self.datasets[name], self.packings[name], self.locations[name] = node, Packing(), (name, 0)
-            self.categories[name] = Categories()
+        if name in self._worded and node.ndim == 1 and self._h5py.check_string_dtype(node.dtype) is not None:
+            self.packings[name], columns[name] = Packing(), partial(self._texts, name, node)
             return
         reason = _unusable(node)
         try:
@@ -201,97 +173,70 @@ class _Datasets:
         except ValueError as fault:
             reason = f"packed, but {fault}"
         if reason:
-            self.findings.append(left_out_finding(name, reason))
+            self._container.leave_out(name, reason)
             return
-        self.datasets[name], self.packings[name] = node, packing
-        self.findings += packing.finding(name)
-        if node.ndim == 1 or 1 in node.shape:
-            self.locations[name] = (name, 0)
-            return
-        for i in range(min(node.shape)):
-            self.locations[f"{name}[{i}]"] = (name, i)
-        if node.shape[0] < node.shape[1]:
-            rows, columns = node.shape
-            shape = {"thing": "dataset", "name": name, "rows": rows, "columns": columns}
-            self.findings.append(Finding("rows_as_columns", "", shape))
+        self.packings[name] = packing
+        findings += packing.finding(name)
+        is_vector = node.ndim == 1 or 1 in node.shape
+        for i in range(1 if is_vector else min(node.shape)):
+            columns[name if is_vector else f"{name}[{i}]"] = partial(self._numbers, name, node, i)
+        if not is_vector and node.shape[0] < node.shape[1]:
+            rows, width = node.shape
+            shape = {"thing": "dataset", "name": name, "rows": rows, "columns": width}
+            findings.append(Finding("rows_as_columns", "", shape))
 
-    def rows(self, key: str) -> int:
-        """Return the number of values of a column."""
-        return int(max(self.datasets[self.locations[key][0]].shape))
+    def _numbers(self, name: str, dataset: Any, index: int) -> SlicedColumn:
+        """Return a column of a dataset."""
 
-    def column(self, key: str) -> SlicedColumn:
-        """Return one column with its unit, and with its clock if the file has one for it."""
-        name, index = self.locations[key]
-        dataset, rows = self.datasets[name], self.rows(key)
+        def read(start: int, end: int) -> npt.NDArray[Any]:
+            return self.packings[name].unpacked(_rows_of(dataset, index, start, end))
 
-        def values(start: int, end: int) -> FloatArray:
-            if key in self.categories:
-                texts = dataset.asstr(errors="replace")[start:end]
-                return np.array([self.categories[key].code(text) if text else np.nan for text in texts])
-            numbers = self.packings[name].unpacked(_rows_of(dataset, index, start, end))
-            self.rounded[key] += rounded_integers(numbers) if dataset.dtype.kind in "iu" else 0
-            return numbers
+        return SlicedColumn(max(dataset.shape), read, self._clock(name, dataset), _unit(dataset))
 
-        own = self._clock(key)
-        if own is None:
-            return SlicedColumn(key, rows, values, unit=_unit(dataset))
-        path, clock = own
+    def _texts(self, name: str, dataset: Any) -> SlicedColumn:
+        categories = Categories()
 
-        def time(start: int, end: int) -> FloatArray:
-            return clock.times(start, end, self._origin)
+        def codes(start: int, end: int) -> FloatArray:
+            texts = dataset.asstr(errors="replace")[start:end]
+            return np.array([categories.code(text) if text else np.nan for text in texts])
 
-        return SlicedColumn(key, rows, values, path, time, _unit(dataset))
-
-    def set_origin(self, keys: Sequence[str]) -> float:
-        """Let the times of these columns start at 0 if they count from an epoch; return the subtracted time [s]."""
-        clocks = dict(clock for key in keys if (clock := self._clock(key)) is not None)
-        self._origin = common_origin(clocks.values())
-        return float(self._origin)
+        return SlicedColumn(len(dataset), codes, self._clock(name, dataset), _unit(dataset), categories)
 
     def clocks_without_unit(self) -> list[Finding]:
         """Return a warning if several groups have datasets with the name of a clock but without a unit of time."""
-        named = (path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES)
+        named = (path for path in self.packings if path.rpartition("/")[2] in _CLOCK_NAMES)
         paths = [path for path in named if self._clock_at(path) is None]
         if len({path.rpartition("/")[0] for path in paths}) < 2:
             return []
         return [Finding("clocks_without_unit", "", {"datasets": tuple(paths)})]
 
-    def _clock(self, key: str) -> tuple[str, EpochClock] | None:
-        """Return path and clock of a column; the clock of a clock is itself. None if the column has no clock."""
-        name, count = self.locations[key][0], self.rows(key)
-        folder, _, own = name.rpartition("/")
-        for clock_name in (own, *_CLOCK_NAMES) if own in _CLOCK_NAMES else _CLOCK_NAMES:
-            path = f"{folder}/{clock_name}" if folder else clock_name
-            clock = self._clock_at(path) if path in self.datasets and self.datasets[path].size == count else None
-            if clock is not None:
-                return path, clock
-        return None
-
-    def _clock_at(self, path: str) -> EpochClock | None:
-        """Return a dataset as a clock; None if it has no unit of time."""
-        if path not in self._clocks:
-            self._clocks[path] = self._as_clock(path)
-        return self._clocks[path]
+    def _clock(self, name: str, dataset: Any) -> EpochClock | None:
+        """Return the clock of a dataset; the clock of a clock is itself. None if it has no clock."""
+        check_chunks(self._container.path, name, dataset)
+        folder, slash, own = name.rpartition("/")
+        names = (own, *_CLOCK_NAMES) if own in _CLOCK_NAMES else _CLOCK_NAMES
+        paths = [path for clock in names if (path := f"{folder}{slash}{clock}") in self.packings]
+        clocks = (self._clock_at(path) for path in paths if self._file[path].size == max(dataset.shape))
+        return next(filter(None, clocks), None)
 
     def _as_clock(self, path: str) -> EpochClock | None:
-        dataset, packing = self.datasets[path], self.packings[path]
+        """Return a dataset as a clock; None if it has no unit of time."""
+        dataset, packing, findings = self._file[path], self.packings[path], self._container.findings
         stated = _unit(dataset) or "?"
         try:
             since = times_since(stated, _text(dataset.attrs.get("calendar")))
         except ValueError as fault:
-            self.findings.append(Finding("unusable_clock", path, {"reason": str(fault)}))
+            findings.append(Finding("unusable_clock", path, {"reason": str(fault)}))
             return None
         unit = find_unit(stated)
         if since is None and (unit is None or unit.si != "s"):
             return None
+        check_chunks(self._container.path, path, dataset)
         factor, base = since or (unit.factor if unit is not None else 1.0, Fraction(0))
-
-        def read(start: int, end: int) -> Any:
-            return _rows_of(dataset, 0, start, end)
-
         base += Fraction(packing.offset) * Fraction(repr(factor))
-        clock = EpochClock(read, factor * packing.scale, base, packing.missing)
-        return with_plausible_unit(clock, stated, self.findings, path)
+        read = partial(_rows_of, dataset, 0)
+        clock = EpochClock(read, factor * packing.scale, base, packing.missing, dated=since is not None)
+        return with_plausible_unit(clock, stated, findings, path)
 
 
 def _rows_of(dataset: Any, index: int, start: int, end: int) -> Any:

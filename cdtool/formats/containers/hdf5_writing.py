@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from io import FileIO
 from itertools import chain
 from pathlib import Path
@@ -18,7 +16,8 @@ from cdtool.formats.columns import Column
 from cdtool.formats.containers.container_checks import library
 from cdtool.formats.groups import Group, Parts, WrittenNames, prefix_keys
 
-_TERMINATION_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+# Windows handles signals between two waits only [s].
+_WAIT = 0.1
 
 
 def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
@@ -27,52 +26,54 @@ def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Ma
     Raises OSError if the disk is full or cannot be written.
     """
     h5py = library("h5py", "hdf5")
-    # An exception within the library's calls of `write` would leave it with a file that it cannot close.
-    with deferred_signals() as deliver, _CheckedFile(path, "wb+") as disk:
-
-        def check() -> None:
-            deliver()
-            disk.check()
-
-        with h5py.File(disk, "w", track_order=True) as file:
-            names = _write(file, check, groups, parts, provenance)
-        check()
-    return names
+    # In a thread, which receives no signals: an exception within the library's calls of `write` would leave it with a
+    # file that it cannot close.
+    with _CheckedFile(path, "wb+") as disk, ThreadPoolExecutor(1) as thread:
+        writing = thread.submit(_write, h5py, disk, groups, parts, provenance)
+        try:
+            while wait([writing], _WAIT).not_done:
+                pass
+        except BaseException as interruption:
+            disk.fault = interruption
+            raise
+    return writing.result()
 
 
 def _write(
-    file: Any, check: Callable[[], None], groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]
+    h5py: Any, disk: _CheckedFile, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]
 ) -> WrittenNames:
     names: WrittenNames = []
     datasets: list[list[Any]] = []
-    for key, value in prefix_keys(provenance).items():
-        file.attrs[key] = value
-    for group in groups:
-        folder = file if len(groups) == 1 else file.create_group(group.name, track_order=True)
-        before = "" if len(groups) == 1 else f"{group.name}/"
-        columns = [Column(OWN_CLOCK, np.empty(0), unit="s")] if group.own_clock else []
-        datasets.append([_dataset(folder, column, group.rows) for column in (*columns, *chain(*group.flat))])
-        names.append([[before + _link(part.name) for part in parts] for parts in group.flat])
-    done = [0] * len(groups)
-    for ready in parts:
-        for number, part in enumerate(ready):
-            if part is not None:
-                rows = slice(done[number], done[number] + len(part))
-                values = [part.time, *part.flat] if groups[number].own_clock else part.flat
-                for dataset, column in zip(datasets[number], values, strict=True):
-                    dataset[rows] = column
-                    check()
-                done[number] = rows.stop
+    with h5py.File(disk, "w", track_order=True) as file:
+        for key, value in prefix_keys(provenance).items():
+            file.attrs[key] = value
+        for group in groups:
+            folder = file if len(groups) == 1 else file.create_group(group.name, track_order=True)
+            before = "" if len(groups) == 1 else f"{group.name}/"
+            columns = [Column(OWN_CLOCK, np.empty(0), unit="s")] if group.own_clock else []
+            datasets.append([_dataset(folder, column, group.rows) for column in (*columns, *chain(*group.flat))])
+            names.append([[before + _link(part.name) for part in parts] for parts in group.flat])
+        done = [0] * len(groups)
+        for ready in parts:
+            for number, part in enumerate(ready):
+                if part is not None:
+                    rows = slice(done[number], done[number] + len(part))
+                    values = [part.time, *part.flat] if groups[number].own_clock else part.flat
+                    for dataset, column in zip(datasets[number], values, strict=True):
+                        dataset[rows] = column
+                        disk.check()
+                    done[number] = rows.stop
+    disk.check()
     return names
 
 
 class _CheckedFile(FileIO):
-    """The file that HDF5 writes to: after the first error (`fault`) it discards all data without raising.
+    """The file that HDF5 writes to: after the first error or interruption (`fault`) it discards all data.
 
     The library cannot close a file after a failed write, and would crash at the end of the process.
     """
 
-    fault: OSError | None = None
+    fault: BaseException | None = None
 
     def write(self, data: Any) -> int:
         """Write all data and return the size; after an error discard the data and return the same size."""
@@ -95,7 +96,7 @@ class _CheckedFile(FileIO):
         return self.tell() if size is None else size
 
     def check(self) -> None:
-        """Raise the OSError of the first write that failed."""
+        """Raise the first error or interruption."""
         if self.fault is not None:
             raise self.fault
 
@@ -110,36 +111,3 @@ def _dataset(folder: Any, column: Column, rows: int) -> Any:
 def _link(name: str) -> str:
     """Return a name without slashes, which would create groups."""
     return name.replace("/", ".")
-
-
-@contextmanager
-def deferred_signals() -> Iterator[Callable[[], None]]:
-    """Defer SIGINT, SIGTERM and SIGHUP to the end of the context, or to a call of the function that it yields.
-
-    Use it if a library calls back into Python code that must not raise. Deferred signals are passed to their previous
-    handlers, which may raise. Only the main thread receives signals: in other threads this has no effect.
-    """
-    pending: list[int] = []
-    handlers: dict[int, Any] = {}
-
-    def deliver() -> None:
-        while pending:
-            number = pending.pop(0)
-            handler = handlers[number]
-            if callable(handler):
-                handler(number, None)
-            elif handler == signal.SIG_DFL:
-                signal.signal(number, signal.SIG_DFL)
-                signal.raise_signal(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield deliver
-        return
-    for number in _TERMINATION_SIGNALS:
-        handlers[number] = signal.signal(number, lambda number, _: pending.append(number))
-    try:
-        yield deliver
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
-        deliver()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,14 +16,9 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, split_unit
-from cdtool.formats.columns import Categories, Column, Piece
-from cdtool.formats.containers.container_checks import (
-    as_numbers,
-    check_size,
-    left_out_finding,
-    library,
-    one_line_errors,
-)
+from cdtool.formats.columns import Categories, Column, Piece, as_float64
+from cdtool.formats.containers.container_checks import check_size, left_out_finding, library, one_line_errors
+from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
 
@@ -55,13 +50,14 @@ class Parquet(PiecewiseFormat):
             names = tuple(table.schema.names)
             keys = [key for key in requested_keys(wanted, names) if some is None or key in some]
             read = [key for key in keys if table.is_number(key)]
-            findings += [left_out_finding(key, str(table.schema.field(key).type)) for key in keys if key not in read]
-            not_read = [key for key in keys if key not in read]
-            if wanted is not None and not_read:
-                raise RecordingError(f"column '{not_read[0]}' is not numeric", "map another column")
+            left_out = [key for key in keys if key not in read]
+            findings += [left_out_finding(key, str(table.schema.field(key).type)) for key in left_out]
+            if wanted is not None and left_out:
+                raise RecordingError(f"column '{left_out[0]}' is not numeric", "map another column")
             if not read:
                 raise RecordingError("has no column of numbers", "see cdtool info")
             yield from table.pieces(read)
+        findings += [finding for key in read for finding in rounding_finding(key, table.rounded[key])]
         details = {"rows": str(table.rows), "container": table.kind}
         unique = tuple(dict.fromkeys(findings))
         return Source(path, self.name, table.headers(read), table.origin, unique, details, names)
@@ -75,15 +71,15 @@ class _ArrowTable:
 
     def __init__(self, path: Path, arrow: Any, findings: list[Finding], worded: Collection[str | int] = ()) -> None:
         self.path, self.arrow, self.findings = path, arrow, findings
-        self.rows = 0
+        self.rows, self.rounded = 0, Counter[str]()
         with path.open("rb") as file:
             self.kind = "parquet" if file.read(4) == _PARQUET else "feather"
         if self.kind == "parquet":
             self._file = library("pyarrow.parquet", "parquet").ParquetFile(os.fspath(path))
             self.schema, self._batches = self._file.schema_arrow, self._of_parquet
         else:
-            self._file = _Feather(path, arrow, findings)
-            self.schema, self._batches = self._file.schema, self._file.batches
+            self._file = library("pyarrow.ipc", "parquet").open_file(os.fspath(path))
+            self.schema, self._batches = self._file.schema, self._of_feather
         metadata = self.schema.metadata or {}
         self.own_clocks = metadata.get(OWN_CLOCKS) == b"1" and OWN_CLOCK in self.schema.names
         self.origin = float(metadata.get(b"cdtool.origin_s", b"0"))
@@ -130,6 +126,15 @@ class _ArrowTable:
         check_size(self.path, sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)) * len(keys))
         return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)))
 
+    def _of_feather(self, keys: Sequence[str]) -> Iterator[Any]:
+        # A batch is decompressed as a whole; this counts its rows by its head.
+        counted = library("pyarrow.dataset", "parquet").dataset(os.fspath(self.path), format="feather")
+        check_size(self.path, counted.count_rows() * len(self.schema.names))
+        for number in range(self._file.num_record_batches):
+            batch = self._file.get_batch(number)
+            batch.validate(full=True)  # Arrow does not check a file's declarations otherwise
+            yield batch.select(list(keys))
+
     def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
         """Return the values, and which of them are absent (null)."""
         absent = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
@@ -137,8 +142,13 @@ class _ArrowTable:
             return self._codes(self._categories[key], column, absent), absent
         if self.arrow.types.is_timestamp(column.type):
             return self._seconds(key, column.to_numpy(zero_copy_only=False).astype("datetime64[ns]"))
-        values = column.cast(self.arrow.float64(), safe=False) if absent.any() else column
-        return as_numbers(key, values.to_numpy(zero_copy_only=False), self.findings), absent
+        if self.arrow.types.is_boolean(column.type):
+            column = column.cast(self.arrow.uint8())
+        is_integer = self.arrow.types.is_integer(column.type)
+        raw = (column.fill_null(0) if is_integer else column).to_numpy(zero_copy_only=False)
+        self.rounded[key] += rounded_integers(raw) if is_integer else 0
+        values = as_float64(raw)
+        return np.where(absent, np.nan, values) if absent.any() else values, absent
 
     def _codes(self, categories: Categories, column: Any, absent: Any) -> FloatArray:
         """Return the codes of a column of texts; NaN where a text is missing or empty."""
@@ -166,43 +176,3 @@ class _ArrowTable:
         metadata = self.schema.field(key).metadata or {}
         stated = next((metadata[name].decode("utf-8", "replace") for name in _UNIT_KEYS if name in metadata), None)
         return stated or split_unit(key)[1]
-
-
-class _Feather:
-    """An Arrow file as record batches; if the file is cut off, only the batches before the cut."""
-
-    def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
-        self._path, self._arrow, self._findings = path, arrow, findings
-        self._ipc = library("pyarrow.ipc", "parquet")
-        try:
-            self._whole = self._ipc.open_file(os.fspath(path))
-            self.schema = self._whole.schema
-            # A batch is decompressed as a whole; this counts its rows by its head.
-            counted = library("pyarrow.dataset", "parquet").dataset(os.fspath(path), format="feather")
-            check_size(path, counted.count_rows() * len(self.schema.names))
-        except arrow.ArrowInvalid:
-            self._whole = None
-            with path.open("rb") as stream:
-                self.schema = self._stream(stream).schema
-
-    def batches(self, keys: Sequence[str]) -> Iterator[Any]:
-        """Yield the columns `keys`, batch by batch. Arrow does not check a file's declarations without `validate`."""
-        count = 0 if self._whole is None else self._whole.num_record_batches
-        for batch in self._before_cut() if self._whole is None else map(self._whole.get_batch, range(count)):
-            batch.validate(full=True)
-            yield batch.select(list(keys))
-
-    def _before_cut(self) -> Iterator[Any]:
-        """Yield the batches before the cut."""
-        rows = 0
-        with self._path.open("rb") as stream, suppress(self._arrow.ArrowInvalid, OSError, StopIteration):
-            reader = self._stream(stream)
-            while True:
-                batch = reader.read_next_batch()
-                rows += batch.num_rows
-                yield batch
-        self._findings.append(Finding("cut_behind_row", "", {"row": rows}))
-
-    def _stream(self, stream: Any) -> Any:
-        stream.seek(8)  # after the magic bytes and their padding, an Arrow file is a stream
-        return self._ipc.open_stream(stream)

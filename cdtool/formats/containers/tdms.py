@@ -5,30 +5,25 @@ from __future__ import annotations
 import logging
 import os
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
+from io import StringIO
 from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.channels.channel_map import ChannelMap
-from cdtool.formats.column_names import OWN_CLOCK, requested_keys
-from cdtool.formats.columns import Column, as_float64
-from cdtool.formats.containers.container_checks import check_size, left_out_finding, library, one_line_errors
-from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
-from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys
-from cdtool.formats.large_integers import rounded_integers, rounding_finding
-from cdtool.formats.pieces import Pieces, PiecewiseFormat
-from cdtool.formats.slices import SlicedColumn, header_of, interleave
-from cdtool.formats.source import Source
+from cdtool.formats.column_names import OWN_CLOCK
+from cdtool.formats.columns import Column
+from cdtool.formats.containers.container_checks import library, messages_of, one_line_errors
+from cdtool.formats.epoch_clock import EpochClock, with_plausible_unit
+from cdtool.formats.groups import Group, Part, Parts, WrittenNames, names_of, prefix_keys
+from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat, rows_of
 from cdtool.recordings.units import find_unit
 
 _MAGIC = b"TDSm"
@@ -37,7 +32,7 @@ _CLOCK_NAMES = ("time", "t", "timestamp")
 
 
 @dataclass(frozen=True)
-class Tdms(PiecewiseFormat):
+class Tdms(SlicedFormat):
     """TDMS files: a column is a channel, prefixed with its group if several groups have a channel of that name.
 
     The clock of a channel is its waveform's (`wf_increment`), or the channel `time` of its group with a unit of time.
@@ -51,143 +46,79 @@ class Tdms(PiecewiseFormat):
         with path.open("rb") as file:
             return file.read(len(_MAGIC)) == _MAGIC
 
-    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
+    @contextmanager
+    def _open(self, container: Container) -> Iterator[None]:
         nptdms = library("nptdms", "tdms")
-        findings: list[Finding] = []
         with (
             one_line_errors("a TDMS file"),
-            collect_warnings("nptdms") as warnings,
-            nptdms.TdmsFile.open(os.fspath(path)) as file,
+            _printed(nptdms) as printed,
+            nptdms.TdmsFile.open(os.fspath(container.path)) as file,
         ):
-            channels = _channels(file, findings)
-            keys = [key for key in requested_keys(wanted, tuple(channels)) if some is None or key in some]
-            if not keys:
-                raise RecordingError("has no channel of numbers", "see cdtool info")
-            check_size(path, sum(len(channels[key]) for key in keys))
+            _add_channels(container, file)
+            container.details = {key: str(value)[:80] for key, value in file.properties.items()}
+            container.origin = float(file.properties.get("cdtool.origin_s", 0.0))
+            yield
             incomplete = getattr(file.file_status, "incomplete_final_segment", False)
             if incomplete:
-                findings.append(Finding("last_segment_incomplete"))
-            tree = _Channels(channels, findings)
-            origin = tree.set_origin(keys, file.properties)
-            columns = [tree.column(key) for key in keys]
-            yield from interleave(columns)
-            findings += [finding for key in keys for finding in rounding_finding(key, tree.rounded[key])]
-            findings += [
-                Finding("library_message", "", {"library": "npTDMS", "text": text}, "note" if incomplete else "warning")
-                for text in warnings
-            ]
-            details = {key: str(value)[:80] for key, value in file.properties.items()}
-        headers = {column.name: header_of(column) for column in columns}
-        return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, tuple(channels))
+                container.findings.append(Finding("last_segment_incomplete"))
+            container.findings += messages_of("npTDMS", printed.getvalue(), "note" if incomplete else "warning")
 
 
-def _channels(file: Any, findings: list[Finding]) -> dict[str, Any]:
-    """Return the channels of numbers by column name."""
+@contextmanager
+def _printed(nptdms: Any) -> Iterator[StringIO]:
+    """Yield what the library prints within the context: its warnings about files that are read at the same time too."""
+    console, printed = nptdms.log.log_manager.console_handler, StringIO()
+    console.setFormatter(logging.Formatter())
+    before = console.setStream(printed)
+    try:
+        yield printed
+    finally:
+        console.setStream(before)
+
+
+def _add_channels(container: Container, file: Any) -> None:
+    """Add the channels of numbers."""
     candidates = [channel for group in file.groups() for channel in group.channels()]
     count = Counter(channel.name for channel in candidates)
-    channels = {}
+    channels = list[Any]()
+    waveform_of, clock_of = cache(_waveform), cache(partial(_stated_clock, container))
     for channel in candidates:
         name = channel.name if count[channel.name] == 1 else f"{channel.group_name}/{channel.name}"
         kind = channel.dtype.kind if channel.dtype is not None else "O"
         if not len(channel):
-            findings.append(left_out_finding(name, "empty"))
+            container.leave_out(name, "empty")
         elif kind not in "biuf":
-            findings.append(left_out_finding(name, "of time stamps" if kind == "M" else "not numeric"))
+            container.leave_out(name, "of time stamps" if kind == "M" else "not numeric")
         else:
-            channels[name] = channel
-    return channels
+            channels.append(channel)
+            container.columns[name] = partial(_column, channel, channels, waveform_of, clock_of)
 
 
-class _Channels:
-    """The channels of an open file as columns, with the clocks that the file has for them."""
+def _column(
+    channel: Any, channels: Sequence[Any], waveform_of: Callable[..., EpochClock], clock_of: Callable[..., Any]
+) -> SlicedColumn:
+    """Return a channel as a column, with the clock of its waveform or of the channel of times in its group."""
+    step = _step(channel)
+    if step is not None:
+        offset = float(channel.properties.get("wf_start_offset", 0.0))
+        return SlicedColumn.of(channel, waveform_of(_start(channel), offset, step), _unit(channel))
+    beside = [other for other in channels if other.group_name == channel.group_name and len(other) >= len(channel)]
+    clocks = (clock_of(other) for other in beside if channel.name not in _CLOCK_NAMES)
+    return SlicedColumn.of(channel, next(filter(None, clocks), None), _unit(channel))
 
-    def __init__(self, channels: Mapping[str, Any], findings: list[Finding]) -> None:
-        self._channels, self._findings = channels, findings
-        self.rounded: Counter[str] = Counter()
-        self._origin = self._epoch = Fraction(0)  # of waveforms, of stamps
-        self._clocks: dict[str, EpochClock] = {}
 
-    def set_origin(self, keys: Sequence[str], properties: Mapping[str, Any]) -> float:
-        """Set and return the origin of all times [s].
+def _waveform(start: Fraction | None, offset: float, step: float) -> EpochClock:
+    return EpochClock(np.arange, step, (start or 0) + Fraction(offset), dated=start is not None)
 
-        It is the origin that `cdtool convert` wrote, or else the earliest start of a waveform or clock since 1970, or 0
-        if no start is known. Channels without a start are assumed to start at the origin.
-        """
-        if "cdtool.origin_s" in properties:
-            return float(properties["cdtool.origin_s"])
-        starts = {key: _start(self._channels[key]) for key in keys if _step(self._channels[key]) is not None}
-        known = [start for start in starts.values() if start is not None]
-        clocks = {key: clock[1] for key in keys if key not in starts and (clock := self._clock(key)) is not None}
-        self._epoch = common_origin(clocks.values())
-        known += [self._epoch] if self._epoch else []
-        self._origin = min(known, default=Fraction(0))
-        unknown = [key for key, start in starts.items() if start is None] + [key for key in clocks if not self._epoch]
-        if known and unknown:
-            self._findings.append(Finding("no_start_time", "", {"channels": tuple(unknown)}))
-        return float(self._origin)
 
-    def column(self, key: str) -> SlicedColumn:
-        """Return a channel as a column."""
-        channel = self._channels[key]
-        count, unit, step = len(channel), _unit(channel), _step(channel)
-
-        def values(start: int, end: int) -> FloatArray:
-            return self._values(key, start, end)
-
-        if step is not None:
-            first = self._first(channel)
-
-            def by_step(start: int, end: int) -> FloatArray:
-                return first + np.arange(start, end, dtype=np.float64) * step
-
-            return SlicedColumn(key, count, values, f"{first!r} {step!r} {count}", by_step, unit)
-        own = self._clock(key)
-        if own is None:
-            return SlicedColumn(key, count, values, unit=unit)
-        path, clock = own
-
-        def by_clock(start: int, end: int) -> FloatArray:
-            return clock.times(start, end, self._origin if self._epoch else Fraction(0))
-
-        return SlicedColumn(key, count, values, f"{path} {count}", by_clock, unit)
-
-    def _values(self, key: str, start: int, end: int) -> FloatArray:
-        raw = self._channels[key][start:end]
-        values = as_float64(raw)
-        self.rounded[key] += rounded_integers(values) if raw.dtype.kind in "iu" else 0
-        if len(values) == end - start:
-            return values
-        self._findings.append(
-            Finding("values_cut_off", key, {"count": end - start - len(values), "first": start + len(values)})
-        )
-        return np.pad(values, (0, end - start - len(values)), constant_values=np.nan)
-
-    def _first(self, channel: Any) -> float:
-        """Return the time [s] of a waveform's first sample."""
-        start = _start(channel)
-        later = float(start - self._origin) if start is not None and self._origin else 0.0
-        return later + float(channel.properties.get("wf_start_offset", 0.0))
-
-    def _clock(self, key: str) -> tuple[str, EpochClock] | None:
-        """Return path and clock of the channel of times in the same group; None if there is no such channel."""
-        channel = self._channels[key]
-        for clock in self._channels.values():
-            is_candidate = clock.group_name == channel.group_name and clock.name in _CLOCK_NAMES
-            if not is_candidate or clock is channel or channel.name in _CLOCK_NAMES:
-                continue
-            unit = find_unit(_unit(clock) or "?")
-            if unit is None or unit.si != "s" or len(clock) < len(channel):
-                continue
-            if clock.path not in self._clocks:
-                epoch_clock = EpochClock(partial(_raw, clock), unit.factor)
-                stated = str(_unit(clock))
-                self._clocks[clock.path] = with_plausible_unit(epoch_clock, stated, self._findings, clock.name)
-            return clock.path, self._clocks[clock.path]
+def _stated_clock(container: Container, channel: Any) -> EpochClock | None:
+    """Return a channel as a clock; None if it has not the name of one, or no unit of time."""
+    stated = _unit(channel) or "?"
+    unit = find_unit(stated)
+    if channel.name not in _CLOCK_NAMES or unit is None or unit.si != "s":
         return None
-
-
-def _raw(channel: Any, start: int, end: int) -> Any:
-    return channel[start:end]
+    clock = EpochClock(partial(rows_of, channel), unit.factor)
+    return with_plausible_unit(clock, stated, container.findings, channel.name)
 
 
 def _step(channel: Any) -> float | None:
@@ -214,8 +145,6 @@ def _unit(channel: Any) -> str | None:
 def write_tdms(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
     """Write one channel per column with its unit, one group per clock with its `time`, and one segment per part."""
     nptdms = library("nptdms", "tdms")
-    many = len(groups) > 1
-    shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with nptdms.TdmsWriter(str(path)) as writer:
         objects = [nptdms.RootObject(properties=prefix_keys(provenance))]
         objects += [nptdms.GroupObject(group.name) for group in groups]
@@ -223,13 +152,7 @@ def write_tdms(path: Path, groups: Sequence[Group], parts: Parts, provenance: Ma
         for ready in parts:
             rows = [_channel_rows(nptdms, group, part) for group, part in zip(groups, ready, strict=True)]
             writer.write_segment(list(chain(*rows)))
-    return [
-        [
-            [f"{group.name}/{part.name}" if many and shared[part.name] > 1 else part.name for part in parts]
-            for parts in group.flat
-        ]
-        for group in groups
-    ]
+    return names_of(groups, [group.name for group in groups])
 
 
 def _channel_rows(nptdms: Any, group: Group, part: Part | None) -> list[Any]:
@@ -243,26 +166,3 @@ def _channel_rows(nptdms: Any, group: Group, part: Part | None) -> list[Any]:
         nptdms.ChannelObject(group.name, column.name, array, {"unit_string": column.unit} if column.unit else {})
         for column, array in zip(columns, values, strict=True)
     ]
-
-
-@contextmanager
-def collect_warnings(library: str) -> Iterator[list[str]]:
-    """Yield a list that collects the warnings of a library's loggers within the context; no handler prints them.
-
-    Only loggers of modules that are already imported are collected. Files that are read at the same time share the
-    warnings.
-    """
-    known = [name for name in logging.Logger.manager.loggerDict if name == library or name.startswith(f"{library}.")]
-    loggers, lines = [logging.getLogger(name) for name in known], list[str]()
-
-    def collect(record: logging.LogRecord) -> bool:
-        lines.append(" ".join(record.getMessage().split())[:200])
-        return False
-
-    for logger in loggers:
-        logger.addFilter(collect)
-    try:
-        yield lines
-    finally:
-        for logger in loggers:
-            logger.removeFilter(collect)

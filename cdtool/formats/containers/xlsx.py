@@ -14,7 +14,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import datetime, time, timedelta
-from functools import cache
+from fractions import Fraction
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
@@ -24,17 +25,15 @@ import numpy as np
 from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
-from cdtool.formats.column_names import OWN_CLOCK, requested_keys, split_unit
+from cdtool.formats.column_names import split_unit
 from cdtool.formats.columns import Column
 from cdtool.formats.containers.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.containers.container_checks import check_size, library, one_line_errors
 from cdtool.formats.csv import Csv
-from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
 from cdtool.formats.source import Source
 
 _MAGIC, _WORKBOOK, _SEPARATOR = b"PK\x03\x04", "xl/workbook.xml", "\t"
-# The texts of a workbook are held in memory.
-_MOST_TEXT = 64 * 2**20
 # Excel has at most so many rows; a log has no more columns than this.
 _MOST_ROWS, _MOST_COLUMNS = 1_048_576, 4096
 # A cell with a formula but without a value, and its place in its attributes.
@@ -81,7 +80,7 @@ class Xlsx:
             tables = [sheet for sheet in sheets if sheet.rows_of_numbers > 1]
             if not tables:
                 raise RecordingError("no sheet contains rows of numbers", "is it the right workbook?")
-            source = tables[0].source(wanted) if len(tables) == 1 else _join(path, tables, wanted)
+            source = tables[0].source(wanted) if len(tables) == 1 else _Tables(tables).columns(path, wanted)
         left_out = tuple(
             Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": "it contains no rows of numbers"})
             for sheet in sheets
@@ -226,7 +225,7 @@ def _moment(value: Any) -> str:
 def _read_sheets(path: Path, openpyxl: Any, folder: Path) -> list[_Sheet]:
     """Return the sheets of a workbook, their texts in files of a folder; raises RecordingError."""
     with zipfile.ZipFile(path) as archive:
-        _check_archive(path, archive)
+        check_size(path, sum(part.file_size for part in archive.infolist()) // 8)
     sheets = list[_Sheet]()
     with _opened(openpyxl, path) as workbook:
         # Dates as numbers of days, since the library rounds moments to milliseconds.
@@ -263,59 +262,52 @@ def _opened(openpyxl: Any, path: Path) -> Iterator[Any]:
             workbook.close()
 
 
-def _check_archive(path: Path, archive: zipfile.ZipFile) -> None:
-    """Raise RecordingError if the parts of a workbook are far larger than the file."""
-    parts = archive.infolist()
-    check_size(path, sum(part.file_size for part in parts) // 8)
-    for part in parts:
-        if part.filename.endswith("sharedStrings.xml") and part.file_size > _MOST_TEXT:
-            raise RecordingError(f"contains {part.file_size >> 20} MiB of texts: refused", "save it as CSV")
+@dataclass(frozen=True)
+class _Tables(SlicedFormat):
+    """Several sheets of a workbook: a column is `sheet!column`, with the clock of its sheet."""
+
+    name: ClassVar[str] = "xlsx"
+    sheets: list[_Sheet]
+
+    @contextmanager
+    def _open(self, container: Container) -> Iterator[None]:
+        sources: dict[_Sheet, Source] = {}
+        for sheet in self.sheets:
+            try:
+                sources[sheet] = sheet.source()
+            except RecordingError as fault:
+                reason = fault.message.replace(f"sheet '{sheet.name}': ", "", 1)
+                left_out = Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": reason}, "loss")
+                container.findings.append(left_out)
+        if not sources:
+            raise RecordingError(f"no sheet can be read: {container.findings[0]}", "save each sheet as CSV")
+        container.origin = start = min((source.origin for source in sources.values() if source.origin), default=0.0)
+        for sheet, source in sources.items():
+            container.findings += [_in_sheet(sheet.name, finding) for finding in source.findings]
+            _add_columns(container, sheet, source, start)
+        yield
 
 
-def _join(path: Path, tables: list[_Sheet], wanted: ChannelMap | None) -> Source:
-    """Return the columns of several sheets, `sheet!column`, each with the clock of its sheet."""
-    sources: dict[_Sheet, Source] = {}
-    findings: list[Finding] = []
-    for sheet in tables:
-        try:
-            sources[sheet] = sheet.source()
-        except RecordingError as fault:
-            reason = fault.message.replace(f"sheet '{sheet.name}': ", "", 1)
-            findings.append(Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": reason}, "loss"))
-    if not sources:
-        raise RecordingError(f"no sheet can be read: {findings[0]}", "save each sheet as CSV")
-    names = tuple(f"{sheet.name}!{name}" for sheet, source in sources.items() for name in source.names)
-    keys = requested_keys(wanted, names)
-    own_clocks = wanted is None or wanted.time.column == OWN_CLOCK
-    start = min((source.origin for source in sources.values() if source.origin), default=0.0)
-    columns: dict[str, Column] = {}
-    clock_of: dict[str, tuple[EpochClock, int]] = {}
-    for sheet, source in sources.items():
-        later = source.origin - start if source.origin else 0.0
-        dated = {name for i, name in enumerate(source.names) if i in sheet.dates}
-        found = {
-            f"{sheet.name}!{name}": replace(column, values=column.values + later * (name in dated))
-            for name, column in source.columns.items()
-        }
-        findings += [_in_sheet(sheet.name, finding) for finding in source.findings]
-        clock = next((key for key, column in found.items() if _is_clock(sheet.name, key, column)), None)
-        if own_clocks and clock is not None:
-            stamps = found[clock].values
-            assumed = assumed_clock(clock, stamps, findings, found[clock].unit)
-            clock_of |= dict.fromkeys(found, (assumed, len(stamps)))
-        columns |= found
-    missing = [key for key in keys if key not in columns]
-    if wanted is not None and missing:
-        raise RecordingError(f"column '{missing[0]}' has cells that are not numbers", "see cdtool info")
-    origin = common_origin([] if start else [clock for clock, _ in clock_of.values()])
-    times = {key: clock.times(0, count, origin) for key, (clock, count) in clock_of.items()}
-    shown = {key: replace(column, name=key, time=times.get(key)) for key, column in columns.items() if key in {*keys}}
-    return Source(path, Xlsx.name, shown, start or float(origin), tuple(findings), names=names)
+def _add_columns(container: Container, sheet: _Sheet, source: Source, start: float) -> None:
+    """Add the columns of a sheet; its dates are seconds after `start`."""
+    dated = {name for i, name in enumerate(source.names) if i in sheet.dates}
+    stamps = next((column for column in source.columns.values() if _is_clock(column)), None)
+    clock = None
+    if stamps is not None and container.has_own_clocks:
+        clock = assumed_clock(f"{sheet.name}!{stamps.name}", stamps.values, container.findings, stamps.unit)
+        if stamps.name in dated:
+            clock, container.origin = replace(clock, base=Fraction(source.origin), dated=True), 0.0
+    later = source.origin - start if source.origin else 0.0
+    sliced = {
+        name: SlicedColumn.of(column.values + later * (name in dated), clock, column.unit)
+        for name, column in source.columns.items()
+    }
+    container.columns |= {f"{sheet.name}!{name}": partial(sliced.get, name) for name in source.names}
 
 
-def _is_clock(sheet: str, key: str, column: Column) -> bool:
+def _is_clock(column: Column) -> bool:
     """Return whether a column of a sheet has the name of a clock, and stamps."""
-    return is_clock_name(split_unit(key.removeprefix(f"{sheet}!"))[0]) and bool(np.isfinite(column.values).any())
+    return is_clock_name(split_unit(column.name)[0]) and bool(np.isfinite(column.values).any())
 
 
 def _in_sheet(sheet: str, finding: Finding) -> Finding:

@@ -24,7 +24,6 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, naming
-from cdtool.base.findings import Finding
 from cdtool.base.plain_text import counted
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.csv import Csv
@@ -57,9 +56,6 @@ _SAMPLE_ROWS = 50
 _TICKS_PER_S, _TICKS_1970 = 1e7, 116_444_736_000_000_000
 # Ticks since 1917 have 18 digits: fewer are damaged. No export is long enough for as many milliseconds.
 _FEWEST_TICKS = 10**17
-_NAME = re.compile(rf"(?<![^ ]){NAME}(?![^ ])")
-# A unit with its quantity in parentheses, `(None)`, or any other word.
-_BETWEEN_BLANKS = re.compile(r"[^ ]+ \((?!None\))[^()]*\)|[^ ]+")
 _WORDED_UNIT = re.compile(r"(?P<unit>[^(]*?)\s*\([^()]*\)")
 
 
@@ -123,10 +119,7 @@ class _ScopeHead:
 
 def _read_export(path: Path, pins: TablePins) -> TimedText:
     text, stream = open_table(path, pins.encoding, _MOST_HEAD)
-    head, findings = _read_head(text, stream.split(text.line_end)), list[Finding]()
-    if head.separator == " ":
-        _refuse_empty_cells(text, head)
-        head = _between_blanks(head, findings)
+    head = _read_head(text, stream.split(text.line_end))
     # A line in which a cell contains the separator is wider than the others: it would be read in the wrong columns.
     usual = Counter(map(len, head.of_channels.values())).most_common(1)[0][0]
     head = replace(head, of_channels={key: line for key, line in head.of_channels.items() if len(line) == usual})
@@ -161,13 +154,18 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     of_groups = {key: at for group in groups for key, at in group.columns.items()}
     units = {key: _unit(head.cell((_UNIT,), at)) for key, at in of_groups.items()}
     origin = (first - _TICKS_1970) / _TICKS_PER_S if ticks else _start(head)
-    return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, tuple(findings))
+    return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, ())
 
 
 def _read_head(text: Text, raw: Sequence[bytes]) -> _ScopeHead:
     separator = scope_separator([text.decode(line).rstrip("\r") for line in raw[:_MOST_FILE_LINES]])
     if separator is None:
         raise RecordingError("is not an export of TwinCAT Scope", "see cdtool list formats")
+    if separator == " ":
+        raise RecordingError(
+            "is separated by blanks, as names, units and empty cells may be",
+            "export it again with tabs or semicolons",
+        )
     of_file: dict[str, list[str]] = {}
     of_channels: dict[str, list[str]] = {}
     start = 0
@@ -190,46 +188,6 @@ def _read_head(text: Text, raw: Sequence[bytes]) -> _ScopeHead:
             "has no line with the names of channels", "export it again with a header that has at least the names"
         )
     raise RecordingError("has no row of numbers", "was the export stopped, or the copy cut off?")
-
-
-def _refuse_empty_cells(text: Text, head: _ScopeHead) -> None:
-    """Raise RecordingError if a table that is separated by blanks has empty cells, which are blanks too."""
-    for block in text.blocks(head.start):
-        if block[:1] == b" " or b"  " in block or text.line_end + b" " in block:
-            raise RecordingError(
-                "is separated by blanks and has empty cells, which are blanks too",
-                "export it again with tabs or semicolons",
-            )
-
-
-def _between_blanks(head: _ScopeHead, findings: list[Finding]) -> _ScopeHead:
-    """Return the head with the cells of lines that are separated by blanks, which names and units may contain.
-
-    Data types have no blanks: their line shows how many channels follow each column of times. Names that cannot be told
-    apart are replaced by those of the symbols, or by the numbers of their columns, with a note.
-    """
-    of_words = {key: cells for key, cells in head.of_channels.items() if key not in (NAME, _UNIT)}
-    if not of_words:
-        return head
-    usual = Counter(map(len, of_words.values())).most_common(1)[0][0]
-    whole = {key: cells for key, cells in of_words.items() if len(cells) == usual}
-    key, layout = next(iter(whole.items()))
-    clocks = [at for at, cell in enumerate(layout) if cell == key]
-    symbols = whole.get(_SYMBOL, [str(at) for at in range(usual)])
-    parts = _NAME.split(" ".join(head.of_channels.get(NAME, [])))[1:]
-    parts = parts if len(parts) == len(clocks) else [""] * len(clocks)
-    names, replaced = list[str](), 0
-    for at, end, part in zip(clocks, [*clocks[1:], usual], parts, strict=True):
-        words = [part.strip()] if end - at == 2 and part.strip() else part.split()
-        if len(words) != end - at - 1:
-            replaced += end - at - 1
-            words = symbols[at + 1 : end]
-        names += [NAME, *words]
-    if replaced:
-        findings.append(Finding("names_of_symbols", "", {"count": replaced}))
-    units = _BETWEEN_BLANKS.findall(" ".join(head.of_channels.get(_UNIT, [])))
-    is_clear = len(units) == usual and all(units[at] == _UNIT for at in clocks)
-    return replace(head, of_channels={**whole, NAME: names, **({_UNIT: units} if is_clear else {})})
 
 
 def _keys(head: _ScopeHead) -> dict[int, str]:

@@ -74,6 +74,17 @@ class MatColumn:
     sections: tuple[VariableSection, ...]
     clock: str = ""
 
+    @property
+    def rows(self) -> int:
+        """Return the number of its values."""
+        return sum(max(section.numbers.shape) for section in self.sections)
+
+    @cached_property
+    def values(self) -> npt.NDArray[Any]:
+        """Return its values (n,) as the file has them."""
+        parts = [section.values() for section in self.sections]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
 
 @dataclass(frozen=True)
 class Opaque:

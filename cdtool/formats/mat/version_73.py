@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.containers.container_checks import check_chunks
+from cdtool.formats.containers.container_checks import check_chunks, check_size
 from cdtool.formats.mat.variables import Numbers, Opaque, Value, ValueCount, Variables
 
 _USER_BLOCK, _MAGIC, _HDF5 = 512, b"MATLAB 7.", b"\x89HDF\r\n\x1a\n"
@@ -114,6 +114,7 @@ class _Version73Reader:
         return " ".join(np.ascontiguousarray(row).tobytes().decode("utf-16-le", "replace").strip() for row in codes)
 
     def _load(self, dataset: Any, shape: tuple[int, ...], is_complex: bool) -> npt.NDArray[Any]:
+        check_size(self._path, dataset.size)
         check_chunks(self._path, dataset.name, dataset)
         values = dataset[()]
         if is_complex:

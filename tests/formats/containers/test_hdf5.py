@@ -59,6 +59,18 @@ def test_a_clock_column_of_the_machine_file_takes_precedence_over_the_files_own(
     assert recording["position"].time[-1] == 90.0
 
 
+def test_an_epoch_clock_of_the_machine_file_beside_the_files_own_is_subtracted_once(tmp_path):
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name in ("clock", "time"):
+            file[name] = 1.7e9 + np.arange(5.0)
+            file[name].attrs["unit"] = "s"
+        file["q"] = np.arange(5.0)
+    text = MACHINE.split("joints")[0] + '[channels]\ntime = { column = "clock", unit = "s" }\n'
+    (tmp_path / "machine.toml").write_text(text + 'position = { column = "q", unit = "rad" }\n')
+    recording = read_recording(tmp_path / "log.h5", read_machine_file(tmp_path / "machine.toml"))
+    assert recording.origin == 1.7e9 and recording["position"].time.tolist() == [0, 1, 2, 3, 4]
+
+
 def test_texts_compounds_scalars_and_matlabs_texts_are_named_and_left_out(tmp_path):
     path = tmp_path / "log.h5"
     with h5py.File(path, "w") as file:

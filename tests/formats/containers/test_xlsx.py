@@ -211,6 +211,19 @@ def test_sheets_with_dates_start_on_one_clock(tmp_path):
     assert source.columns["b!F"].time[0] == 0.0
 
 
+def test_dates_of_a_sheet_that_a_machine_file_names_as_the_clock_keep_their_start(tmp_path, machine):
+    def rows(later: float):
+        return [["Zeit", "v"], *([NOON + dt.timedelta(seconds=later + 0.1 * i), 1.0 * i] for i in range(20))]
+
+    path = save(tmp_path / "log.xlsx", a=rows(2.0), b=rows(0.0))
+    for column, start in (("time", 2.0), ("a!Zeit", 2.0)):
+        channels = f'[channels]\ntime = {{ column = "{column}", unit = "s" }}\n'
+        mapped = machine(channels + 'speed = { column = "a!v", unit = "rad/s" }\n')
+        recording = read_as_logged(path, mapped).recording
+        first = recording.origin + recording["speed"].time[0]
+        assert first == pytest.approx(NOON.replace(tzinfo=dt.UTC).timestamp() + start, abs=1e-5)
+
+
 @pytest.mark.parametrize("clock", ['column = "time", unit = "s"', 'column = "Run!t", unit = "s"'])
 def test_a_machine_file_maps_columns_of_a_sheet(tmp_path, machine, clock):
     path = save(tmp_path / "log.xlsx", Run=[["t", "v [rad/s]"], *ramp()], Other=[["t", "F"], *ramp(9)])

@@ -82,25 +82,10 @@ def test_a_stamp_with_another_number_of_digits_than_a_filetime_is_no_time(tmp_pa
     assert [fact_of(finding) for finding in source.findings] == [("values_without_time", {"count": 1})]
 
 
-def test_an_export_separated_by_blanks_is_read_if_no_cell_is_empty(tmp_path):
+def test_an_export_separated_by_blanks_is_refused_with_the_option_that_helps(tmp_path):
     path = write_export(tmp_path / "run.csv", SORTED, Options(separator=" "))
-    source = survey(path)
-    assert_read(source, SORTED)
-    assert [column.unit for column in source.columns.values()] == [None] * 4  # "N m" is two words
-    nominal = [*SORTED[:3], replace(SORTED[3], unit="Nm")]
-    source = survey(write_export(path, nominal, Options(separator=" ")))
-    assert [column.unit for column in source.columns.values()] == [None, "mm", "mm/s", "Nm"] and not source.findings
-    with pytest.raises(RecordingError, match="empty cells, which are blanks too"):
-        survey(write_export(path, CHANNELS, Options(separator=" ")))
-
-
-def test_names_that_blanks_make_ambiguous_are_replaced_by_those_of_the_symbols(tmp_path):
-    channels = [Channel("the fast one", "1", ramp(20)), Channel("a b", "5", ramp(4)), Channel("c", "5", ramp(4))]
-    channels = [replace(channel, symbol=f"MAIN.{i}") for i, channel in enumerate(channels)]
-    source = survey(write_export(tmp_path / "run.csv", channels, Options(separator=" ")))
-    assert source.names == ("the fast one", "MAIN.1", "MAIN.2")
-    assert [len(column.values) for column in source.columns.values()] == [20, 4, 4]
-    assert [fact_of(finding) for finding in source.findings] == [("names_of_symbols", {"count": 2})]
+    with pytest.raises(RecordingError, match=r"separated by blanks, .*export it again with tabs or semicolons"):
+        survey(path)
 
 
 def test_a_channel_with_the_name_of_another_has_that_of_its_symbol_or_its_column(tmp_path):
