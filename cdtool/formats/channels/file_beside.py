@@ -17,7 +17,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding, Severity
 from cdtool.base.remote.remote_path import location, relative_name
-from cdtool.formats.channels.channel_assembly import assemble_recording
+from cdtool.formats.channels.channel_assembly import assemble_recording, file_digest
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, OwnFile
 from cdtool.formats.source import Source
 from cdtool.machines.dynamics import Machine
@@ -76,7 +76,7 @@ def _read(
         sources.append(ChannelSource("trigger", columns=(own.file_trigger,)))
     source, resolved = read(path, ChannelMap(own.time, tuple(sources), channels.joints))
     with naming(path):
-        return assemble_recording(source, resolved, machine)
+        return assemble_recording(source, resolved, machine, file_digest(path)).recording
 
 
 @dataclass(frozen=True)

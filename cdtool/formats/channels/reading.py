@@ -1,7 +1,4 @@
-"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece.
-
-The axes of a force vector whose columns or topics have clocks of their own: joined on one clock, causally.
-"""
+"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece."""
 
 from __future__ import annotations
 
@@ -16,104 +13,31 @@ import numpy as np
 from cdtool.base.errors import ConfigurationError, RecordingError, naming
 from cdtool.base.files.kinds import kind_of
 from cdtool.base.findings import Finding
-from cdtool.base.log_names import log_stem, log_suffix
+from cdtool.base.log_names import log_suffix
 from cdtool.base.remote.remote_path import location
 from cdtool.formats import FORMATS
-from cdtool.formats.channels.channel_assembly import assemble_recording
+from cdtool.formats.channels.channel_assembly import LoggedRecording, assemble_recording, file_digest
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
 from cdtool.formats.channels.file_beside import add_files_beside
-from cdtool.formats.channels.header_units import unit_findings
-from cdtool.formats.channels.logged_recording import LoggedRecording
 from cdtool.formats.channels.parts import (
     Span,
-    join_recordings,
+    join_digests,
+    join_parts,
     join_sources,
     loss_findings,
     missing_part_findings,
     named_parts,
 )
 from cdtool.formats.column_names import OWN_CLOCK, resolve_columns
-from cdtool.formats.columns import Column, Piece
+from cdtool.formats.columns import Piece
 from cdtool.formats.csv.gzipped import MAGIC
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.machine_file import MachineFile
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source
-from cdtool.recordings.clock import HOLD_PERIODS, clean_time, previous_value
 from cdtool.recordings.clock.stamps import epoch_start
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.recordings.recording import Recording, Series
-
-
-def fields_by_axis(channels: ChannelMap) -> ChannelMap:
-    """Return a map of topics in which every axis of a force is a source of its own; any other map is unchanged."""
-    if not any(item.fields for item in channels.sources):
-        return channels
-    return replace(channels, sources=tuple(axis for item in channels.sources for axis in item.by_axis))
-
-
-def join_fields(source: Source, resolved: ChannelMap, wanted: ChannelMap) -> tuple[Source, ChannelMap]:
-    """Return a source in which the fields of a force vector are one column, and its map; the inverse of fields_by_axis.
-
-    `wanted` is the map of the machine file. A vector without one of its axes is missing. Raises RecordingError.
-    """
-    vectors = [item for item in wanted.sources if item.fields]
-    if not vectors:
-        return source, resolved
-    present = {key for item in resolved.sources for key in item.keys}
-    sources = [item for item in resolved.sources if item.channel not in {vector.channel for vector in vectors}]
-    columns, findings = dict(source.columns), list(source.findings)
-    for vector in vectors:
-        keys = [axis.described for axis in vector.by_axis]
-        if not present.issuperset(keys):
-            continue
-        column, notes = join_axes(vector, [source.columns[key] for key in keys])
-        columns[vector.channel] = column
-        findings += notes
-        sources.append(replace(vector, keys=(vector.channel,)))
-    return replace(source, columns=columns, findings=tuple(findings)), replace(resolved, sources=tuple(sources))
-
-
-def join_axes(item: ChannelSource, axes: Sequence[Column]) -> tuple[Column, list[Finding]]:
-    """Return the axes of a force as one column (n, axes), and a note if they have different clocks.
-
-    The clock is then that of the axis with the longest period; of every other axis, each time has the last sample at or
-    before it, NaN if that is older than 5 of its periods. Raises RecordingError if an axis has no sample.
-    """
-    for axis in axes:
-        if axis.time is None or axis.values.ndim != 1 or not len(axis.values):
-            problem = "is not one number per sample" if axis.values.ndim != 1 else "has no sample with a time"
-            raise RecordingError(
-                f"'{axis.name}' (channel '{item.channel}') {problem}",
-                "name one element per axis, each with a clock",
-                channel=item.channel,
-            )
-    first = axes[0].time
-    if all(axis.time is first or np.array_equal(axis.time, first) for axis in axes):  # type: ignore[arg-type]
-        return Column(item.channel, np.column_stack([axis.values for axis in axes]), first), []
-    clean = [_cleaned(item, axis) for axis in axes]
-    slowest = max(range(len(axes)), key=lambda k: clean[k].period if np.isfinite(clean[k].period) else 0.0)
-    clock = clean[slowest].time
-    held = np.column_stack([previous_value(series, clock)[:, 0] for series in clean])
-    ages = [_longest_age(series, clock) for k, series in enumerate(clean) if k != slowest]
-    fact = {"slowest": axes[slowest].name, "age": max(ages, default=0.0)}
-    return Column(item.channel, held, clock), [Finding("axes_held", item.channel, fact)]
-
-
-def _cleaned(item: ChannelSource, axis: Column) -> Series:
-    clean = clean_time(axis.time)  # type: ignore[arg-type]
-    if not len(clean.time):
-        raise RecordingError(f"'{axis.name}' has no sample with a time", channel=item.channel)
-    return Series(clean.time, axis.values[clean.keep], "1")
-
-
-def _longest_age(series: Series, clock: np.ndarray) -> float:
-    """Return the largest age of the samples that are held [s], among those that are not too old."""
-    at = np.searchsorted(series.time, clock, side="right") - 1
-    age = (clock - series.time[np.maximum(at, 0)])[at >= 0]
-    age = age[age <= HOLD_PERIODS * series.period] if np.isfinite(series.period) else age
-    return float(age.max(initial=0.0))
-
 
 # The parts of a log in a folder; the first kind that is there is read.
 _PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
@@ -206,9 +130,7 @@ def _part_pieces(folder: Path, keys: Collection[str] | None, read: ReadFile) -> 
     parts: list[tuple[Source, Mapping[str, Span]]] = []
     for part in (*log.filled, *log.empty):
         if not has_topics(chosen := choose_format(part)):
-            raise RecordingError(
-                f"{part}: is not a log of topics, as a part of a log has to be", "remove it or its suffix"
-            )
+            raise _not_of_topics(part)
         run = PieceRun(read(chosen, part, keys))
         spans: dict[str, Span] = {}
         for piece in run:
@@ -251,23 +173,40 @@ def read_as_logged(path: Path, machine_file: MachineFile, unread: Unread = "erro
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
-    paths, lost = _parts_of(path, unread) if path.is_dir() else ([path], [])
-    parts: list[Recording] = []
-    headers: list[Source] = []
-    factors: dict[str, tuple[float, ...]] = {}
-    for part in paths:
-        source, channels = mapped_source(part, machine_file)
-        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
-        with naming(part):
-            parts.append(assemble_recording(source, channels, machine_file.machine))
-        headers.append(replace(source, columns={}))
-    name = path.name if path.is_dir() else log_stem(path)
-    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
-    if path.is_dir():
-        whole = replace(whole, source=str(path), findings=(*lost, *whole.findings))
+    source, channels, digest = mapped_log(path, machine_file, unread=unread)
+    with naming(path):
+        name = path.name if path.is_dir() else ""
+        logged = assemble_recording(source, channels, machine_file.machine, digest, name)
     if machine_file.columns.beside or machine_file.topics.beside:
-        whole = _with_files_beside(whole, path, machine_file, unread)
-    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
+        return replace(logged, recording=_with_files_beside(logged.recording, path, machine_file, unread))
+    return logged
+
+
+def mapped_log(
+    path: Path,
+    machine_file: MachineFile,
+    also: Callable[[bool], ChannelSource] | None = None,
+    unread: Unread = "error",
+) -> tuple[Source, ChannelMap, str]:
+    """Return the mapped columns of a log, a file or a folder of parts, the map for them, and the log's digest.
+
+    `also` is a further column, as for mapped_source. Raises RecordingError or ConfigurationError.
+    """
+    if not path.is_dir():
+        return (*mapped_source(path, machine_file, also), file_digest(path))
+    files, lost = _parts_of(path, unread)
+    parts = sorted((mapped_source(file, machine_file, also) for file in files), key=lambda part: part[0].origin)
+    for part, channels in parts:
+        if not channels.topics:
+            raise _not_of_topics(part.path)
+    with naming(path):
+        source, channels = join_parts(path, parts)
+    digest = join_digests([file_digest(part.path) for part, _ in parts])
+    return replace(source, findings=(*lost, *source.findings)), channels, digest
+
+
+def _not_of_topics(part: Path) -> RecordingError:
+    return RecordingError(f"{part}: is not a log of topics, as a part of a log has to be", "remove it or its suffix")
 
 
 def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFile, unread: Unread) -> Recording:
@@ -371,11 +310,23 @@ def mapped_source(
     with naming(path):
         if topics and not channels.topics:
             raise RecordingError("contains topics, but columns are mapped", "give a file of columns")
-        asked = fields_by_axis(channels)
+        asked = replace(channels, sources=tuple(axis for item in channels.sources for axis in item.by_axis))
         source, resolved = resolve_columns(file_format.columns(path, asked), asked)
         if resolved.time.nanoseconds_key:
             source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
-        return with_own_clocks(*join_fields(source, resolved, channels))
+        return with_one_clock(source, resolved), _with_vectors(resolved, channels)
+
+
+def _with_vectors(resolved: ChannelMap, channels: ChannelMap) -> ChannelMap:
+    """Return a resolved map in which the axes of a force are one source again; one without all its axes is missing."""
+    vectors = [
+        replace(item, keys=tuple(axis.described for axis in item.by_axis)) for item in channels.sources if item.fields
+    ]
+    names = {item.channel for item in vectors}
+    present = {key for item in resolved.sources for key in item.keys}
+    whole = [item for item in vectors if present.issuperset(item.keys)]
+    sources = (*(item for item in resolved.sources if item.channel not in names), *whole)
+    return replace(resolved, sources=sources)
 
 
 def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: float = 1.0) -> Source:
@@ -452,50 +403,26 @@ def _read_head(path: Path) -> bytes:
     return head
 
 
-def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
-    """Return a source whose columns have their own clocks, and its map, with one column per channel.
+def with_one_clock(source: Source, channels: ChannelMap) -> Source:
+    """Return a source whose mapped columns have clocks of their own, or none.
 
-    MDF4, TDMS and HDF5 files have such columns. A table is returned unchanged. The map's columns are resolved
-    (resolve_columns). Raises RecordingError if the columns of a channel have different clocks or no clock, and
-    ConfigurationError if the machine file states another unit than s for the clock.
+    MDF4, TDMS and HDF5 files have columns with their own clocks, which count if the machine file names them. Raises
+    RecordingError if a column has no clock, and ConfigurationError if the machine file states another unit than s.
     """
     if channels.topics or not any(column.time is not None for column in source.columns.values()):
-        return source, channels
+        return source
     if channels.time.column != OWN_CLOCK:  # a column or a rate that the machine file names decides
-        plain = {name: replace(column, time=None) for name, column in source.columns.items()}
-        return replace(source, columns=plain), channels
+        return replace(source, columns={name: replace(column, time=None) for name, column in source.columns.items()})
     if channels.time.factor != 1.0:
         raise ConfigurationError(
             "its own clock is in s, but [channels] time states another unit", 'time = { column = "time", unit = "s" }'
         )
-    joined, notes = dict[str, Column](), list[Finding]()
     for item in channels.sources:
-        joined[item.channel], of_axes = _joined(source, item)
-        notes += of_axes
-    sources = tuple(replace(item, keys=(item.channel,)) for item in channels.sources)
-    names = tuple(joined)
-    # The units are compared here, as joined columns have no unit.
-    findings = (*source.findings, *unit_findings(source, channels), *notes)
-    source = replace(source, columns=joined, names=names, findings=findings)
-    return source, replace(channels, sources=sources, topics=True)
-
-
-def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]:
-    parts = [source.columns[key] for key in item.keys]
-    if item.axes and all(part.time is not None for part in parts):
-        return join_axes(item, parts)
-    time = parts[0].time
-    for part in parts:
-        if part.time is None or time is None:
-            raise RecordingError(
-                f"column '{part.name}' (channel '{item.channel}') has no clock",
-                "name the column with its clock in [channels] time",
-                channel=item.channel,
-            )
-        if not np.array_equal(part.time, time):
-            raise RecordingError(
-                f"'{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
-                "all joints of a channel must have the same clock",
-                channel=item.channel,
-            )
-    return Column(item.channel, np.column_stack([part.values for part in parts]), time, words=parts[0].words), []
+        for key in item.keys:
+            if source.columns[key].time is None:
+                raise RecordingError(
+                    f"column '{source.columns[key].name}' (channel '{item.channel}') has no clock",
+                    "name the column with its clock in [channels] time",
+                    channel=item.channel,
+                )
+    return source

@@ -20,11 +20,9 @@ from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.plain_text import counted, first_of
 from cdtool.base.remote.remote_path import location
-from cdtool.formats.channels.channel_assembly import assemble_recording, file_digest
+from cdtool.formats.channels.channel_assembly import LoggedRecording, assemble_recording
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
-from cdtool.formats.channels.logged_recording import LoggedRecording
-from cdtool.formats.channels.parts import join_details, join_digests, join_topics, missing_part_findings, with_file_name
-from cdtool.formats.channels.reading import log_parts, mapped_source
+from cdtool.formats.channels.reading import mapped_log
 from cdtool.formats.channels.run_segments import Rows, Segments, segments_by_id, segments_by_reset
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import MachineFile
@@ -107,14 +105,11 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
             f"{machine_file.path}: a channel in a file of its own cannot be divided into the runs of {path}",
             "write each run to a log of its own, or map a channel of the log",
         )
-    files = log_parts(path)
     also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
-    mapped = [mapped_source(file, machine_file, also) for file in files]
+    source, channels, digest = mapped_log(path, machine_file, also)
     with naming(path):
-        channels = _common_map([item for _, item in mapped])
-        source = _joined(path, [item for item, _ in mapped]) if path.is_dir() else mapped[0][0]
         whole = _by_reset(source, channels, cut) if also is None else _by_id(source, channels, cut)
-        return whole.runs(pattern, machine_file.machine, join_digests([file_digest(file) for file in files]))
+        return whole.runs(pattern, machine_file.machine, digest)
 
 
 def _fits(name: str, pattern: str) -> bool:
@@ -199,7 +194,7 @@ class _CutLog:
         times, start = self._times(run)
         columns: dict[str, Column] = {}
         for key, column in source.columns.items():
-            clock = id(column.time) if self.channels.topics else 0
+            clock = _clock_of(column)
             if clock in self.rows:  # of a channel
                 columns[key] = replace(column, values=column.values[self.rows[clock][run]], time=times.get(clock))
         if 0 in self.rows:
@@ -209,10 +204,7 @@ class _CutLog:
         mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
         origin = source.origin + start
         part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=tuple(absent))
-        recording = assemble_recording(part, channels, machine, mark)
-        recording = replace(recording, name=f"{log_stem(source.path)}{_MARK}{name}")
-        factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
-        return LoggedRecording(recording, factors, channels.speed_low_pass, (replace(source, columns={}),))
+        return assemble_recording(part, channels, machine, mark, f"{log_stem(source.path)}{_MARK}{name}")
 
     def _times(self, run: int) -> tuple[dict[int, FloatArray], float]:
         """Return the times of a run by clock, and their start [s].
@@ -259,12 +251,12 @@ class _CutLog:
         if self.cut.by == "clock-reset":
             return
         columns = self.source.columns
-        channels = {id(columns[item.keys[0]].time): item.channel for item in reversed(self.channels.sources)}
-        totals = {id(column.time) if self.channels.topics else 0: len(column.values) for column in columns.values()}
+        channels = {_clock_of(columns[item.keys[0]]): item.channel for item in reversed(self.channels.sources)}
+        totals = {_clock_of(column): len(column.values) for column in columns.values()}
         for clock, rows in self.rows.items():
             if outside := totals[clock] - sum(map(len, rows)):
                 fact = {"count": outside, "total": totals[clock], "column": self.cut.column}
-                yield Finding("samples_outside_runs", channels.get(clock, "") if self.channels.topics else "", fact)
+                yield Finding("samples_outside_runs", channels[clock] if clock else "", fact)
 
     def no_run(self, longest: int) -> RecordingError:
         """Return the error for a log without a run that can be used."""
@@ -280,11 +272,11 @@ class _CutLog:
 
 
 def _by_id(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
-    """Cut a log by the ids in the last column of the map, beside the channels; raises RecordingError."""
-    *others, last = channels.sources
-    channels = replace(channels, sources=tuple(others))
-    ids = source.columns[last.keys[0]]
-    if ids.words and any(last.keys[0] in other.keys for other in others):
+    """Cut a log by the column of ids, which is in the map beside the channels; raises RecordingError."""
+    key = next(item.keys[0] for item in channels.sources if item.channel == _ID)
+    channels = replace(channels, sources=tuple(item for item in channels.sources if item.channel != _ID))
+    ids = source.columns[key]
+    if ids.words and any(key in other.keys for other in channels.sources):
         raise RecordingError(f"column '{cut.column}' has texts", "map another column to the channel")
     values = ids.values.reshape(len(ids.values), -1)
     if values.shape[1] != 1:
@@ -293,11 +285,11 @@ def _by_id(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
             "select one element, e.g. data[0]",
         )
     time, id_values = ids.time, values[:, 0]
-    if channels.topics and time is not None and np.any(time[1:] < time[:-1]):
+    if time is not None and np.any(time[1:] < time[:-1]):
         order = np.argsort(time, kind="stable")
         time, id_values = time[order], id_values[order]
     segments = segments_by_id(id_values, ids.words, cut.by == "column")
-    if not channels.topics or time is None:
+    if time is None:
         return _CutLog(source, channels, cut, segments, {0: _consecutive(segments)})
     begins, ends = time[segments.start], np.append(time, np.inf)[segments.stop]
     rows = {clock: _between(stamps, begins, ends) for clock, stamps in _clocks(source, channels).items()}
@@ -316,7 +308,7 @@ def _by_reset(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
             "has no clock that could start again: [channels] time states a rate",
             'cut it by a column: by = "column:NAME"',
         )
-    clocks = _clocks(source, channels) if channels.topics else {0: source.columns[channels.time.key].values}
+    clocks = _clocks(source, channels) or {0: source.columns[channels.time.key].values}
     found = {clock: segments_by_reset(time) for clock, time in clocks.items()}
     counts = sorted({len(item) for item in found.values()})
     if len(counts) > 1:
@@ -327,6 +319,10 @@ def _by_reset(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
         )
     rows = {clock: _consecutive(segments) for clock, segments in found.items()}
     return _CutLog(source, channels, cut, next(iter(found.values())), rows)
+
+
+def _clock_of(column: Column) -> int:
+    return 0 if column.time is None else id(column.time)
 
 
 def _clocks(source: Source, channels: ChannelMap) -> dict[int, FloatArray]:
@@ -351,39 +347,3 @@ def _between(time: FloatArray, begins: FloatArray, ends: FloatArray) -> list[Row
 
 def _described(cut: RunCut) -> str:
     return cut.by if cut.by == "clock-reset" else f"{cut.by} '{cut.column}'"
-
-
-def _common_map(maps: Sequence[ChannelMap]) -> ChannelMap:
-    """Return the map of all parts of a log; raises RecordingError if their channels differ."""
-    for other in maps[1:]:
-        if [item.channel for item in other.sources] != [item.channel for item in maps[0].sources]:
-            raise RecordingError("its parts have different channels", "cut each part as a log of its own")
-    return maps[0]
-
-
-def _joined(path: Path, parts: Sequence[Source]) -> Source:
-    """Return the columns of the parts of a log one after the other, on the clock of the first part."""
-    first = min(parts, key=lambda part: part.origin)
-    ordered = sorted(parts, key=lambda part: part.origin)
-    columns: dict[str, Column] = {}
-    clocks: dict[tuple[int, ...], FloatArray] = {}
-    for key in first.columns:
-        own = [part.columns[key] for part in ordered]
-        if len({item.values.shape[1:] for item in own}) > 1:
-            raise RecordingError(f"the length of '{key}' differs between its parts", "select one element")
-        times = [item.time for item in own if item.time is not None]
-        clock = tuple(map(id, times))
-        if clock not in clocks:
-            shifted = [time + (part.origin - first.origin) for time, part in zip(times, ordered, strict=True)]
-            clocks[clock] = np.concatenate(shifted)
-        columns[key] = replace(own[0], values=np.concatenate([item.values for item in own]), time=clocks[clock])
-    findings = [item for part in ordered for item in with_file_name(part.path, part.findings)]
-    findings += missing_part_findings(path, [part.path for part in ordered])
-    return replace(
-        first,
-        path=path,
-        columns=columns,
-        findings=tuple(findings),
-        details=join_details(ordered),
-        topics=join_topics(ordered),
-    )
