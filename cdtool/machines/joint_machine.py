@@ -15,7 +15,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.base.tables import Table
-from cdtool.recordings.clock import differentiate, integrate, previous_value
+from cdtool.recordings.clock import differentiate, integrate
 from cdtool.recordings.recording import RIG_UNITS, UNITLESS, Recording, Series
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
@@ -140,9 +140,11 @@ class JointMachine:
         return replace(recording, channels=channels, findings=tuple(findings))
 
     def _integrated_reference(self, channels: Mapping[str, Series]) -> Series:
+        """Return the travel by the reference speed: from the last position at or before its first sample, else 0."""
         speed = channels["reference_speed"]
         travel = integrate(speed, self.load_units["position"])
-        start = np.nan_to_num(previous_value(channels["position"], speed.time[:1])) if "position" in channels else 0.0
+        before = channels["position"].between(-np.inf, speed.time[0]).values if "position" in channels else ()
+        start = np.nan_to_num(before[-1]) if len(before) else 0.0
         return travel.with_values(travel.values + start, travel.unit)
 
     def minus_friction(self, force: FloatArray, speed: FloatArray, velocity: FloatArray) -> FloatArray:
