@@ -9,16 +9,16 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
-from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import location
 from cdtool.base.tables import Table, read_toml
-from cdtool.formats.channels.channel_map import ChannelMap, TablePins, read_channel_map
+from cdtool.detectors import DETECTORS
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, read_channel_map
+from cdtool.machines import MACHINES
 from cdtool.machines.dynamics import Gain, Machine
 
 
@@ -41,42 +41,39 @@ class MachineFile(StoresDerived):
         return f"MachineFile({str(self.path)!r}: {self.machine.name}, joints {', '.join(self.machine.joints)})"
 
     @property
+    def _sources(self) -> tuple[ChannelSource, ...]:
+        maps = (self.columns, self.topics)
+        return tuple(item for each in maps for item in (*each.sources, *each.beside))
+
+    @property
     def force_reduction(self) -> str:
         """Return how the axes of a force become one number, in words; empty if no force has several axes."""
-        maps = (self.columns, self.topics)
-        sources = [source for each in maps for source in (*each.sources, *each.beside)]
-        return " or ".join(dict.fromkeys(item.reduction for item in sources if item.reduction))
+        return " or ".join(dict.fromkeys(item.reduction for item in self._sources if item.reduction))
 
     def maps(self, channel: str) -> bool:
         """Return whether a log has a column, a topic or a file beside it for a channel."""
-        return any(
-            item.channel == channel for each in (self.columns, self.topics) for item in (*each.sources, *each.beside)
-        )
+        return any(item.channel == channel for item in self._sources)
 
     @property
     def label_kinds(self) -> tuple[str, ...]:
         """Return the kinds of contacts that a label channel distinguishes."""
-        sources = (*self.columns.sources, *self.topics.sources)
-        return tuple(dict.fromkeys(kind for item in sources for _, kind in item.kinds))
+        return tuple(dict.fromkeys(kind for item in self._sources for _, kind in item.kinds))
 
     def files_beside(self, log: Path) -> tuple[Path, ...]:
         """Return the files that belong to a log, whether they exist or not."""
-        sources = (*self.columns.beside, *self.topics.beside)
-        return tuple(dict.fromkeys(item.own_file.path_for(log) for item in sources if item.own_file))
+        return tuple(dict.fromkeys(item.own_file.path_for(log) for item in self._sources if item.own_file))
 
     def detector(self, name: str | Any) -> Any:
         """Return the detector of that (full or short) name with this file's gains; an instance as it is, checked."""
-        registry = _registry("cdtool.detectors", "DETECTORS")
         if not isinstance(name, str):
-            return registry.checked(name)
-        full = registry.canonical(name)
-        return registry.load(full)(**self.gains.get(full, {}))
+            return DETECTORS.checked(name)
+        full = DETECTORS.canonical(name)
+        return DETECTORS.load(full)(**self.gains.get(full, {}))
 
     def with_gains_of(self, detectors: Sequence[str | Any]) -> MachineFile:
         """Return the file with the gains of those detectors that are objects; raises UsageError for unknown classes."""
         made = [self.detector(item) for item in detectors if not isinstance(item, str)]
-        registry = _registry("cdtool.detectors", "DETECTORS")
-        return replace(self, gains={**self.gains, **{registry.canonical(item.name): asdict(item) for item in made}})
+        return replace(self, gains={**self.gains, **{DETECTORS.canonical(item.name): asdict(item) for item in made}})
 
 
 def read_machine_file(path: str | Path) -> MachineFile:
@@ -116,18 +113,24 @@ def read_machine_file(path: str | Path) -> MachineFile:
             raise part.fault(
                 "operations", "is a key of the benchmark file", "set it there, or give detect --operations motion"
             )
-    machines = _registry("cdtool.machines", "MACHINES")
-    kind = table.choice("type", machines.names_for(table.values.get("type")))
-    machine = machines.load(kind).from_table(table)
+    kind = table.choice("type", MACHINES.names_for(table.values.get("type")))
+    machine = MACHINES.load(kind).from_table(table)
     table.finish()
     channels = root.table("channels")
     columns = read_channel_map(channels, machine.joints, machine.accepted_units, topics=False)
-    columns = replace(columns, pins=_read_pins(root.table("csv")))
+    if "csv" in root:
+        from cdtool.formats.csv_dialect.pins import read_pins
+
+        columns = replace(columns, pins=read_pins(root.table("csv")))
     topics = read_channel_map(channels.table("mcap"), machine.joints, machine.accepted_units, topics=True)
     if len(machine.joints) == 1 and "joints" not in table:
         topics = replace(topics, named=False)
     gains = _read_gains(root.table("detectors"), len(machine.joints))
-    model = _read_model(root, len(machine.joints))
+    model = None
+    if "model" in root:  # only few commands use it
+        from cdtool.machines.axis_model.model_table import ModelTable
+
+        model = ModelTable.read(root.table("model"), len(machine.joints))
     root.finish()
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
     return MachineFile(file, machine, columns, topics, gains, digest, model)
@@ -150,14 +153,13 @@ def _parameters_text(machine: Machine) -> str:
 
 
 def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
-    registry = _registry("cdtool.detectors", "DETECTORS")
     gains: dict[str, dict[str, Gain]] = {}
     for name in table.values:
         try:
-            full = registry.canonical(name)
+            full = DETECTORS.canonical(name)
         except UsageError as fault:
             raise table.fault(name, fault.message, fault.hint) from fault
-        part, detector = table.table(name), registry.load(full)
+        part, detector = table.table(name), DETECTORS.load(full)
         allowed = [item.name for item in fields(detector)]
         for key in part.values:
             if key not in allowed:
@@ -174,23 +176,3 @@ def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
             raise table.fault(name, f"repeats {full}", "give a detector's gains once, under one of its names")
         gains[full] = given
     return gains
-
-
-def _read_model(root: Table, joints: int) -> Any:
-    if "model" not in root:
-        return None
-    # By name: only few commands use it.
-    return import_module("cdtool.machines.axis_model.model_table").ModelTable.read(root.table("model"), joints)
-
-
-def _read_pins(table: Table) -> TablePins:
-    if not table.values:
-        return TablePins()
-    pins: TablePins = import_module("cdtool.formats.csv_dialect.pins").read_pins(table)
-    return pins
-
-
-def _registry(module: str, name: str) -> Registry:
-    # By name: this module is in a lower layer than the classes.
-    registry: Registry = getattr(import_module(module), name)
-    return registry
