@@ -47,10 +47,6 @@ Unread = Literal["error", "loss"]
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
 
 _KNOWN_CONTENTS = {
-    b"\x89PNG": "a PNG image",
-    b"\xff\xd8\xff": "a JPEG image",
-    b"GIF8": "a GIF image",
-    b"%PDF": "a PDF document",
     b"PK\x03\x04": "a ZIP archive or an Excel workbook",
     b"\x1f\x8b": "gzip-compressed",
     b"(\xb5/\xfd": "zstd-compressed",
@@ -64,13 +60,6 @@ _NEXT_STEPS = {
     "a ZIP archive or an Excel workbook": "unpack the archive, or save the sheet as CSV",
     "gzip-compressed": "only text tables are read compressed; unpack it first, e.g. with gunzip",
     "zstd-compressed": "unpack it first, e.g. with unzstd",
-}
-# UTF-32 first: its mark begins with that of UTF-16.
-_WIDE = {
-    codecs.BOM_UTF32_LE: "utf-32",
-    codecs.BOM_UTF32_BE: "utf-32",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
 }
 
 
@@ -92,14 +81,9 @@ def choose_format(path: Path) -> Format:
         for item in [*by_suffix, *formats]:
             if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
                 return item
-        wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
-        start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
+        start = head.removeprefix(codecs.BOM_UTF8).lstrip()
         content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
         content = kind_of(head) or content if content == "JSON" else content
-        if wide and not content and _is_damaged_text(path, wide):
-            raise RecordingError(
-                f"begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
-            )
         expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
         raise RecordingError(
             f"is not a recording{f': it is {content}' if content else expected}",
@@ -310,11 +294,14 @@ def mapped_source(
     with naming(path):
         if topics and not channels.topics:
             raise RecordingError("contains topics, but columns are mapped", "give a file of columns")
-        asked = replace(channels, sources=tuple(axis for item in channels.sources for axis in item.by_axis))
-        source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+        if topics:
+            asked = replace(channels, sources=tuple(axis for item in channels.sources for axis in item.by_axis))
+            source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+            return source, _with_vectors(resolved, channels)
+        source, resolved = resolve_columns(file_format.columns(path, channels), channels)
         if resolved.time.nanoseconds_key:
             source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
-        return with_one_clock(source, resolved), _with_vectors(resolved, channels)
+        return with_one_clock(source, resolved), resolved
 
 
 def _with_vectors(resolved: ChannelMap, channels: ChannelMap) -> ChannelMap:
@@ -360,14 +347,6 @@ def _suffixes() -> set[str]:
     return {suffix for name in FORMATS.names() for suffix in FORMATS.load(name).suffixes}
 
 
-def _is_damaged_text(path: Path, encoding: str) -> bool:
-    try:
-        codecs.getincrementaldecoder(encoding)().decode(read_sample(path))
-    except UnicodeError:
-        return True
-    return False
-
-
 def is_bag_folder(path: Path) -> bool:
     """Return whether a folder was written by rosbag2: its metadata.yaml names its parts."""
     return path.is_dir() and bool(named_parts(path))
@@ -404,12 +383,12 @@ def _read_head(path: Path) -> bytes:
 
 
 def with_one_clock(source: Source, channels: ChannelMap) -> Source:
-    """Return a source whose mapped columns have clocks of their own, or none.
+    """Return a source of columns that have all a clock of their own, as in MDF4, TDMS and HDF5 files, or none has.
 
-    MDF4, TDMS and HDF5 files have columns with their own clocks, which count if the machine file names them. Raises
-    RecordingError if a column has no clock, and ConfigurationError if the machine file states another unit than s.
+    Their own clocks count if the machine file names them. Raises RecordingError if a column has no clock, and
+    ConfigurationError if the machine file states another unit than s.
     """
-    if channels.topics or not any(column.time is not None for column in source.columns.values()):
+    if all(column.time is None for column in source.columns.values()):
         return source
     if channels.time.column != OWN_CLOCK:  # a column or a rate that the machine file names decides
         return replace(source, columns={name: replace(column, time=None) for name, column in source.columns.items()})
