@@ -143,8 +143,10 @@ class JointMachine:
         """Return the travel by the reference speed: from the last position at or before its first sample, else 0."""
         speed = channels["reference_speed"]
         travel = integrate(speed, self.load_units["position"])
-        before = channels["position"].between(-np.inf, speed.time[0]).values if "position" in channels else ()
-        start = np.nan_to_num(before[-1]) if len(before) else 0.0
+        start: FloatArray | float = 0.0
+        if "position" in channels:
+            before = channels["position"].between(-np.inf, float(speed.time[0])).values
+            start = np.nan_to_num(before[-1]) if len(before) else 0.0
         return travel.with_values(travel.values + start, travel.unit)
 
     def minus_friction(self, force: FloatArray, speed: FloatArray, velocity: FloatArray) -> FloatArray:

@@ -189,48 +189,36 @@ class _CutLog:
 
     def recording(self, run: int, name: str, machine: Machine, digest: str) -> LoggedRecording:
         """Return a run as logged; raises RecordingError if a channel has no sample in it."""
-        source, first_row = self.source, self.source.first_row
-        path = location(f"{source.path}{_MARK}{name}")
-        times, start = self._times(run)
-        columns: dict[str, Column] = {}
-        for key, column in source.columns.items():
-            clock = _clock_of(column)
-            if clock in self.rows:  # of a channel
-                columns[key] = replace(column, values=column.values[self.rows[clock][run]], time=times.get(clock))
-        if 0 in self.rows:
-            first_row += int(self.segments.start[run]) if first_row else 0
-            columns, start = self._from_start(columns)
+        source, channels, first_row = self.source, self.channels, self.source.first_row
+        rows = {clock: of_clock[run] for clock, of_clock in self.rows.items()}
+        clocks = {clock: time[rows[clock]] for clock, time in _clocks(source, channels).items() if clock in rows}
+        first = self._first(run, clocks)
+        times = {clock: time - first for clock, time in clocks.items()}
+        columns = {
+            key: replace(column, values=column.values[rows[clock]], time=times[clock] if clock else None)
+            for key, column in source.columns.items()
+            if (clock := _clock_of(column)) in rows  # of a channel
+        }
+        if 0 in times:
+            columns[channels.time.key] = replace(columns[channels.time.key], values=times[0])
+        if 0 in rows and first_row:
+            first_row += int(self.segments.start[run])
         channels, absent = self._present(columns)
-        mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
-        origin = source.origin + start
+        path, origin = location(f"{source.path}{_MARK}{name}"), source.origin + first * channels.time.factor
         part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=tuple(absent))
+        mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
         return assemble_recording(part, channels, machine, mark, f"{log_stem(source.path)}{_MARK}{name}")
 
-    def _times(self, run: int) -> tuple[dict[int, FloatArray], float]:
-        """Return the times of a run by clock, and their start [s].
+    def _first(self, run: int, clocks: Mapping[int, FloatArray]) -> float:
+        """Return the time stamp, in its unit, from which the clocks of a run count; 0 if they count as in the log.
 
-        A message's time, and one that counts from an epoch, is what it is in a file with this run alone: it counts from
-        the run's start.
+        A message's time, and one that counts from an epoch, is what it is in a file with this run alone.
         """
-        times = {
-            clock: time[self.rows[clock][run]]
-            for clock, time in _clocks(self.source, self.channels).items()
-            if clock in self.rows
-        }
         if not self.source.origin and not any(item.topic for item in self.channels.sources):
-            return times, 0.0
-        starts = [float(time[0]) for time in times.values() if len(time)]
-        first = float(self.begins[run]) if self.begins is not None else min(starts, default=0.0)
-        return {clock: time - first for clock, time in times.items()}, first
-
-    def _from_start(self, columns: dict[str, Column]) -> tuple[dict[str, Column], float]:
-        """Return the columns of a run of a table, whose clock counts from its start if the log's counts from one."""
-        time = self.channels.time
-        if not self.source.origin or time.column is None:
-            return columns, 0.0
-        clock = columns[time.key]
-        first = float(next(iter(clock.values[np.isfinite(clock.values)]), 0.0))
-        return columns | {time.key: replace(clock, values=clock.values - first)}, first * time.factor
+            return 0.0
+        if self.begins is not None:
+            return float(self.begins[run])
+        return min((float(known[0]) for time in clocks.values() if len(known := time[np.isfinite(time)])), default=0.0)
 
     def _present(self, columns: Mapping[str, Column]) -> tuple[ChannelMap, list[Finding]]:
         """Return the map without ground truth that has no sample in a run, each with a note."""
@@ -308,8 +296,7 @@ def _by_reset(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
             "has no clock that could start again: [channels] time states a rate",
             'cut it by a column: by = "column:NAME"',
         )
-    clocks = _clocks(source, channels) or {0: source.columns[channels.time.key].values}
-    found = {clock: segments_by_reset(time) for clock, time in clocks.items()}
+    found = {clock: segments_by_reset(time) for clock, time in _clocks(source, channels).items()}
     counts = sorted({len(item) for item in found.values()})
     if len(counts) > 1:
         raise RecordingError(
@@ -326,9 +313,10 @@ def _clock_of(column: Column) -> int:
 
 
 def _clocks(source: Source, channels: ChannelMap) -> dict[int, FloatArray]:
-    """Return the clocks of the channels by their identity; empty for a table."""
+    """Return the clocks of the channels; that of a table in its unit, none if [channels] time states a rate."""
     columns = (source.columns[key] for item in channels.sources for key in item.keys)
-    return {id(column.time): column.time for column in columns if column.time is not None}
+    clocks = {id(column.time): column.time for column in columns if column.time is not None}
+    return {0: source.columns[channels.time.key].values} if not clocks and channels.time.key else clocks
 
 
 def _consecutive(segments: Segments) -> list[Rows]:
