@@ -91,6 +91,7 @@ def join_parts(folder: Path, parts: Sequence[tuple[Source, ChannelMap]]) -> tupl
     Each column is removed from its part, to limit the memory in use. Ground truth, such as the events of a stroke, may
     be in some parts only. Raises RecordingError if a part begins before the previous one ends.
     """
+    parts = sorted(parts, key=lambda part: part[0].origin)
     sources = [source for source, _ in parts]
     first, items = sources[0], {item.channel: item for _, channels in parts for item in channels.sources}
     columns: dict[str, Column] = {}

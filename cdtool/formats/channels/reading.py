@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import codecs
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def log_pieces(log: Path, keys: Collection[str] | None = None, read: ReadFile = 
 
 def _part_pieces(folder: Path, keys: Collection[str] | None, read: ReadFile) -> Pieces:
     """Yield the pieces of one part after the other; all times count from the start of the first part."""
-    log = LogFolder.of(folder)
+    log = _LogFolder.of(folder)
     start: float | None = None
     parts: list[tuple[Source, Mapping[str, Span]]] = []
     for part in (*log.filled, *log.empty):
@@ -157,36 +157,27 @@ def read_as_logged(path: Path, machine_file: MachineFile, unread: Unread = "erro
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
-    source, channels, digest = mapped_log(path, machine_file, unread=unread)
+    source, channels = mapped_source(path, machine_file, unread=unread)
     with naming(path):
         name = path.name if path.is_dir() else ""
-        logged = assemble_recording(source, channels, machine_file.machine, digest, name)
+        logged = assemble_recording(source, channels, machine_file.machine, log_digest(path), name)
     if machine_file.columns.beside or machine_file.topics.beside:
         return replace(logged, recording=_with_files_beside(logged.recording, path, machine_file, unread))
     return logged
 
 
-def mapped_log(
-    path: Path,
-    machine_file: MachineFile,
-    also: Callable[[bool], ChannelSource] | None = None,
-    unread: Unread = "error",
-) -> tuple[Source, ChannelMap, str]:
-    """Return the mapped columns of a log, a file or a folder of parts, the map for them, and the log's digest.
-
-    `also` is a further column, as for mapped_source. Raises RecordingError or ConfigurationError.
-    """
-    if not path.is_dir():
-        return (*mapped_source(path, machine_file, also), file_digest(path))
-    files, lost = _parts_of(path, unread)
-    parts = sorted((mapped_source(file, machine_file, also) for file in files), key=lambda part: part[0].origin)
+def _mapped_parts(
+    folder: Path, mapping: MachineFile | ChannelMap, also: Callable[[bool], ChannelSource] | None, unread: Unread
+) -> tuple[Source, ChannelMap]:
+    """Return what mapped_source returns, of the parts of a log, on one clock."""
+    files, lost = _parts_of(folder, unread)
+    parts = [mapped_source(file, mapping, also) for file in files]
     for part, channels in parts:
         if not channels.topics:
             raise _not_of_topics(part.path)
-    with naming(path):
-        source, channels = join_parts(path, parts)
-    digest = join_digests([file_digest(part.path) for part, _ in parts])
-    return replace(source, findings=(*lost, *source.findings)), channels, digest
+    with naming(folder):
+        source, channels = join_parts(folder, parts)
+    return replace(source, findings=(*lost, *source.findings)), channels
 
 
 def _not_of_topics(part: Path) -> RecordingError:
@@ -209,31 +200,29 @@ def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFi
     return add_files_beside(recording, path, channels, machine_file.machine, mapped_source, read_trigger)
 
 
-def _parts_of(folder: Path, unread: Unread) -> tuple[list[Path], Sequence[Finding]]:
+def _parts_of(folder: Path, unread: Unread) -> tuple[Sequence[Path], Sequence[Finding]]:
     """Return the files of a folder in the order of their times or names, and the losses; raises RecordingError."""
     if unread == "error":
         parts = log_parts(folder)
         return parts, missing_part_findings(folder, parts)
-    log = LogFolder.of(folder)
+    log = _LogFolder.of(folder)
     if not log.filled:
         raise RecordingError(f"{folder}: no part of the log contains a message", "was the recording stopped at once?")
-    return list(log.filled), log.findings
+    return log.filled, loss_findings(folder, (*log.filled, *log.empty, *log.unread), log.unread)
 
 
-@dataclass(frozen=True)
-class LogFolder:
+class _LogFolder(NamedTuple):
     """The parts of a log in a folder: `filled` ones in the order of their first times, and `empty` ones.
 
     `unread` are those that cannot be read, with the reason.
     """
 
-    folder: Path
     filled: tuple[Path, ...]
     empty: tuple[Path, ...]
     unread: Mapping[Path, RecordingError]
 
     @classmethod
-    def of(cls, folder: Path) -> LogFolder:
+    def of(cls, folder: Path) -> _LogFolder:
         """Return the parts of a folder; raises RecordingError if no part can be read."""
         starts: dict[Path, float] = {}
         unread: dict[Path, RecordingError] = {}
@@ -246,17 +235,12 @@ class LogFolder:
             raise next(iter(unread.values()))
         known = sorted((start, part.name, part) for part, start in starts.items() if start < np.inf)
         empty = tuple(part for part, start in starts.items() if start == np.inf)
-        return cls(folder, tuple(part for _, _, part in known), empty, unread)
+        return cls(tuple(part for _, _, part in known), empty, unread)
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All files of the log."""
-        return (*self.filled, *self.empty, *self.unread)
 
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """The losses: missing parts, and those that cannot be read."""
-        return loss_findings(self.folder, self.files, self.unread)
+def log_digest(log: Path) -> str:
+    """Return the SHA-256 of a log; of a folder that of the hexadecimal digests of its parts, in the order of names."""
+    return join_digests([file_digest(part) for part in log_parts(log)])
 
 
 def log_parts(path: Path) -> list[Path]:
@@ -272,14 +256,19 @@ def log_parts(path: Path) -> list[Path]:
 
 
 def mapped_source(
-    path: Path, mapping: MachineFile | ChannelMap, also: Callable[[bool], ChannelSource] | None = None
+    path: Path,
+    mapping: MachineFile | ChannelMap,
+    also: Callable[[bool], ChannelSource] | None = None,
+    unread: Unread = "error",
 ) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that are mapped, and the map for them; raises RecordingError.
+    """Return the mapped columns of a log, a file or a folder of parts, and the map for them; raises RecordingError.
 
     The map is that of a machine file for a format of columns or topics, or given. A mapped load cell or label that is
     not in the file is left out of the map, with a note. `also` returns a further column, given whether the file
     contains topics; it becomes the last source of the map.
     """
+    if path.is_dir():
+        return _mapped_parts(path, mapping, also, unread)
     file_format = choose_format(path)
     topics = has_topics(file_format)
     channels = mapping if isinstance(mapping, ChannelMap) else mapping.topics if topics else mapping.columns

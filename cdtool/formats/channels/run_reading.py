@@ -22,7 +22,7 @@ from cdtool.base.plain_text import counted, first_of
 from cdtool.base.remote.remote_path import location
 from cdtool.formats.channels.channel_assembly import LoggedRecording, assemble_recording
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
-from cdtool.formats.channels.reading import mapped_log
+from cdtool.formats.channels.reading import log_digest, mapped_source
 from cdtool.formats.channels.run_segments import Rows, Segments, segments_by_id, segments_by_reset
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import MachineFile
@@ -106,10 +106,10 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
             "write each run to a log of its own, or map a channel of the log",
         )
     also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
-    source, channels, digest = mapped_log(path, machine_file, also)
+    source, channels = mapped_source(path, machine_file, also)
     with naming(path):
         whole = _by_reset(source, channels, cut) if also is None else _by_id(source, channels, cut)
-        return whole.runs(pattern, machine_file.machine, digest)
+        return whole.runs(pattern, machine_file.machine, log_digest(path))
 
 
 def _fits(name: str, pattern: str) -> bool:
