@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
@@ -33,9 +32,6 @@ from cdtool.recordings.recording import MEASURED, RIG_UNITS, UNITLESS, Recording
 
 # A channel of a lower rate has empty cells in these first rows of a table.
 _FIRST_ROWS = 1 << 12
-Counts = npt.NDArray[np.int64]
-# The kinds of masked values, in the order of convert_to_si.
-_MASKED = ("infinite_values", "saturated_values", "impossible_values")
 
 
 @dataclass(frozen=True)
@@ -199,10 +195,10 @@ def _series(
             findings.append(Finding("lower_rate", item.channel, {"rate": 1.0 / times.period, "share": share}))
             gaps = tuple(gaps_of(times.time, times.period, "time"))
     scaled, masked = convert_to_si(item, values)
-    findings += _masked_findings(masked, item, joints) if masked.any() else []
+    findings += _masked_findings(masked, item, joints)
     findings += [replace(finding, channel=item.channel) for finding in gaps]
     absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
-    findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
+    findings += missing_findings(absent, scaled.size, item.channel, sum(map(sum, masked.values())))
     series = times.with_values(component_along(item.direction, scaled) if item.direction else scaled, item.unit)
     return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
@@ -227,15 +223,14 @@ def _kept_rows(item: ChannelSource, parts: Sequence[FloatArray], keep: BoolArray
     return table if keep.all() else table[keep]
 
 
-def _masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
-    """Return the findings on masked values by joint, or by axis of a force; `masked` (3, J): as of convert_to_si."""
-    width = masked.shape[1]
+def _masked_findings(masked: Mapping[str, list[int]], item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
+    """Return the findings on masked values by joint, or by axis of a force; `masked`: as of convert_to_si."""
     parts = [(f"{item.channel} {axis}", "") for axis in item.axes]
-    parts = parts or [(item.channel, joints[j] if width > 1 else "") for j in range(width)]
+    parts = parts or [(item.channel, joint if len(item.factor) > 1 else "") for joint in joints]
     return [
         Finding(kind, channel, {"count": count, "joint": joint})
-        for kind, counts in zip(_MASKED, masked.tolist(), strict=True)
-        for (channel, joint), count in zip(parts, counts, strict=True)
+        for kind, counts in masked.items()
+        for (channel, joint), count in zip(parts, counts, strict=False)
         if count
     ]
 
@@ -247,10 +242,10 @@ def component_along(direction: Sequence[float], values: FloatArray) -> FloatArra
     return along[:, np.newaxis]
 
 
-def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
+def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, dict[str, list[int]]]:
     """Return the values (n, J) of a channel in its SI unit, with masked ones as NaN, and the counts of masked ones.
 
-    The counts are (3, J): infinite, saturated, and physically impossible values.
+    The counts are by kind of finding, for each joint; none if no value is masked.
     """
     low, high = item.valid_range or (np.nan, np.nan)
     with np.errstate(over="ignore", invalid="ignore"):  # of values that are masked
@@ -263,9 +258,10 @@ def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, 
     impossible &= ~(infinite | saturated)
     masked = infinite | saturated | impossible
     if not masked.any():  # the usual case
-        return scaled, np.zeros((len(_MASKED), values.shape[1]), dtype=np.int64)
+        return scaled, {}
     scaled[masked] = np.nan
-    return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, impossible)])
+    masks = {"infinite_values": infinite, "saturated_values": saturated, "impossible_values": impossible}
+    return scaled, {kind: np.count_nonzero(mask, axis=0).tolist() for kind, mask in masks.items()}
 
 
 def _torque_from_duty(item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
