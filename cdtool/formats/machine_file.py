@@ -63,6 +63,10 @@ class MachineFile(StoresDerived):
         """Return the files that belong to a log, whether they exist or not."""
         return tuple(dict.fromkeys(item.own_file.path_for(log) for item in self._sources if item.own_file))
 
+    def with_map(self, channels: ChannelMap) -> MachineFile:
+        """Return the file with another map, for columns or topics."""
+        return replace(self, columns=channels, topics=channels)
+
     def detector(self, name: str | Any) -> Any:
         """Return the detector of that (full or short) name with this file's gains; an instance as it is, checked."""
         if not isinstance(name, str):

@@ -157,7 +157,7 @@ def read_as_logged(path: Path, machine_file: MachineFile, unread: Unread = "erro
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
-    source, channels = mapped_source(path, machine_file, unread=unread)
+    source, channels = mapped_source(path, machine_file, unread)
     with naming(path):
         name = path.name if path.is_dir() else ""
         logged = assemble_recording(source, channels, machine_file.machine, log_digest(path), name)
@@ -166,12 +166,10 @@ def read_as_logged(path: Path, machine_file: MachineFile, unread: Unread = "erro
     return logged
 
 
-def _mapped_parts(
-    folder: Path, mapping: MachineFile | ChannelMap, also: Callable[[bool], ChannelSource] | None, unread: Unread
-) -> tuple[Source, ChannelMap]:
+def _mapped_parts(folder: Path, machine_file: MachineFile, unread: Unread) -> tuple[Source, ChannelMap]:
     """Return what mapped_source returns, of the parts of a log, on one clock."""
     files, lost = _parts_of(folder, unread)
-    parts = [mapped_source(file, mapping, also) for file in files]
+    parts = [mapped_source(file, machine_file) for file in files]
     for part, channels in parts:
         if not channels.topics:
             raise _not_of_topics(part.path)
@@ -194,10 +192,15 @@ def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFi
         if by_topics:
             topic, _, field = str(name).rpartition(" ")
             source = ChannelSource("trigger", topic=topic, field=field)
-        only = replace(channels, sources=(source,), beside=())
-        return read_as_logged(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
+        only = machine_file.with_map(replace(channels, sources=(source,), beside=()))
+        return read_as_logged(path, only, unread).recording["trigger"]
 
-    return add_files_beside(recording, path, channels, machine_file.machine, mapped_source, read_trigger)
+    def read_beside(file: Path, mapped: ChannelMap) -> Recording:
+        source, resolved = mapped_source(file, machine_file.with_map(mapped))
+        with naming(file):
+            return assemble_recording(source, resolved, machine_file.machine, file_digest(file)).recording
+
+    return add_files_beside(recording, path, channels, read_beside, read_trigger)
 
 
 def _parts_of(folder: Path, unread: Unread) -> tuple[Sequence[Path], Sequence[Finding]]:
@@ -255,31 +258,22 @@ def log_parts(path: Path) -> list[Path]:
     return [path]
 
 
-def mapped_source(
-    path: Path,
-    mapping: MachineFile | ChannelMap,
-    also: Callable[[bool], ChannelSource] | None = None,
-    unread: Unread = "error",
-) -> tuple[Source, ChannelMap]:
+def mapped_source(path: Path, machine_file: MachineFile, unread: Unread = "error") -> tuple[Source, ChannelMap]:
     """Return the mapped columns of a log, a file or a folder of parts, and the map for them; raises RecordingError.
 
-    The map is that of a machine file for a format of columns or topics, or given. A mapped load cell or label that is
-    not in the file is left out of the map, with a note. `also` returns a further column, given whether the file
-    contains topics; it becomes the last source of the map.
+    A mapped load cell or label that is not in the file is left out of the map, with a note.
     """
     if path.is_dir():
-        return _mapped_parts(path, mapping, also, unread)
+        return _mapped_parts(path, machine_file, unread)
     file_format = choose_format(path)
     topics = has_topics(file_format)
-    channels = mapping if isinstance(mapping, ChannelMap) else mapping.topics if topics else mapping.columns
-    if isinstance(mapping, MachineFile) and not channels.sources:
+    channels = machine_file.topics if topics else machine_file.columns
+    if not channels.sources:
         section, what = ("[channels.mcap]", "topic and field") if topics else ("[channels]", "column and unit")
         raise ConfigurationError(
-            f"{mapping.path}: no channel in {section}, which {path} needs",
+            f"{machine_file.path}: no channel in {section}, which {path} needs",
             f"write {section} with the {what} of each channel",
         )
-    if also is not None:
-        channels = replace(channels, sources=(*channels.sources, also(topics)))
     with naming(path):
         if topics and not channels.topics:
             raise RecordingError("contains topics, but columns are mapped", "give a file of columns")

@@ -105,10 +105,10 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
             f"{machine_file.path}: a channel in a file of its own cannot be divided into the runs of {path}",
             "write each run to a log of its own, or map a channel of the log",
         )
-    also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
-    source, channels = mapped_source(path, machine_file, also)
+    by_reset = cut.by == "clock-reset"
+    source, channels = mapped_source(path, machine_file if by_reset else _with_ids(machine_file, cut.column))
     with naming(path):
-        whole = _by_reset(source, channels, cut) if also is None else _by_id(source, channels, cut)
+        whole = _by_reset(source, channels, cut) if by_reset else _by_id(source, channels, cut)
         return whole.runs(pattern, machine_file.machine, log_digest(path))
 
 
@@ -126,17 +126,17 @@ def _too_short(segments: Segments, short: Rows, lengths: Rows) -> str:
     )
 
 
-def id_source(cut: RunCut, topics: bool) -> ChannelSource:
-    """Return the source of the ids of a cut; raises RecordingError if topics have no such field or no such cut."""
-    if not topics:
-        column = int(cut.column) if cut.column.isdecimal() else cut.column  # a number as in [channels]
-        return ChannelSource(_ID, (column,), words=True)
-    topic, _, field_name = cut.column.partition(" ")
-    if not field_name.strip():
-        raise RecordingError(
-            f"operations '{cut.by}:{cut.column}': does not name a field of a topic", f"write {cut.by}:TOPIC FIELD"
-        )
-    return ChannelSource(_ID, topic=topic, field=field_name.strip(), words=True)
+def _with_ids(machine_file: MachineFile, column: str) -> MachineFile:
+    """Return the machine file with the ids of a cut as a further source, of topics only if it names a field of one."""
+    number = int(column) if column.isdecimal() else column  # as in [channels]
+    topic, _, field_name = column.partition(" ")
+    columns, topics = machine_file.columns, machine_file.topics
+    if columns.sources:
+        columns = replace(columns, sources=(*columns.sources, ChannelSource(_ID, (number,), words=True)))
+    if topics.sources and field_name.strip():
+        by_topic = ChannelSource(_ID, topic=topic, field=field_name.strip(), words=True)
+        topics = replace(topics, sources=(*topics.sources, by_topic))
+    return replace(machine_file, columns=columns, topics=topics)
 
 
 @dataclass(frozen=True)
@@ -261,6 +261,10 @@ class _CutLog:
 
 def _by_id(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
     """Cut a log by the column of ids, which is in the map beside the channels; raises RecordingError."""
+    if _ID not in channels:
+        raise RecordingError(
+            f"operations '{cut.by}:{cut.column}': does not name a field of a topic", f"write {cut.by}:TOPIC FIELD"
+        )
     key = next(item.keys[0] for item in channels.sources if item.channel == _ID)
     channels = replace(channels, sources=tuple(item for item in channels.sources if item.channel != _ID))
     ids = source.columns[key]
