@@ -243,7 +243,7 @@ class _LogFolder(NamedTuple):
 
 def log_digest(log: Path) -> str:
     """Return the SHA-256 of a log; of a folder that of the hexadecimal digests of its parts, in the order of names."""
-    return join_digests([file_digest(part) for part in log_parts(log)])
+    return join_digests([file_digest(part) for part in (log_parts(log) if log.is_dir() else [log])])
 
 
 def log_parts(path: Path) -> list[Path]:
