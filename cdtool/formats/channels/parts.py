@@ -17,6 +17,7 @@ from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.columns import Column
 from cdtool.formats.source import Source, TopicDetails
+from cdtool.recordings.clock import clean_time
 
 # First and last time [s].
 Span = tuple[float, float]
@@ -117,7 +118,8 @@ def join_parts(folder: Path, parts: Sequence[tuple[Source, ChannelMap]]) -> tupl
 def _joined_times(key: str, parts: Sequence[tuple[Source, Column]], origin: float) -> FloatArray:
     """Return the times [s] after `origin` of a column in the parts of a log; raises RecordingError if they overlap."""
     times = [column.time + (source.origin - origin) for source, column in parts if column.time is not None]
-    filled = [(source, time) for (source, _), time in zip(parts, times, strict=True) if len(time)]
+    cleaned = [clean_time(time, sampled=False).time for time in times]  # a stray stamp is no overlap
+    filled = [(source, time) for (source, _), time in zip(parts, cleaned, strict=True) if len(time)]
     for (_, before), (source, time) in pairwise(filled):
         if time[0] <= before[-1]:
             raise RecordingError(

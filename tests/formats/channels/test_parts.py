@@ -13,11 +13,13 @@ from hypothesis import strategies as st
 from cdtool import convert
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.channels.parts import missing_part_findings
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.channels.parts import join_parts, missing_part_findings
 from cdtool.formats.channels.reading import log_parts, read_recording, survey
+from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.source import TopicDetails
+from cdtool.formats.source import Source, TopicDetails
 from tests.base.findings.facts import fact_of
 
 START = 1_700_000_000
@@ -238,6 +240,20 @@ def test_parts_that_overlap_are_refused(tmp_path):
     write_part(folder / "bag_1.mcap", 0.5 + np.arange(100) / 100, np.zeros(100))
     with pytest.raises(RecordingError, match=r"bag_1\.mcap: overlaps the previous part"):
         read_recording(folder, machine(tmp_path))
+
+
+def test_a_stray_stamp_at_the_beginning_of_a_part_is_no_overlap(tmp_path):
+    parts = []
+    for number in (0, 1):
+        time = number + np.arange(100) / 100
+        time[0] -= START * number  # the stamp of a header that is not set
+        column = Column("/speed data", np.arange(100.0), time)
+        parts.append(Source(tmp_path / f"bag_{number}.mcap", "mcap", {column.name: column}, START))
+    item = ChannelSource("speed", topic="/speed", field="data", keys=("/speed data",))
+    joined, _ = join_parts(
+        tmp_path, [(part, ChannelMap(TimeSource(), (item,), ("axis",), topics=True)) for part in parts]
+    )
+    assert len(joined.columns["/speed data"].values) == 200
 
 
 def test_a_table_with_the_suffix_of_a_part_is_one_line(tmp_path):
