@@ -74,12 +74,11 @@ def choose_format(path: Path) -> Format:
             likely: Format = FORMATS.load(name)()
             if suffix in likely.suffixes and likely.sniff(path):
                 return likely
-        formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
+        is_new = all(suffix not in FORMATS.load(name).suffixes for name in FORMATS.names())
+        formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=is_new)]
         by_suffix = [item for item in formats if suffix in item.suffixes]
-        # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
-        claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
         for item in [*by_suffix, *formats]:
-            if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
+            if item.sniff(path):
                 return item
         start = head.removeprefix(codecs.BOM_UTF8).lstrip()
         content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
@@ -313,21 +312,6 @@ def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: flo
 def has_topics(file_format: Format) -> bool:
     """Return True if a format contains messages of topics, mapped by [channels.mcap]; optional for plug-ins."""
     return bool(getattr(file_format, "topics", False))
-
-
-def _sniffs_any_text(file_format: Format) -> bool:
-    return bool(getattr(file_format, "sniffs_any_text", False))
-
-
-def _is_table(file_format: Format, path: Path) -> bool:
-    try:
-        return bool(file_format.columns(path).columns)
-    except RecordingError:
-        return False
-
-
-def _suffixes() -> set[str]:
-    return {suffix for name in FORMATS.names() for suffix in FORMATS.load(name).suffixes}
 
 
 def is_bag_folder(path: Path) -> bool:

@@ -37,7 +37,7 @@ def test_the_first_bytes_determine_the_format_if_the_suffix_is_wrong(log, tmp_pa
         (b"\xfe\xff" + '{"a": 1}'.encode("utf-16-be"), "a.json", "is not a recording"),
         ("<p>1,2</p>".encode("utf-32"), "a.csv", "is not a recording"),
         (b"\xff\xfe" + bytes(30), "a.csv", "is not a recording"),
-        ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.mcap", "nor a complete MCAP file"),
+        ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.mcap", "contains no row of numbers"),
         (b"", "a.csv", "is empty"),
         (b"a sentence.\nAnd another one.\n", "a.txt", "contains no row of numbers"),
     ],
