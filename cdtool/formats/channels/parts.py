@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -24,6 +25,10 @@ Span = tuple[float, float]
 
 _METADATA = "metadata.yaml"
 _COMPRESSED = (".zstd", ".zst", ".lz4")
+# In metadata.yaml: a comment, the list of parts up to the next key, and the name of a part in it.
+_COMMENT = re.compile(r"(?:^|[ \t])#.*", re.MULTILINE)
+_LIST = re.compile(r"^[ \t]*relative_file_paths:(.*?)(?:^[ \t]*\w+:|\Z)", re.DOTALL | re.MULTILINE)
+_PART = re.compile(r"[^\n,'\"\[\]/]{1,255}\.(?:mcap|db3)(?:\.\w{1,8})?")
 
 
 def join_digests(digests: Sequence[str]) -> str:
@@ -158,42 +163,12 @@ def join_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
 def named_parts(folder: Path) -> list[str]:
     """Return the file names listed in `relative_file_paths` of a folder's metadata.yaml; empty without this file.
 
-    It is read line by line, as rosbag2 writes simple lists of strings. The first versions of rosbag2 wrote the bag's
-    folder before each name.
+    The first versions of rosbag2 wrote the bag's folder before each name.
     """
     metadata = folder / _METADATA
     try:
         content = read_bytes(metadata, RecordingError) if metadata.is_file() else b""
     except RecordingError:  # the list is only used for a check
         return []
-    lines = content.decode("utf-8", "replace").splitlines()
-    for i, line in enumerate(lines):
-        key, colon, rest = line.partition(":")
-        if key.strip() == "relative_file_paths" and colon:
-            listed = _flow_list(rest, lines[i + 1 :]) if "[" in rest else _block_list(lines[i + 1 :])
-            return [Path(name).name for name in map(_plain, listed) if name]
-    return []
-
-
-def _flow_list(rest: str, below: Sequence[str]) -> list[str]:
-    """Return the items of a list `[bag_0.mcap, bag_1.mcap]`, in one line or several."""
-    return "\n".join([rest, *below]).partition("[")[2].partition("]")[0].split(",")
-
-
-def _block_list(below: Sequence[str]) -> Iterator[str]:
-    """Yield the items of lines `- bag_0.mcap`, up to the first line that is not an item."""
-    for line in below:
-        text = line.strip()
-        if not text or text.startswith("#"):
-            continue
-        if not text.startswith("- "):
-            return
-        yield text[2:]
-
-
-def _plain(item: str) -> str:
-    """Return an item without its quotes, or without the comment after it."""
-    text = item.strip()
-    if text[:1] in ("'", '"'):
-        return text[1:].partition(text[0])[0]
-    return text.partition(" #")[0].strip()
+    listed = _LIST.search(_COMMENT.sub("", content.decode("utf-8", "replace")))
+    return [name.lstrip("- ") for name in _PART.findall(listed[1])] if listed else []
