@@ -143,11 +143,8 @@ class JointMachine:
         """Return the travel by the reference speed: from the last position at or before its first sample, else 0."""
         speed = channels["reference_speed"]
         travel = integrate(speed, self.load_units["position"])
-        start: FloatArray | float = 0.0
-        if "position" in channels:
-            before = channels["position"].between(-np.inf, float(speed.time[0])).values
-            start = np.nan_to_num(before[-1]) if len(before) else 0.0
-        return travel.with_values(travel.values + start, travel.unit)
+        before = channels.get("position", travel).between(-np.inf, float(speed.time[0])).values[-1:]
+        return travel.with_values(travel.values + np.nan_to_num(before).sum(axis=0), travel.unit)
 
     def minus_friction(self, force: FloatArray, speed: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return `force` (n, J), changed in place, minus friction and constant force of each joint.

@@ -318,10 +318,8 @@ class _RestartDetector:
 
 def wrapped_bits(before: float, after: float, usual_step: float, largest: float) -> int:
     """Return the width of a counter of whole numbers, up to `largest`, that continues at zero; 0 if it restarts."""
-    for bits in _COUNTER_BITS:
-        if largest < 2.0**bits and 0.0 < after - before + 2.0**bits <= GAP_PERIODS * usual_step:
-            return bits
-    return 0
+    step = after - before
+    return next((k for k in _COUNTER_BITS if largest < 2.0**k and 0.0 < step + 2.0**k <= GAP_PERIODS * usual_step), 0)
 
 
 def _median_step(stamps: FloatArray) -> float:
