@@ -33,7 +33,7 @@ import cdtool  # noqa: E402
 from cdtool.commands.inject.channel_change import ChannelChange  # noqa: E402
 from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
 from cdtool.detectors.momentum import Momentum  # noqa: E402
-from cdtool.formats.channels.logged_recording import LoggedRecording  # noqa: E402
+from cdtool.formats.channels.channel_assembly import LoggedRecording  # noqa: E402
 from cdtool.formats.channels.reading import read_as_logged  # noqa: E402
 from cdtool.formats.machine_file import MachineFile, read_machine_file  # noqa: E402
 from cdtool.machines.axis import Axis  # noqa: E402

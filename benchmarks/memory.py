@@ -22,8 +22,7 @@ from memory_logs import MACHINE_CHANNELS, write_log
 from timing import main, table
 
 import cdtool
-from cdtool.formats.channels.channel_assembly import assemble_recording
-from cdtool.formats.channels.reading import mapped_source
+from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.recording import Recording
 
@@ -73,8 +72,7 @@ def _prepare(folder: Path) -> Recording:
     for detector in DETECTORS:
         learn = ["learn-signature", *free, "--machine", str(GATE / "machine.toml"), "--detector", detector]
         _peak([*learn, "-o", str(folder / f"{detector}.json")])
-    source, channels = mapped_source(GATE / "free" / "01.mcap", known)
-    recording: Recording = assemble_recording(source, channels, known.machine)
+    recording: Recording = read_as_logged(GATE / "free" / "01.mcap", known).recording
     return recording
 
 

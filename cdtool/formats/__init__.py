@@ -6,8 +6,7 @@ Optional attributes:
 * `topics`: True if the file contains messages of topics, which [channels.mcap] maps;
 * `pieces`: yields the columns of a file that need not fit into memory (`pieces.py`); `exact_pieces`: the same with the
   times that `cdtool convert` wrote;
-* `element_names`: returns the names of the elements of a topic's arrays, such as the joints of a JointState;
-* `sniffs_any_text`: True if `sniff` accepts almost any text file.
+* `element_names`: returns the names of the elements of a topic's arrays, such as the joints of a JointState.
 
 Anything that the user should know about a file is added to `Source.findings`: by a plug-in as `remark("...", column,
 severity)`, here as `Finding(kind, column, numbers)` with a kind in `cdtool/base/findings/kinds.toml`.

@@ -9,18 +9,18 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
 from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_toml
-from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import location
 from cdtool.base.settings import Place, read, setting
 from cdtool.base.value_words import value_in_words
-from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource, channel_maps
+from cdtool.detectors import DETECTORS
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TablePins, TimeSource, channel_maps
+from cdtool.machines import MACHINES
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.machines.joint_machine import per_joint
 
@@ -44,42 +44,43 @@ class MachineFile(StoresDerived):
         return f"MachineFile({str(self.path)!r}: {self.machine.name}, joints {', '.join(self.machine.joints)})"
 
     @property
+    def _sources(self) -> tuple[ChannelSource, ...]:
+        maps = (self.columns, self.topics)
+        return tuple(item for each in maps for item in (*each.sources, *each.beside))
+
+    @property
     def force_reduction(self) -> str:
         """Return how the axes of a force become one number, in words; empty if no force has several axes."""
-        maps = (self.columns, self.topics)
-        sources = [source for each in maps for source in (*each.sources, *each.beside)]
-        return " or ".join(dict.fromkeys(item.reduction for item in sources if item.reduction))
+        return " or ".join(dict.fromkeys(item.reduction for item in self._sources if item.reduction))
 
     def maps(self, channel: str) -> bool:
         """Return whether a log has a column, a topic or a file beside it for a channel."""
-        return any(
-            item.channel == channel for each in (self.columns, self.topics) for item in (*each.sources, *each.beside)
-        )
+        return any(item.channel == channel for item in self._sources)
 
     @property
     def label_kinds(self) -> tuple[str, ...]:
         """Return the kinds of contacts that a label channel distinguishes."""
-        sources = (*self.columns.sources, *self.topics.sources)
-        return tuple(dict.fromkeys(kind for item in sources for _, kind in item.kinds))
+        return tuple(dict.fromkeys(kind for item in self._sources for _, kind in item.kinds))
 
     def files_beside(self, log: Path) -> tuple[Path, ...]:
         """Return the files that belong to a log, whether they exist or not."""
-        sources = (*self.columns.beside, *self.topics.beside)
-        return tuple(dict.fromkeys(item.own_file.path_for(log) for item in sources if item.own_file))
+        return tuple(dict.fromkeys(item.own_file.path_for(log) for item in self._sources if item.own_file))
+
+    def with_map(self, channels: ChannelMap) -> MachineFile:
+        """Return the file with another map, for columns or topics."""
+        return replace(self, columns=channels, topics=channels)
 
     def detector(self, name: str | Any) -> Any:
         """Return the detector of that (full or short) name with this file's gains; an instance as it is, checked."""
-        registry = _registry("cdtool.detectors", "DETECTORS")
         if not isinstance(name, str):
-            return registry.checked(name)
-        full = registry.canonical(name)
-        return registry.load(full)(**self.gains.get(full, {}))
+            return DETECTORS.checked(name)
+        full = DETECTORS.canonical(name)
+        return DETECTORS.load(full)(**self.gains.get(full, {}))
 
     def with_gains_of(self, detectors: Sequence[str | Any]) -> MachineFile:
         """Return the file with the gains of those detectors that are objects; raises UsageError for unknown classes."""
         made = [self.detector(item) for item in detectors if not isinstance(item, str)]
-        registry = _registry("cdtool.detectors", "DETECTORS")
-        return replace(self, gains={**self.gains, **{registry.canonical(item.name): asdict(item) for item in made}})
+        return replace(self, gains={**self.gains, **{DETECTORS.canonical(item.name): asdict(item) for item in made}})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,13 +158,12 @@ def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:
         if "operations" in part:
             hint = "set it there, or give detect --operations motion"
             raise at.fault("operations", "is a key of the benchmark file", hint)
-    machines = _registry("cdtool.machines", "MACHINES")
     kind = table.get("type")
-    known = machines.names_for(kind)
+    known = MACHINES.names_for(kind)
     if kind not in known:
         problem = "is missing" if kind is None else f"is {value_in_words(kind)}"
         raise place.below("machine").fault("type", problem, nearest(str(kind), known))
-    machine: Machine | None = machines.load(kind).read(table, place.below("machine"))
+    machine: Machine | None = MACHINES.load(kind).read(table, place.below("machine"))
     return machine
 
 
@@ -185,15 +185,14 @@ def _parameters_text(machine: Machine) -> str:
 
 def _read_gains(table: Mapping[str, Any], joints: int, place: Place) -> dict[str, dict[str, Gain]]:
     """Return the gains of [detectors] by the detectors' full names, with the mistakes in `place`."""
-    registry = _registry("cdtool.detectors", "DETECTORS")
     gains: dict[str, dict[str, Gain]] = {}
     for name, values in table.items():
         with place.noting(), place.at(name):
-            full = registry.canonical(name)
+            full = DETECTORS.canonical(name)
             if full in gains:
                 raise UsageError(f"repeats {full}", "give a detector's gains once, under one of its names")
             gains[full] = {}
-            detector = read(registry.load(full), values, place.below(name))
+            detector = read(DETECTORS.load(full), values, place.below(name))
             keys = [key for key in values if hasattr(detector, key)]
             for key in keys:
                 if joints and isinstance(getattr(detector, key), tuple):
@@ -203,19 +202,16 @@ def _read_gains(table: Mapping[str, Any], joints: int, place: Place) -> dict[str
 
 
 def _read_model(table: Mapping[str, Any] | None, joints: int, place: Place) -> Any:
-    # By name: only few commands use it.
-    part = "cdtool.machines.axis_model.model_table"
-    return None if table is None else import_module(part).ModelTable.read(table, joints, place)
+    if table is None:
+        return None
+    from cdtool.machines.axis_model.model_table import ModelTable  # only few commands use it
+
+    return ModelTable.read(table, joints, place)
 
 
 def _read_pins(table: Mapping[str, Any] | None, place: Place) -> TablePins:
     if table is None:
         return TablePins()
-    pins: TablePins = import_module("cdtool.formats.csv_dialect.pins").read_pins(table, place)
-    return pins
+    from cdtool.formats.csv_dialect.pins import read_pins
 
-
-def _registry(module: str, name: str) -> Registry:
-    # By name: this module is in a lower layer than the classes.
-    registry: Registry = getattr(import_module(module), name)
-    return registry
+    return read_pins(table, place)

@@ -15,7 +15,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.base.settings import NotNegative, Place, Positive, read, setting
-from cdtool.recordings.clock import differentiate, integrate, previous_value
+from cdtool.recordings.clock import differentiate, integrate
 from cdtool.recordings.recording import RIG_UNITS, UNITLESS, Recording, Series
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
@@ -237,10 +237,11 @@ class JointMachine:
         return replace(recording, channels=channels, findings=tuple(findings))
 
     def _integrated_reference(self, channels: Mapping[str, Series]) -> Series:
+        """Return the travel by the reference speed: from the last position at or before its first sample, else 0."""
         speed = channels["reference_speed"]
         travel = integrate(speed, self.load_units["position"])
-        start = np.nan_to_num(previous_value(channels["position"], speed.time[:1])) if "position" in channels else 0.0
-        return travel.with_values(travel.values + start, travel.unit)
+        before = channels.get("position", travel).between(-np.inf, float(speed.time[0])).values[-1:]
+        return travel.with_values(travel.values + np.nan_to_num(before).sum(axis=0), travel.unit)
 
     def minus_friction(self, force: FloatArray, speed: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return `force` (n, J), changed in place, minus friction and constant force of each joint.

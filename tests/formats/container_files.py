@@ -63,7 +63,7 @@ def two_clocks(path: Path, start_ns: int = 0) -> Path:
 def logged(path: Path | str, machine: Path | str) -> Recording:
     """Return the channels of a file as logged."""
     source, channels = mapped_source(Path(path), read_machine_file(machine))
-    return assemble_recording(source, channels, read_machine_file(machine).machine)
+    return assemble_recording(source, channels, read_machine_file(machine).machine, "digest").recording
 
 
 def assert_same(recording: Recording, other: Recording, exact_time: bool = True) -> None:

@@ -13,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cdtool.commands.judging.information import info
-from cdtool.formats.channels.logged_recording import LoggedRecording
+from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.signature_store import read_signature
@@ -103,7 +103,9 @@ def test_the_end_of_an_integer_that_fills_a_gap_is_masked(raw):
     scaled = []
     for item, count in zip(free, counts, strict=True):
         series = Series(np.arange(500) * 0.01, 0.001 * count, "N m")
-        scaled.append(LoggedRecording(replace(item.recording, channels={"torque": series}), {"torque": (0.001,)}, 50.0))
+        scaled.append(
+            replace(item, recording=replace(item.recording, channels={"torque": series}), factors={"torque": (0.001,)})
+        )
     ranges = learned_of(scaled)
     wrong = with_values(scaled[0], "torque", slice(250, 252), raw * 0.001)
     assert np.flatnonzero(masked(ranges, wrong)["torque"][:, 0]).tolist() == [250, 251]
@@ -117,7 +119,7 @@ def test_a_position_whose_counter_wraps_is_masked_until_it_is_back():
 
     def log(counts: np.ndarray) -> LoggedRecording:
         channels = {"position": Series(time, 1e-3 * counts, "rad")}
-        return LoggedRecording(replace(free.recording, channels=channels), {"position": (1e-3,)}, 50.0)
+        return replace(free, recording=replace(free.recording, channels=channels), factors={"position": (1e-3,)})
 
     ranges = learned_of([log(stroke)] * 3)
     wrapped = np.mod(stroke + 20000.0 + 2.0**15, 2.0**16) - 2.0**15  # like an int16 that starts at 20,000
@@ -155,7 +157,7 @@ def test_a_log_that_rests_most_of_its_time_has_no_spikes_where_it_moves():
         moving = np.concatenate((np.zeros(round(seconds * 100.0)), 3.0 * np.sin(np.linspace(0.0, np.pi, 150))))
         values = moving + 1e-4 * rng.standard_normal(len(moving))
         series = Series(0.01 * np.arange(len(values)), values[:, np.newaxis], "N m")
-        return LoggedRecording(replace(free.recording, channels={"torque": series}), {"torque": (1.0,)}, 100.0)
+        return replace(free, recording=replace(free.recording, channels={"torque": series}), factors={"torque": (1.0,)})
 
     logs = [log(600.0) for _ in range(12)]
     ranges = learned_of(logs)
@@ -175,7 +177,9 @@ def strokes(*starts: float, stuck: slice | None = None) -> Series:
 
 def masked_position(free: LoggedRecording, series: Series) -> tuple[np.ndarray, str]:
     def log(item: Series) -> LoggedRecording:
-        return LoggedRecording(replace(free.recording, channels={"position": item}), {"position": (1.0,)}, 100.0)
+        return replace(
+            free, recording=replace(free.recording, channels={"position": item}), factors={"position": (1.0,)}
+        )
 
     ranges = learned_of([log(strokes(0.0))] * 3)
     made = ranges.masked(log(series).recording, {"position": (1.0,)})

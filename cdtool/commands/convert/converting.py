@@ -25,7 +25,7 @@ from cdtool.commands.convert.log_rows import ColumnRows
 from cdtool.commands.judging.runs import read
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.parts import join_digests
-from cdtool.formats.channels.reading import LogFolder, log_parts, read_as_logged
+from cdtool.formats.channels.reading import log_parts, read_as_logged
 from cdtool.formats.columns import Column
 from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts
 from cdtool.formats.machine_file import MachineFile, fingerprint, read_machine_file
@@ -286,8 +286,6 @@ def _provenance(
     log: Path, parts: Sequence[Path], rows: Rows, machine_file: MachineFile | None, section: LogSection
 ) -> dict[str, str]:
     """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
-    if log.is_dir():
-        parts = LogFolder.of(log).files  # in order of time
     digests = {part.name: file_digest(part) for part in parts}
     told = {
         "source": log.name or log.resolve().name,

@@ -32,7 +32,7 @@ from cdtool.commands.inject.struck_machine import StruckAxis, StruckRobot, struc
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.runs import shown_path, unread
 from cdtool.execution.workers import Progress, Workers, in_order
-from cdtool.formats.channels.logged_recording import LoggedRecording
+from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.columns import Column
 from cdtool.formats.groups import Group, Part

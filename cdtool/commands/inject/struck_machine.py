@@ -9,7 +9,7 @@ from cdtool.commands.inject.assumption import Assumption
 from cdtool.commands.inject.axis_contact import InjectedContact, axis_contact
 from cdtool.commands.inject.inject_section import InjectSection
 from cdtool.commands.inject.robot_contact import RobotLog, StruckPoint, least_known_joint, robot_contact
-from cdtool.formats.channels.logged_recording import LoggedRecording
+from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.machine_file import MachineFile
 from cdtool.machines.axis import Axis
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run

@@ -226,7 +226,6 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
     from cdtool.commands.judging.synchronisation import latency_findings
-    from cdtool.formats.channels.parts import join_details, join_topics
     from cdtool.formats.channels.reading import read_as_logged
     from cdtool.truth.synchronisation.audit import audit
 
@@ -249,8 +248,9 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     latencies = audit(recording, machine_file.machine, contacts)
     findings += latency_findings(latencies)
     found = worst_first(findings)
-    details, last = in_words(join_details(logged.headers), join_topics(logged.headers)), logged.headers[-1]
-    return Info(str(log), last.format, details, tuple(channels), found, last.dialect, latencies, recording.origin)
+    header, origin = logged.header, recording.origin
+    details = in_words(header.details, header.topics)
+    return Info(str(log), header.format, details, tuple(channels), found, header.dialect, latencies, origin)
 
 
 def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Finding]) -> list[Finding]:

@@ -16,7 +16,7 @@ from cdtool.base.remote.remote_path import is_remote, joined, location
 from cdtool.commands.judging.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.commands.judging.log_findings import before_contact, log_warnings
 from cdtool.execution.workers import Progress, Workers, in_order
-from cdtool.formats.channels.logged_recording import LoggedRecording
+from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.reading import is_bag_folder, read_as_logged, read_recording
 from cdtool.formats.channels.run_reading import LogRuns, read_runs, split_run
 from cdtool.formats.machine_file import MachineFile, read_machine_file

@@ -33,7 +33,7 @@ from cdtool.commands.judging.runs import (
 from cdtool.commands.judging.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.force_rows import force_rows
-from cdtool.formats.channels.logged_recording import LoggedRecording
+from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.motion.applicable import HOLD

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
@@ -20,39 +19,66 @@ from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.remote.remote_path import is_read_by_ranges, version_of
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
-from cdtool.formats.channels.header_units import clock_unit_findings, guessed_units, unit_findings
+from cdtool.formats.channels.force_axes import on_one_clock
+from cdtool.formats.channels.header_units import clock_unit_findings, unit_findings
+from cdtool.formats.columns import Column
 from cdtool.formats.source import Source
 from cdtool.machines.dynamics import Machine
-from cdtool.recordings.clock import CleanTime, clean_time, differentiate, epoch_start, previous_value
+from cdtool.recordings.clock import clean_time, differentiate, epoch_start, previous_value
 from cdtool.recordings.clock.lower_rate import sampled_rows
 from cdtool.recordings.clock.stamps import gaps_of, missing_findings
-from cdtool.recordings.plausible import IMPOSSIBLE
+from cdtool.recordings.plausible import IMPOSSIBLE, PlausibleRanges
 from cdtool.recordings.recording import MEASURED, RIG_UNITS, UNITLESS, Recording, Series, TableRows
 
 # A channel of a lower rate has empty cells in these first rows of a table.
 _FIRST_ROWS = 1 << 12
-Counts = npt.NDArray[np.int64]
-# The kinds of masked values, in the order of convert_to_si.
-_MASKED = ("infinite_values", "saturated_values", "impossible_values")
 
 
-def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, digest: str = "") -> Recording:
+@dataclass(frozen=True)
+class LoggedRecording:
+    """A log's channels as logged, in SI, not yet on the load side; `factors` converted the logged numbers to SI.
+
+    `header` is the log without its rows: what it states.
+    """
+
+    recording: Recording
+    factors: Mapping[str, tuple[float, ...]]
+    speed_low_pass: float
+    header: Source
+
+    def on_load_side(
+        self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: tuple[float, float] | None = None
+    ) -> Recording:
+        """Return the recording on the load side, without values outside the plausible ranges."""
+        plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)
+        recording: Recording = machine.referred_to_load(plausible, self.speed_low_pass)
+        return recording
+
+
+def assemble_recording(
+    source: Source, channels: ChannelMap, machine: Machine, digest: str, name: str = ""
+) -> LoggedRecording:
     """Return the channels in SI as logged, not yet referred to the load side; the map's columns are resolved.
 
     Each column is removed from the source after its last use, to limit the memory in use. `digest` is that of the
-    content if the source is not a whole file.
+    log's content; `name` is the recording's if it is not that of the file.
     """
+    header = replace(source, columns={})
     columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
     findings: list[Finding] = []
-    table, origin = (None, source.origin) if channels.topics else _table_clock(source, channels, findings)
-    findings += guessed_units(channels, {found.channel for found in findings})
+    timed = channels.topics or any(column.time is not None for column in columns.values())
+    table, origin = (None, source.origin) if timed else _table_clock(source, channels, findings)
+    findings += unit_findings(source, channels)
     reported = (*source.findings, *findings)
     doubted = {item.channel for item in reported if item.kind == "unit_contradicted" and item.severity == "loss"}
     clocks: dict[tuple[int, bool], _Clock] = {}  # by the identity of the stamps
     series: dict[str, Series] = {}
     for number, item in enumerate(channels.sources):
-        clock = table or _topic_clock(columns[item.keys[0]].time, item, clocks, findings)
-        made = _series(item, [columns[key].values for key in item.keys], clock, channels.joints, findings)
+        parts = [columns[key] for key in item.keys]
+        if table is None:
+            parts = [on_one_clock(item, parts, findings)]
+        clock = table or _own_clock(item, parts[0], clocks, findings)
+        made = _series(item, [part.values for part in parts], clock, channels.joints, findings)
         if item.channel not in doubted:
             series[item.channel] = made
         elif item.channel not in RIG_UNITS:  # present, so that nothing takes its place, but not assessable
@@ -73,20 +99,19 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
             series[item.channel] = _torque_from_duty(item, series, channels.speed_low_pass)
     findings += [Finding("confirmed", item.channel) for item in channels.sources if item.confirmed]
     findings += [*_stuck_findings(series, channels.joints), *_disjoint_clock_findings(series)]
-    rows = None
-    if table is not None:
-        rows = TableRows(table.times.time, None if table.keep.all() else table.keep)
-    return Recording(
-        name=log_stem(source.path),
+    recording = Recording(
+        name=name or log_stem(source.path),
         source=str(source.path),
         joints=channels.joints,
         channels=series,
         origin=origin,
         findings=(*source.findings, *findings),
-        digest=digest or file_digest(source.path),
-        rows=rows,
+        digest=digest,
+        rows=None if table is None else TableRows(table.times.time, None if table.keep.all() else table.keep),
         label_kinds=next((item.kinds for item in channels.sources if item.channel == "label"), ()),
     )
+    factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
+    return LoggedRecording(recording, factors, channels.speed_low_pass, header)
 
 
 def file_digest(path: Path) -> str:
@@ -102,68 +127,56 @@ def file_digest(path: Path) -> str:
 
 @dataclass(frozen=True)
 class _Clock:
-    """A clock that channels share: its times, which rows are kept, and findings that each of its channels gets.
-
-    Channels of a table share its one clock. Those of a topic are in columns with these `stamps` [s].
-    """
+    """A clock that channels share: its times, which rows are kept, findings on its stamps, and those on its gaps."""
 
     times: Series
     keep: BoolArray
+    findings: tuple[Finding, ...]
+    gaps: tuple[Finding, ...]
     of_table: bool = False
-    gaps: tuple[Finding, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    stamps: FloatArray | None = None
+
+
+def _clean(
+    name: str, stamps: FloatArray, first_row: int = 0, *, counted: FloatArray | None = None, sampled: bool = True
+) -> _Clock:
+    """Return the clock of stamps [s]; an error names it."""
+    try:
+        clean = clean_time(stamps, first_row, counted=counted, sampled=sampled)
+    except RecordingError as fault:
+        raise RecordingError(f"{name}: {fault.message}", fault.hint) from fault
+    times = Series(clean.time, np.zeros(len(clean.time)), "s")
+    return _Clock(times, clean.keep, clean.findings, tuple(gaps_of(times.time, times.period, "time")))
 
 
 def _table_clock(source: Source, channels: ChannelMap, findings: list[Finding]) -> tuple[_Clock, float]:
-    """Return the clock of a table and what it counts from [s]; the findings on it and on units are added."""
+    """Return the clock of a table and what it counts from [s]; the findings on it are added, once for all channels."""
     time, origin = channels.time, source.origin
     if time.column is None:
         rows = {len(column.values) for column in source.columns.values()}
-        clean = clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
-        times = _as_series(clean.time)
+        clock = _clean("time", np.arange(max(rows, default=0)) / (time.rate or 1.0))
     else:
         column = source.columns[time.key]
         findings += clock_unit_findings(time, column, origin)
         start = epoch_start(column.values, time.factor)
         origin += start * time.factor
-        clean = _clean((column.values - start) * time.factor, "time", source.first_row, counted=column.values)
-        if not len(clean.time):
+        clock = _clean("time", (column.values - start) * time.factor, source.first_row, counted=column.values)
+        if not len(clock.times):
             raise RecordingError(f"column '{column.name}' contains no time stamp", "see [channels] time")
-        times = _as_series(clean.time)
-        findings += [*clean.findings, *gaps_of(times.time, times.period, "time")]
-    findings += unit_findings(source, channels)
-    return _Clock(times, clean.keep, of_table=True), origin
+        findings += [*clock.findings, *clock.gaps]
+    return replace(clock, gaps=(), of_table=True), origin
 
 
-def _topic_clock(
-    stamps: FloatArray | None, item: ChannelSource, known: dict[tuple[int, bool], _Clock], findings: list[Finding]
+def _own_clock(
+    item: ChannelSource, column: Column, known: dict[tuple[int, bool], _Clock], findings: list[Finding]
 ) -> _Clock:
-    """Return a channel's clock, cleaned once for all channels of its topic, and add the findings on its stamps."""
-    stamps = np.empty(0) if stamps is None else stamps
+    """Return the clock of a channel's column, cleaned once for all its channels; add the findings on its stamps."""
+    stamps = np.empty(0) if column.time is None else column.time
     name, sampled = f"{item.channel} time", item.channel != "event"
     clock = known.get((id(stamps), sampled))
     if clock is None:
-        clean = _clean(stamps, name, sampled=sampled)
-        times = _as_series(clean.time)
-        gaps = tuple(gaps_of(times.time, times.period, "time"))
-        clock = known[id(stamps), sampled] = _Clock(times, clean.keep, False, gaps, clean.findings, stamps)
+        clock = known[id(stamps), sampled] = _clean(name, stamps, sampled=sampled)
     findings += [replace(finding, channel=name) for finding in clock.findings]
     return clock
-
-
-def _clean(
-    stamps: FloatArray, clock: str, first_row: int = 0, *, counted: FloatArray | None = None, sampled: bool = True
-) -> CleanTime:
-    """Return the cleaned times of a clock's stamps [s]; an error names the clock."""
-    try:
-        return clean_time(stamps, first_row, counted=counted, sampled=sampled)
-    except RecordingError as fault:
-        raise RecordingError(f"{clock}: {fault.message}", fault.hint) from fault
-
-
-def _as_series(time: FloatArray) -> Series:
-    return Series(time, np.zeros(len(time)), "s")
 
 
 def _series(
@@ -177,15 +190,15 @@ def _series(
     if clock.of_table and item.channel not in UNITLESS and np.isnan(values[:_FIRST_ROWS]).any():
         rows = sampled_rows(values)
         if rows is not None:  # its rate is lower than that of the table
-            values, times = values[rows], _as_series(times.time[rows])
+            values, times = values[rows], Series(times.time[rows], values[rows], item.unit)
             share = clock.times.period / times.period if times.period > 0.0 else np.nan
             findings.append(Finding("lower_rate", item.channel, {"rate": 1.0 / times.period, "share": share}))
             gaps = tuple(gaps_of(times.time, times.period, "time"))
     scaled, masked = convert_to_si(item, values)
-    findings += _masked_findings(masked, item, joints) if masked.any() else []
+    findings += _masked_findings(masked, item, joints)
     findings += [replace(finding, channel=item.channel) for finding in gaps]
     absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
-    findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
+    findings += missing_findings(absent, scaled.size, item.channel, sum(map(sum, masked.values())))
     series = times.with_values(component_along(item.direction, scaled) if item.direction else scaled, item.unit)
     return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
@@ -210,15 +223,14 @@ def _kept_rows(item: ChannelSource, parts: Sequence[FloatArray], keep: BoolArray
     return table if keep.all() else table[keep]
 
 
-def _masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
-    """Return the findings on masked values by joint, or by axis of a force; `masked` (3, J): as of convert_to_si."""
-    width = masked.shape[1]
+def _masked_findings(masked: Mapping[str, list[int]], item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
+    """Return the findings on masked values by joint, or by axis of a force; `masked`: as of convert_to_si."""
     parts = [(f"{item.channel} {axis}", "") for axis in item.axes]
-    parts = parts or [(item.channel, joints[j] if width > 1 else "") for j in range(width)]
+    parts = parts or [(item.channel, joint if len(item.factor) > 1 else "") for joint in joints]
     return [
         Finding(kind, channel, {"count": count, "joint": joint})
-        for kind, counts in zip(_MASKED, masked.tolist(), strict=True)
-        for (channel, joint), count in zip(parts, counts, strict=True)
+        for kind, counts in masked.items()
+        for (channel, joint), count in zip(parts, counts, strict=False)
         if count
     ]
 
@@ -230,10 +242,10 @@ def component_along(direction: Sequence[float], values: FloatArray) -> FloatArra
     return along[:, np.newaxis]
 
 
-def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
+def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, dict[str, list[int]]]:
     """Return the values (n, J) of a channel in its SI unit, with masked ones as NaN, and the counts of masked ones.
 
-    The counts are (3, J): infinite, saturated, and physically impossible values.
+    The counts are by kind of finding, for each joint; none if no value is masked.
     """
     low, high = item.valid_range or (np.nan, np.nan)
     with np.errstate(over="ignore", invalid="ignore"):  # of values that are masked
@@ -246,9 +258,10 @@ def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, 
     impossible &= ~(infinite | saturated)
     masked = infinite | saturated | impossible
     if not masked.any():  # the usual case
-        return scaled, np.zeros((len(_MASKED), values.shape[1]), dtype=np.int64)
+        return scaled, {}
     scaled[masked] = np.nan
-    return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, impossible)])
+    masks = {"infinite_values": infinite, "saturated_values": saturated, "impossible_values": impossible}
+    return scaled, {kind: np.count_nonzero(mask, axis=0).tolist() for kind, mask in masks.items()}
 
 
 def _torque_from_duty(item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:

@@ -14,27 +14,24 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError, naming
+from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding, Severity
 from cdtool.base.remote.remote_path import location, relative_name
-from cdtool.formats.channels.channel_assembly import assemble_recording
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, OwnFile
-from cdtool.formats.source import Source
-from cdtool.machines.dynamics import Machine
 from cdtool.recordings.recording import SHOWS_CONTACTS, Recording, Series
 
 # A trigger rises where it comes to the upper share of its range after the lower one. It has two levels: at most this
 # share of its samples is between them, of noise most are.
 _LOWER, _UPPER, _BETWEEN = 0.3, 0.7, 0.1
 
-# Returns the mapped columns of a file with the resolved map.
-ReadSource = Callable[[Path, ChannelMap], tuple[Source, ChannelMap]]
+# Returns a file beside the log as a recording of its own.
+ReadFile = Callable[[Path, ChannelMap], Recording]
 # Returns a channel of the log: the values of a trigger column, or of a topic and its field.
 ReadTrigger = Callable[[str | int], Series]
 
 
 def add_files_beside(
-    recording: Recording, log: Path, channels: ChannelMap, machine: Machine, read: ReadSource, trigger: ReadTrigger
+    recording: Recording, log: Path, channels: ChannelMap, read: ReadFile, trigger: ReadTrigger
 ) -> Recording:
     """Return a recording with the channels that are in files beside the log.
 
@@ -54,7 +51,8 @@ def add_files_beside(
             recording = _without(recording, item, name)
             continue
         try:
-            recording = _with_file(recording, item, own, _read(path, item, own, channels, machine, read), trigger)
+            beside = read(path, _map_of(item, own, channels.joints))
+            recording = _with_file(recording, item, own, beside, trigger)
         except RecordingError as fault:
             reason = str(fault).removeprefix(f"{path}: ")
             recording = _without(recording, item, name, reason)
@@ -67,16 +65,10 @@ def _without(recording: Recording, item: ChannelSource, name: str, reason: str =
     return replace(recording, findings=(*recording.findings, finding))
 
 
-def _read(
-    path: Path, item: ChannelSource, own: OwnFile, channels: ChannelMap, machine: Machine, read: ReadSource
-) -> Recording:
-    """Return the file as a recording of its own: the channel, and its trigger."""
-    sources = [replace(item, own_file=None, time_offset=0.0)]
-    if own.align == "trigger":
-        sources.append(ChannelSource("trigger", columns=(own.file_trigger,)))
-    source, resolved = read(path, ChannelMap(own.time, tuple(sources), channels.joints))
-    with naming(path):
-        return assemble_recording(source, resolved, machine)
+def _map_of(item: ChannelSource, own: OwnFile, joints: tuple[str, ...]) -> ChannelMap:
+    """Return the map of a file beside the log: the channel, and its trigger."""
+    triggers = [ChannelSource("trigger", columns=(own.file_trigger,))] if own.align == "trigger" else []
+    return ChannelMap(own.time, (replace(item, own_file=None, time_offset=0.0), *triggers), joints)
 
 
 @dataclass(frozen=True)

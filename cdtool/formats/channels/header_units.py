@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from unicodedata import normalize
 
 import numpy as np
@@ -35,31 +35,17 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
     """Return a loss for each channel whose columns have units that contradict the machine file, in kind or factor.
 
     An explicit scale that converts the header's unit to the channel's is not a contradiction, and a unit that the
-    machine file confirms is none either. A text in the place of the unit that is not a unit is a note; of a pressure a
-    loss, as that is only compared with limits. The map's columns are resolved (resolve_columns).
+    machine file confirms is none either. A text in the place of the unit that is not a unit is a note, as is a force's
+    unit that the machine file guesses; of a pressure a loss, as that is only compared with limits. The map's columns
+    are resolved (resolve_columns); topics state no units.
     """
     findings = []
     for item in channels.sources:
-        findings += channel_unit_findings(item, [source.columns[key] for key in item.keys])
+        found = [] if channels.topics else channel_unit_findings(item, [source.columns[key] for key in item.keys])
+        if not found and item.unit_confirmed is False and item.channel in RIG_UNITS:
+            found = [_unknown(item, "confirm", {"header": "", "header_unit": "", "more": 0})]
+        findings += found
     return findings
-
-
-def guessed_units(channels: ChannelMap, reported: Collection[str]) -> list[Finding]:
-    """Return a note for a force whose unit the machine file itself does not confirm; of a pressure a loss.
-
-    Not of the `reported` channels, whose header says more.
-    """
-    numbers = {"header": "", "header_unit": "", "more": 0, "ratio": 0.0, "advice": "confirm", "scale": ""}
-    return [
-        Finding(
-            "unit_contradicted",
-            item.channel,
-            {**numbers, "stated": item.stated or ""},
-            "loss" if item.channel == CONTACT_PRESSURE else "note",
-        )
-        for item in channels.sources
-        if item.unit_confirmed is False and item.channel in RIG_UNITS and item.channel not in reported
-    ]
 
 
 def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> list[Finding]:
@@ -155,16 +141,9 @@ def _fits(header_unit: Unit, stated: Unit, item: ChannelSource, factor: float) -
 
 def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> Finding:
     header_unit = find_unit(unit)
-    known = {
-        "header": _header_text(columns[0]),
-        "header_unit": unit,
-        "more": len(columns) - 1,
-        "stated": str(item.stated),
-    }
+    known = {"header": _header_text(columns[0]), "header_unit": unit, "more": len(columns) - 1}
     if header_unit is None or (unit == "1" and item.channel in RIG_UNITS):
-        numbers = {**known, "advice": "no unit", "ratio": 0.0, "scale": ""}
-        severity: Severity = "loss" if item.channel == CONTACT_PRESSURE else "note"
-        return Finding("unit_contradicted", item.channel, numbers, severity)
+        return _unknown(item, "no unit", known)
     advice = "unit"
     if item.duty is None and header_unit.si in RAW_UNITS and (stated.si != header_unit.si or item.channel in RIG_UNITS):
         advice = "unit and scale"
@@ -173,8 +152,15 @@ def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequen
     elif header_unit.si not in (item.unit, stated.si, *RAW_UNITS):
         advice = "other column"
     scale = f"{item.unit} per {header_unit.si}" if advice == "unit and scale" else ""
-    numbers = {**known, "advice": advice, "ratio": _ratio(header_unit, stated), "scale": scale}
+    numbers = {**known, "stated": item.stated, "advice": advice, "ratio": _ratio(header_unit, stated), "scale": scale}
     return Finding("unit_contradicted", item.channel, numbers)
+
+
+def _unknown(item: ChannelSource, advice: str, header: Mapping[str, object]) -> Finding:
+    """Return the finding on a unit that neither the header nor the machine file knows."""
+    severity: Severity = "loss" if item.channel == CONTACT_PRESSURE else "note"
+    numbers = {**header, "stated": item.stated, "advice": advice, "ratio": 0.0, "scale": ""}
+    return Finding("unit_contradicted", item.channel, numbers, severity)
 
 
 def _ratio(header_unit: Unit, stated: Unit) -> float:

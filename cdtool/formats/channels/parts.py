@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -14,17 +15,20 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.files.bounded_loading import read_bytes
 from cdtool.base.findings import Finding
-from cdtool.base.remote.remote_path import location
+from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.columns import Column
 from cdtool.formats.source import Source, TopicDetails
-from cdtool.recordings.clock import GAP_PERIODS
-from cdtool.recordings.recording import GROUND_TRUTH, Recording, Series
+from cdtool.recordings.clock import clean_time
 
 # First and last time [s].
 Span = tuple[float, float]
 
 _METADATA = "metadata.yaml"
 _COMPRESSED = (".zstd", ".zst", ".lz4")
+# In metadata.yaml: a comment, the list of parts up to the next key, and the name of a part in it.
+_COMMENT = re.compile(r"(?:^|[ \t])#.*", re.MULTILINE)
+_LIST = re.compile(r"^[ \t]*relative_file_paths:(.*?)(?:^[ \t]*\w+:|\Z)", re.DOTALL | re.MULTILINE)
+_PART = re.compile(r"[^\n,'\"\[\]/]{1,255}\.(?:mcap|db3)(?:\.\w{1,8})?")
 
 
 def join_digests(digests: Sequence[str]) -> str:
@@ -87,60 +91,47 @@ def join_sources(
     return Source(folder, first.format, columns, first.origin, tuple(findings), details, names=names, topics=topics)
 
 
-def join_recordings(parts: Sequence[Recording], name: str) -> Recording:
-    """Return the parts of a log, as logged, as one recording.
+def join_parts(folder: Path, parts: Sequence[tuple[Source, ChannelMap]]) -> tuple[Source, ChannelMap]:
+    """Return the rows of the parts of a log, in the order of their times, on the clock of the first, and their map.
 
-    Raises RecordingError if a part does not have a channel of another one, or begins before the previous part ends.
-    Ground truth, such as the events of a stroke, may be in some parts only.
+    Each column is removed from its part, to limit the memory in use. Ground truth, such as the events of a stroke, may
+    be in some parts only. Raises RecordingError if a part begins before the previous one ends.
     """
-    parts = sorted(parts, key=lambda part: part.origin + part.start)
-    first = parts[0]
-    joined: dict[str, Series] = {}
-    for channel in dict.fromkeys(name for part in parts for name in part.channels):
-        containing = [part for part in parts if channel in part or channel not in GROUND_TRUTH]
-        end, unit, times = -np.inf, None, list[FloatArray]()
-        for part in containing:
-            if channel not in part or unit not in (None, part[channel].unit):
-                raise RecordingError(
-                    f"{part.source}: channel '{channel}' is not logged as in {first.source}",
-                    "all parts of a log have the same channels and units",
-                    channel=channel,
-                )
-            times.append(part[channel].time + (part.origin - first.origin))
-            if times[-1][0] <= end:
-                raise RecordingError(
-                    f"{part.source}: overlaps the previous part ({channel}: starts at {times[-1][0]:g} s, before "
-                    f"{end:g} s)",
-                    "the parts of a log share one clock and do not overlap",
-                )
-            end, unit = times[-1][-1], part[channel].unit
-        values = np.concatenate([part[channel].values for part in containing])
-        joined[channel] = Series(np.concatenate(times), values, containing[0][channel].unit)
-    findings = tuple(found for part in parts for found in with_file_name(location(part.source), part.findings))
-    findings += tuple(_gaps_between(parts))
-    source = ", ".join(part.source for part in parts)
-    digest = join_digests([part.digest for part in parts])
-    kinds = next((part.label_kinds for part in parts if part.label_kinds), ())
-    return Recording(name, source, first.joints, joined, first.origin, findings, digest, label_kinds=kinds)
+    parts = sorted(parts, key=lambda part: part[0].origin)
+    sources = [source for source, _ in parts]
+    first, items = sources[0], {item.channel: item for _, channels in parts for item in channels.sources}
+    columns: dict[str, Column] = {}
+    clocks: dict[tuple[int, ...], FloatArray] = {}
+    for key in dict.fromkeys(key for item in items.values() for key in item.keys):
+        containing = [(source, source.columns[key]) for source in sources if key in source.columns]
+        if len({column.values.shape[1:] for _, column in containing}) > 1:
+            raise RecordingError(f"the length of '{key}' differs between its parts", "select one element")
+        clock = tuple(id(column.time) for _, column in containing)
+        if clock not in clocks:
+            clocks[clock] = _joined_times(key, containing, first.origin)
+        values = np.concatenate([column.values for _, column in containing])
+        columns[key] = replace(containing[0][1], values=values, time=clocks[clock])
+        for source in sources:
+            if isinstance(source.columns, dict):
+                source.columns.pop(key, None)
+    findings = tuple(found for source in sources for found in with_file_name(source.path, source.findings))
+    details, topics = join_details(sources), join_topics(sources)
+    joined = replace(first, path=folder, columns=columns, findings=findings, details=details, topics=topics)
+    return joined, replace(parts[0][1], sources=tuple(items.values()))
 
 
-def _gaps_between(parts: Sequence[Recording]) -> Iterator[Finding]:
-    """Yield one finding for each of the consecutive `parts` that begins later than its channels' steps explain.
-
-    Nothing was logged in between: the recorder was stopped, or a part is missing. Ground truth is not considered, as it
-    may be in some parts only. If only some channels pause, the finding names them.
-    """
-    for before, after in pairwise(parts):
-        channels = [name for name in before.channels if name in after and name not in GROUND_TRUTH]
-        gaps = {}
-        for name in channels:
-            gap = float(after[name].time[0] + (after.origin - before.origin) - before[name].time[-1])
-            if gap > GAP_PERIODS * before[name].period:
-                gaps[name] = gap
-        if gaps:
-            paused = () if len(gaps) == len(channels) else tuple(gaps)
-            numbers = {"gap": min(gaps.values()), "channels": paused}
-            yield Finding("part_gap", "", numbers, file=Path(after.source).name)
+def _joined_times(key: str, parts: Sequence[tuple[Source, Column]], origin: float) -> FloatArray:
+    """Return the times [s] after `origin` of a column in the parts of a log; raises RecordingError if they overlap."""
+    times = [column.time + (source.origin - origin) for source, column in parts if column.time is not None]
+    cleaned = [clean_time(time, sampled=False).time for time in times]  # a stray stamp is no overlap
+    filled = [(source, time) for (source, _), time in zip(parts, cleaned, strict=True) if len(time)]
+    for (_, before), (source, time) in pairwise(filled):
+        if time[0] <= before[-1]:
+            raise RecordingError(
+                f"{source.path}: overlaps the previous part ({key}: starts at {time[0]:g} s, before {before[-1]:g} s)",
+                "the parts of a log share one clock and do not overlap",
+            )
+    return np.concatenate(times)
 
 
 def with_file_name(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
@@ -172,42 +163,12 @@ def join_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
 def named_parts(folder: Path) -> list[str]:
     """Return the file names listed in `relative_file_paths` of a folder's metadata.yaml; empty without this file.
 
-    It is read line by line, as rosbag2 writes simple lists of strings. The first versions of rosbag2 wrote the bag's
-    folder before each name.
+    The first versions of rosbag2 wrote the bag's folder before each name.
     """
     metadata = folder / _METADATA
     try:
         content = read_bytes(metadata, RecordingError) if metadata.is_file() else b""
     except RecordingError:  # the list is only used for a check
         return []
-    lines = content.decode("utf-8", "replace").splitlines()
-    for i, line in enumerate(lines):
-        key, colon, rest = line.partition(":")
-        if key.strip() == "relative_file_paths" and colon:
-            listed = _flow_list(rest, lines[i + 1 :]) if "[" in rest else _block_list(lines[i + 1 :])
-            return [Path(name).name for name in map(_plain, listed) if name]
-    return []
-
-
-def _flow_list(rest: str, below: Sequence[str]) -> list[str]:
-    """Return the items of a list `[bag_0.mcap, bag_1.mcap]`, in one line or several."""
-    return "\n".join([rest, *below]).partition("[")[2].partition("]")[0].split(",")
-
-
-def _block_list(below: Sequence[str]) -> Iterator[str]:
-    """Yield the items of lines `- bag_0.mcap`, up to the first line that is not an item."""
-    for line in below:
-        text = line.strip()
-        if not text or text.startswith("#"):
-            continue
-        if not text.startswith("- "):
-            return
-        yield text[2:]
-
-
-def _plain(item: str) -> str:
-    """Return an item without its quotes, or without the comment after it."""
-    text = item.strip()
-    if text[:1] in ("'", '"'):
-        return text[1:].partition(text[0])[0]
-    return text.partition(" #")[0].strip()
+    listed = _LIST.search(_COMMENT.sub("", content.decode("utf-8", "replace")))
+    return [name.lstrip("- ") for name in _PART.findall(listed[1])] if listed else []

@@ -1,119 +1,43 @@
-"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece.
-
-The axes of a force vector whose columns or topics have clocks of their own: joined on one clock, causally.
-"""
+"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece."""
 
 from __future__ import annotations
 
 import codecs
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from cdtool.base.errors import ConfigurationError, RecordingError, naming
 from cdtool.base.files.kinds import kind_of
 from cdtool.base.findings import Finding
-from cdtool.base.log_names import log_stem, log_suffix
+from cdtool.base.log_names import log_suffix
 from cdtool.base.remote.remote_path import location
 from cdtool.formats import FORMATS
-from cdtool.formats.channels.channel_assembly import assemble_recording
+from cdtool.formats.channels.channel_assembly import LoggedRecording, assemble_recording, file_digest
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
 from cdtool.formats.channels.file_beside import add_files_beside
-from cdtool.formats.channels.header_units import unit_findings
-from cdtool.formats.channels.logged_recording import LoggedRecording
 from cdtool.formats.channels.parts import (
     Span,
-    join_recordings,
+    join_digests,
+    join_parts,
     join_sources,
     loss_findings,
     missing_part_findings,
     named_parts,
 )
 from cdtool.formats.column_names import OWN_CLOCK, resolve_columns
-from cdtool.formats.columns import Column, Piece
+from cdtool.formats.columns import Piece
 from cdtool.formats.csv.gzipped import MAGIC
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.machine_file import MachineFile
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source
-from cdtool.recordings.clock import HOLD_PERIODS, clean_time, previous_value
 from cdtool.recordings.clock.stamps import epoch_start
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.recordings.recording import Recording, Series
-
-
-def fields_by_axis(channels: ChannelMap) -> ChannelMap:
-    """Return a map of topics in which every axis of a force is a source of its own; any other map is unchanged."""
-    if not any(item.fields for item in channels.sources):
-        return channels
-    return replace(channels, sources=tuple(axis for item in channels.sources for axis in item.by_axis))
-
-
-def join_fields(source: Source, resolved: ChannelMap, wanted: ChannelMap) -> tuple[Source, ChannelMap]:
-    """Return a source in which the fields of a force vector are one column, and its map; the inverse of fields_by_axis.
-
-    `wanted` is the map of the machine file. A vector without one of its axes is missing. Raises RecordingError.
-    """
-    vectors = [item for item in wanted.sources if item.fields]
-    if not vectors:
-        return source, resolved
-    present = {key for item in resolved.sources for key in item.keys}
-    sources = [item for item in resolved.sources if item.channel not in {vector.channel for vector in vectors}]
-    columns, findings = dict(source.columns), list(source.findings)
-    for vector in vectors:
-        keys = [axis.described for axis in vector.by_axis]
-        if not present.issuperset(keys):
-            continue
-        column, notes = join_axes(vector, [source.columns[key] for key in keys])
-        columns[vector.channel] = column
-        findings += notes
-        sources.append(replace(vector, keys=(vector.channel,)))
-    return replace(source, columns=columns, findings=tuple(findings)), replace(resolved, sources=tuple(sources))
-
-
-def join_axes(item: ChannelSource, axes: Sequence[Column]) -> tuple[Column, list[Finding]]:
-    """Return the axes of a force as one column (n, axes), and a note if they have different clocks.
-
-    The clock is then that of the axis with the longest period; of every other axis, each time has the last sample at or
-    before it, NaN if that is older than 5 of its periods. Raises RecordingError if an axis has no sample.
-    """
-    for axis in axes:
-        if axis.time is None or axis.values.ndim != 1 or not len(axis.values):
-            problem = "is not one number per sample" if axis.values.ndim != 1 else "has no sample with a time"
-            raise RecordingError(
-                f"'{axis.name}' (channel '{item.channel}') {problem}",
-                "name one element per axis, each with a clock",
-                channel=item.channel,
-            )
-    first = axes[0].time
-    if all(axis.time is first or np.array_equal(axis.time, first) for axis in axes):  # type: ignore[arg-type]
-        return Column(item.channel, np.column_stack([axis.values for axis in axes]), first), []
-    clean = [_cleaned(item, axis) for axis in axes]
-    slowest = max(range(len(axes)), key=lambda k: clean[k].period if np.isfinite(clean[k].period) else 0.0)
-    clock = clean[slowest].time
-    held = np.column_stack([previous_value(series, clock)[:, 0] for series in clean])
-    ages = [_longest_age(series, clock) for k, series in enumerate(clean) if k != slowest]
-    fact = {"slowest": axes[slowest].name, "age": max(ages, default=0.0)}
-    return Column(item.channel, held, clock), [Finding("axes_held", item.channel, fact)]
-
-
-def _cleaned(item: ChannelSource, axis: Column) -> Series:
-    clean = clean_time(axis.time)  # type: ignore[arg-type]
-    if not len(clean.time):
-        raise RecordingError(f"'{axis.name}' has no sample with a time", channel=item.channel)
-    return Series(clean.time, axis.values[clean.keep], "1")
-
-
-def _longest_age(series: Series, clock: np.ndarray) -> float:
-    """Return the largest age of the samples that are held [s], among those that are not too old."""
-    at = np.searchsorted(series.time, clock, side="right") - 1
-    age = (clock - series.time[np.maximum(at, 0)])[at >= 0]
-    age = age[age <= HOLD_PERIODS * series.period] if np.isfinite(series.period) else age
-    return float(age.max(initial=0.0))
-
 
 # The parts of a log in a folder; the first kind that is there is read.
 _PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
@@ -123,10 +47,6 @@ Unread = Literal["error", "loss"]
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
 
 _KNOWN_CONTENTS = {
-    b"\x89PNG": "a PNG image",
-    b"\xff\xd8\xff": "a JPEG image",
-    b"GIF8": "a GIF image",
-    b"%PDF": "a PDF document",
     b"PK\x03\x04": "a ZIP archive or an Excel workbook",
     b"\x1f\x8b": "gzip-compressed",
     b"(\xb5/\xfd": "zstd-compressed",
@@ -141,13 +61,6 @@ _NEXT_STEPS = {
     "gzip-compressed": "only text tables are read compressed; unpack it first, e.g. with gunzip",
     "zstd-compressed": "unpack it first, e.g. with unzstd",
 }
-# UTF-32 first: its mark begins with that of UTF-16.
-_WIDE = {
-    codecs.BOM_UTF32_LE: "utf-32",
-    codecs.BOM_UTF32_BE: "utf-32",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
 
 
 def choose_format(path: Path) -> Format:
@@ -161,21 +74,15 @@ def choose_format(path: Path) -> Format:
             likely: Format = FORMATS.load(name)()
             if suffix in likely.suffixes and likely.sniff(path):
                 return likely
-        formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
+        is_new = all(suffix not in FORMATS.load(name).suffixes for name in FORMATS.names())
+        formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=is_new)]
         by_suffix = [item for item in formats if suffix in item.suffixes]
-        # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
-        claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
         for item in [*by_suffix, *formats]:
-            if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
+            if item.sniff(path):
                 return item
-        wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
-        start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
+        start = head.removeprefix(codecs.BOM_UTF8).lstrip()
         content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
         content = kind_of(head) or content if content == "JSON" else content
-        if wide and not content and _is_damaged_text(path, wide):
-            raise RecordingError(
-                f"begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
-            )
         expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
         raise RecordingError(
             f"is not a recording{f': it is {content}' if content else expected}",
@@ -201,14 +108,12 @@ def log_pieces(log: Path, keys: Collection[str] | None = None, read: ReadFile = 
 
 def _part_pieces(folder: Path, keys: Collection[str] | None, read: ReadFile) -> Pieces:
     """Yield the pieces of one part after the other; all times count from the start of the first part."""
-    log = LogFolder.of(folder)
+    log = _LogFolder.of(folder)
     start: float | None = None
     parts: list[tuple[Source, Mapping[str, Span]]] = []
     for part in (*log.filled, *log.empty):
         if not has_topics(chosen := choose_format(part)):
-            raise RecordingError(
-                f"{part}: is not a log of topics, as a part of a log has to be", "remove it or its suffix"
-            )
+            raise _not_of_topics(part)
         run = PieceRun(read(chosen, part, keys))
         spans: dict[str, Span] = {}
         for piece in run:
@@ -251,23 +156,29 @@ def read_as_logged(path: Path, machine_file: MachineFile, unread: Unread = "erro
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
-    paths, lost = _parts_of(path, unread) if path.is_dir() else ([path], [])
-    parts: list[Recording] = []
-    headers: list[Source] = []
-    factors: dict[str, tuple[float, ...]] = {}
-    for part in paths:
-        source, channels = mapped_source(part, machine_file)
-        factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
-        with naming(part):
-            parts.append(assemble_recording(source, channels, machine_file.machine))
-        headers.append(replace(source, columns={}))
-    name = path.name if path.is_dir() else log_stem(path)
-    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
-    if path.is_dir():
-        whole = replace(whole, source=str(path), findings=(*lost, *whole.findings))
+    source, channels = mapped_source(path, machine_file, unread)
+    with naming(path):
+        name = path.name if path.is_dir() else ""
+        logged = assemble_recording(source, channels, machine_file.machine, log_digest(path), name)
     if machine_file.columns.beside or machine_file.topics.beside:
-        whole = _with_files_beside(whole, path, machine_file, unread)
-    return LoggedRecording(whole, factors, channels.speed_low_pass, tuple(headers))
+        return replace(logged, recording=_with_files_beside(logged.recording, path, machine_file, unread))
+    return logged
+
+
+def _mapped_parts(folder: Path, machine_file: MachineFile, unread: Unread) -> tuple[Source, ChannelMap]:
+    """Return what mapped_source returns, of the parts of a log, on one clock."""
+    files, lost = _parts_of(folder, unread)
+    parts = [mapped_source(file, machine_file) for file in files]
+    for part, channels in parts:
+        if not channels.topics:
+            raise _not_of_topics(part.path)
+    with naming(folder):
+        source, channels = join_parts(folder, parts)
+    return replace(source, findings=(*lost, *source.findings)), channels
+
+
+def _not_of_topics(part: Path) -> RecordingError:
+    return RecordingError(f"{part}: is not a log of topics, as a part of a log has to be", "remove it or its suffix")
 
 
 def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFile, unread: Unread) -> Recording:
@@ -280,37 +191,40 @@ def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFi
         if by_topics:
             topic, _, field = str(name).rpartition(" ")
             source = ChannelSource("trigger", topic=topic, field=field)
-        only = replace(channels, sources=(source,), beside=())
-        return read_as_logged(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
+        only = machine_file.with_map(replace(channels, sources=(source,), beside=()))
+        return read_as_logged(path, only, unread).recording["trigger"]
 
-    return add_files_beside(recording, path, channels, machine_file.machine, mapped_source, read_trigger)
+    def read_beside(file: Path, mapped: ChannelMap) -> Recording:
+        source, resolved = mapped_source(file, machine_file.with_map(mapped))
+        with naming(file):
+            return assemble_recording(source, resolved, machine_file.machine, file_digest(file)).recording
+
+    return add_files_beside(recording, path, channels, read_beside, read_trigger)
 
 
-def _parts_of(folder: Path, unread: Unread) -> tuple[list[Path], Sequence[Finding]]:
+def _parts_of(folder: Path, unread: Unread) -> tuple[Sequence[Path], Sequence[Finding]]:
     """Return the files of a folder in the order of their times or names, and the losses; raises RecordingError."""
     if unread == "error":
         parts = log_parts(folder)
         return parts, missing_part_findings(folder, parts)
-    log = LogFolder.of(folder)
+    log = _LogFolder.of(folder)
     if not log.filled:
         raise RecordingError(f"{folder}: no part of the log contains a message", "was the recording stopped at once?")
-    return list(log.filled), log.findings
+    return log.filled, loss_findings(folder, (*log.filled, *log.empty, *log.unread), log.unread)
 
 
-@dataclass(frozen=True)
-class LogFolder:
+class _LogFolder(NamedTuple):
     """The parts of a log in a folder: `filled` ones in the order of their first times, and `empty` ones.
 
     `unread` are those that cannot be read, with the reason.
     """
 
-    folder: Path
     filled: tuple[Path, ...]
     empty: tuple[Path, ...]
     unread: Mapping[Path, RecordingError]
 
     @classmethod
-    def of(cls, folder: Path) -> LogFolder:
+    def of(cls, folder: Path) -> _LogFolder:
         """Return the parts of a folder; raises RecordingError if no part can be read."""
         starts: dict[Path, float] = {}
         unread: dict[Path, RecordingError] = {}
@@ -323,17 +237,12 @@ class LogFolder:
             raise next(iter(unread.values()))
         known = sorted((start, part.name, part) for part, start in starts.items() if start < np.inf)
         empty = tuple(part for part, start in starts.items() if start == np.inf)
-        return cls(folder, tuple(part for _, _, part in known), empty, unread)
+        return cls(tuple(part for _, _, part in known), empty, unread)
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All files of the log."""
-        return (*self.filled, *self.empty, *self.unread)
 
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """The losses: missing parts, and those that cannot be read."""
-        return loss_findings(self.folder, self.files, self.unread)
+def log_digest(log: Path) -> str:
+    """Return the SHA-256 of a log; of a folder that of the hexadecimal digests of its parts, in the order of names."""
+    return join_digests([file_digest(part) for part in (log_parts(log) if log.is_dir() else [log])])
 
 
 def log_parts(path: Path) -> list[Path]:
@@ -348,34 +257,45 @@ def log_parts(path: Path) -> list[Path]:
     return [path]
 
 
-def mapped_source(
-    path: Path, mapping: MachineFile | ChannelMap, also: Callable[[bool], ChannelSource] | None = None
-) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that are mapped, and the map for them; raises RecordingError.
+def mapped_source(path: Path, machine_file: MachineFile, unread: Unread = "error") -> tuple[Source, ChannelMap]:
+    """Return the mapped columns of a log, a file or a folder of parts, and the map for them; raises RecordingError.
 
-    The map is that of a machine file for a format of columns or topics, or given. A mapped load cell or label that is
-    not in the file is left out of the map, with a note. `also` returns a further column, given whether the file
-    contains topics; it becomes the last source of the map.
+    A mapped load cell or label that is not in the file is left out of the map, with a note.
     """
+    if path.is_dir():
+        return _mapped_parts(path, machine_file, unread)
     file_format = choose_format(path)
     topics = has_topics(file_format)
-    channels = mapping if isinstance(mapping, ChannelMap) else mapping.topics if topics else mapping.columns
-    if isinstance(mapping, MachineFile) and not channels.sources:
+    channels = machine_file.topics if topics else machine_file.columns
+    if not channels.sources:
         section, what = ("[channels.mcap]", "topic and field") if topics else ("[channels]", "column and unit")
         raise ConfigurationError(
-            f"{mapping.path}: no channel in {section}, which {path} needs",
+            f"{machine_file.path}: no channel in {section}, which {path} needs",
             f"write {section} with the {what} of each channel",
         )
-    if also is not None:
-        channels = replace(channels, sources=(*channels.sources, also(topics)))
     with naming(path):
         if topics and not channels.topics:
             raise RecordingError("contains topics, but columns are mapped", "give a file of columns")
-        asked = fields_by_axis(channels)
-        source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+        if topics:
+            asked = replace(channels, sources=tuple(axis for item in channels.sources for axis in item.by_axis))
+            source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+            return source, _with_vectors(resolved, channels)
+        source, resolved = resolve_columns(file_format.columns(path, channels), channels)
         if resolved.time.nanoseconds_key:
             source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
-        return with_own_clocks(*join_fields(source, resolved, channels))
+        return with_one_clock(source, resolved), resolved
+
+
+def _with_vectors(resolved: ChannelMap, channels: ChannelMap) -> ChannelMap:
+    """Return a resolved map in which the axes of a force are one source again; one without all its axes is missing."""
+    vectors = [
+        replace(item, keys=tuple(axis.described for axis in item.by_axis)) for item in channels.sources if item.fields
+    ]
+    names = {item.channel for item in vectors}
+    present = {key for item in resolved.sources for key in item.keys}
+    whole = [item for item in vectors if present.issuperset(item.keys)]
+    sources = (*(item for item in resolved.sources if item.channel not in names), *whole)
+    return replace(resolved, sources=sources)
 
 
 def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: float = 1.0) -> Source:
@@ -392,29 +312,6 @@ def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: flo
 def has_topics(file_format: Format) -> bool:
     """Return True if a format contains messages of topics, mapped by [channels.mcap]; optional for plug-ins."""
     return bool(getattr(file_format, "topics", False))
-
-
-def _sniffs_any_text(file_format: Format) -> bool:
-    return bool(getattr(file_format, "sniffs_any_text", False))
-
-
-def _is_table(file_format: Format, path: Path) -> bool:
-    try:
-        return bool(file_format.columns(path).columns)
-    except RecordingError:
-        return False
-
-
-def _suffixes() -> set[str]:
-    return {suffix for name in FORMATS.names() for suffix in FORMATS.load(name).suffixes}
-
-
-def _is_damaged_text(path: Path, encoding: str) -> bool:
-    try:
-        codecs.getincrementaldecoder(encoding)().decode(read_sample(path))
-    except UnicodeError:
-        return True
-    return False
 
 
 def is_bag_folder(path: Path) -> bool:
@@ -452,50 +349,26 @@ def _read_head(path: Path) -> bytes:
     return head
 
 
-def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
-    """Return a source whose columns have their own clocks, and its map, with one column per channel.
+def with_one_clock(source: Source, channels: ChannelMap) -> Source:
+    """Return a source of columns that have all a clock of their own, as in MDF4, TDMS and HDF5 files, or none has.
 
-    MDF4, TDMS and HDF5 files have such columns. A table is returned unchanged. The map's columns are resolved
-    (resolve_columns). Raises RecordingError if the columns of a channel have different clocks or no clock, and
-    ConfigurationError if the machine file states another unit than s for the clock.
+    Their own clocks count if the machine file names them. Raises RecordingError if a column has no clock, and
+    ConfigurationError if the machine file states another unit than s.
     """
-    if channels.topics or not any(column.time is not None for column in source.columns.values()):
-        return source, channels
+    if all(column.time is None for column in source.columns.values()):
+        return source
     if channels.time.column != OWN_CLOCK:  # a column or a rate that the machine file names decides
-        plain = {name: replace(column, time=None) for name, column in source.columns.items()}
-        return replace(source, columns=plain), channels
+        return replace(source, columns={name: replace(column, time=None) for name, column in source.columns.items()})
     if channels.time.factor != 1.0:
         raise ConfigurationError(
             "its own clock is in s, but [channels] time states another unit", 'time = { column = "time", unit = "s" }'
         )
-    joined, notes = dict[str, Column](), list[Finding]()
     for item in channels.sources:
-        joined[item.channel], of_axes = _joined(source, item)
-        notes += of_axes
-    sources = tuple(replace(item, keys=(item.channel,)) for item in channels.sources)
-    names = tuple(joined)
-    # The units are compared here, as joined columns have no unit.
-    findings = (*source.findings, *unit_findings(source, channels), *notes)
-    source = replace(source, columns=joined, names=names, findings=findings)
-    return source, replace(channels, sources=sources, topics=True)
-
-
-def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]:
-    parts = [source.columns[key] for key in item.keys]
-    if item.axes and all(part.time is not None for part in parts):
-        return join_axes(item, parts)
-    time = parts[0].time
-    for part in parts:
-        if part.time is None or time is None:
-            raise RecordingError(
-                f"column '{part.name}' (channel '{item.channel}') has no clock",
-                "name the column with its clock in [channels] time",
-                channel=item.channel,
-            )
-        if not np.array_equal(part.time, time):
-            raise RecordingError(
-                f"'{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
-                "all joints of a channel must have the same clock",
-                channel=item.channel,
-            )
-    return Column(item.channel, np.column_stack([part.values for part in parts]), time, words=parts[0].words), []
+        for key in item.keys:
+            if source.columns[key].time is None:
+                raise RecordingError(
+                    f"column '{source.columns[key].name}' (channel '{item.channel}') has no clock",
+                    "name the column with its clock in [channels] time",
+                    channel=item.channel,
+                )
+    return source

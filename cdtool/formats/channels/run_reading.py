@@ -20,11 +20,9 @@ from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.plain_text import counted, first_of
 from cdtool.base.remote.remote_path import location
-from cdtool.formats.channels.channel_assembly import assemble_recording, file_digest
+from cdtool.formats.channels.channel_assembly import LoggedRecording, assemble_recording
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
-from cdtool.formats.channels.logged_recording import LoggedRecording
-from cdtool.formats.channels.parts import join_details, join_digests, join_topics, missing_part_findings, with_file_name
-from cdtool.formats.channels.reading import log_parts, mapped_source
+from cdtool.formats.channels.reading import log_digest, mapped_source
 from cdtool.formats.channels.run_segments import Rows, Segments, segments_by_id, segments_by_reset
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import MachineFile
@@ -107,14 +105,11 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
             f"{machine_file.path}: a channel in a file of its own cannot be divided into the runs of {path}",
             "write each run to a log of its own, or map a channel of the log",
         )
-    files = log_parts(path)
-    also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
-    mapped = [mapped_source(file, machine_file, also) for file in files]
+    by_reset = cut.by == "clock-reset"
+    source, channels = mapped_source(path, machine_file if by_reset else _with_ids(machine_file, cut.column))
     with naming(path):
-        channels = _common_map([item for _, item in mapped])
-        source = _joined(path, [item for item, _ in mapped]) if path.is_dir() else mapped[0][0]
-        whole = _by_reset(source, channels, cut) if also is None else _by_id(source, channels, cut)
-        return whole.runs(pattern, machine_file.machine, join_digests([file_digest(file) for file in files]))
+        whole = _by_reset(source, channels, cut) if by_reset else _by_id(source, channels, cut)
+        return whole.runs(pattern, machine_file.machine, log_digest(path))
 
 
 def _fits(name: str, pattern: str) -> bool:
@@ -131,17 +126,17 @@ def _too_short(segments: Segments, short: Rows, lengths: Rows) -> str:
     )
 
 
-def id_source(cut: RunCut, topics: bool) -> ChannelSource:
-    """Return the source of the ids of a cut; raises RecordingError if topics have no such field or no such cut."""
-    if not topics:
-        column = int(cut.column) if cut.column.isdecimal() else cut.column  # a number as in [channels]
-        return ChannelSource(_ID, (column,), words=True)
-    topic, _, field_name = cut.column.partition(" ")
-    if not field_name.strip():
-        raise RecordingError(
-            f"operations '{cut.by}:{cut.column}': does not name a field of a topic", f"write {cut.by}:TOPIC FIELD"
-        )
-    return ChannelSource(_ID, topic=topic, field=field_name.strip(), words=True)
+def _with_ids(machine_file: MachineFile, column: str) -> MachineFile:
+    """Return the machine file with the ids of a cut as a further source, of topics only if it names a field of one."""
+    number = int(column) if column.isdecimal() else column  # as in [channels]
+    topic, _, field_name = column.partition(" ")
+    columns, topics = machine_file.columns, machine_file.topics
+    if columns.sources:
+        columns = replace(columns, sources=(*columns.sources, ChannelSource(_ID, (number,), words=True)))
+    if topics.sources and field_name.strip():
+        by_topic = ChannelSource(_ID, topic=topic, field=field_name.strip(), words=True)
+        topics = replace(topics, sources=(*topics.sources, by_topic))
+    return replace(machine_file, columns=columns, topics=topics)
 
 
 @dataclass(frozen=True)
@@ -194,51 +189,36 @@ class _CutLog:
 
     def recording(self, run: int, name: str, machine: Machine, digest: str) -> LoggedRecording:
         """Return a run as logged; raises RecordingError if a channel has no sample in it."""
-        source, first_row = self.source, self.source.first_row
-        path = location(f"{source.path}{_MARK}{name}")
-        times, start = self._times(run)
-        columns: dict[str, Column] = {}
-        for key, column in source.columns.items():
-            clock = id(column.time) if self.channels.topics else 0
-            if clock in self.rows:  # of a channel
-                columns[key] = replace(column, values=column.values[self.rows[clock][run]], time=times.get(clock))
-        if 0 in self.rows:
-            first_row += int(self.segments.start[run]) if first_row else 0
-            columns, start = self._from_start(columns)
-        channels, absent = self._present(columns)
-        mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
-        origin = source.origin + start
-        part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=tuple(absent))
-        recording = assemble_recording(part, channels, machine, mark)
-        recording = replace(recording, name=f"{log_stem(source.path)}{_MARK}{name}")
-        factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
-        return LoggedRecording(recording, factors, channels.speed_low_pass, (replace(source, columns={}),))
-
-    def _times(self, run: int) -> tuple[dict[int, FloatArray], float]:
-        """Return the times of a run by clock, and their start [s].
-
-        A message's time, and one that counts from an epoch, is what it is in a file with this run alone: it counts from
-        the run's start.
-        """
-        times = {
-            clock: time[self.rows[clock][run]]
-            for clock, time in _clocks(self.source, self.channels).items()
-            if clock in self.rows
+        source, channels, first_row = self.source, self.channels, self.source.first_row
+        rows = {clock: of_clock[run] for clock, of_clock in self.rows.items()}
+        clocks = {clock: time[rows[clock]] for clock, time in _clocks(source, channels).items() if clock in rows}
+        first = self._first(run, clocks)
+        times = {clock: time - first for clock, time in clocks.items()}
+        columns = {
+            key: replace(column, values=column.values[rows[clock]], time=times[clock] if clock else None)
+            for key, column in source.columns.items()
+            if (clock := _clock_of(column)) in rows  # of a channel
         }
-        if not self.source.origin and not any(item.topic for item in self.channels.sources):
-            return times, 0.0
-        starts = [float(time[0]) for time in times.values() if len(time)]
-        first = float(self.begins[run]) if self.begins is not None else min(starts, default=0.0)
-        return {clock: time - first for clock, time in times.items()}, first
+        if 0 in times:
+            columns[channels.time.key] = replace(columns[channels.time.key], values=times[0])
+        if 0 in rows and first_row:
+            first_row += int(self.segments.start[run])
+        channels, absent = self._present(columns)
+        path, origin = location(f"{source.path}{_MARK}{name}"), source.origin + first * channels.time.factor
+        part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=tuple(absent))
+        mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
+        return assemble_recording(part, channels, machine, mark, f"{log_stem(source.path)}{_MARK}{name}")
 
-    def _from_start(self, columns: dict[str, Column]) -> tuple[dict[str, Column], float]:
-        """Return the columns of a run of a table, whose clock counts from its start if the log's counts from one."""
-        time = self.channels.time
-        if not self.source.origin or time.column is None:
-            return columns, 0.0
-        clock = columns[time.key]
-        first = float(next(iter(clock.values[np.isfinite(clock.values)]), 0.0))
-        return columns | {time.key: replace(clock, values=clock.values - first)}, first * time.factor
+    def _first(self, run: int, clocks: Mapping[int, FloatArray]) -> float:
+        """Return the time stamp, in its unit, from which the clocks of a run count; 0 if they count as in the log.
+
+        A message's time, and one that counts from an epoch, is what it is in a file with this run alone.
+        """
+        if not self.source.origin and not any(item.topic for item in self.channels.sources):
+            return 0.0
+        if self.begins is not None:
+            return float(self.begins[run])
+        return min((float(known[0]) for time in clocks.values() if len(known := time[np.isfinite(time)])), default=0.0)
 
     def _present(self, columns: Mapping[str, Column]) -> tuple[ChannelMap, list[Finding]]:
         """Return the map without ground truth that has no sample in a run, each with a note."""
@@ -259,12 +239,12 @@ class _CutLog:
         if self.cut.by == "clock-reset":
             return
         columns = self.source.columns
-        channels = {id(columns[item.keys[0]].time): item.channel for item in reversed(self.channels.sources)}
-        totals = {id(column.time) if self.channels.topics else 0: len(column.values) for column in columns.values()}
+        channels = {_clock_of(columns[item.keys[0]]): item.channel for item in reversed(self.channels.sources)}
+        totals = {_clock_of(column): len(column.values) for column in columns.values()}
         for clock, rows in self.rows.items():
             if outside := totals[clock] - sum(map(len, rows)):
                 fact = {"count": outside, "total": totals[clock], "column": self.cut.column}
-                yield Finding("samples_outside_runs", channels.get(clock, "") if self.channels.topics else "", fact)
+                yield Finding("samples_outside_runs", channels[clock] if clock else "", fact)
 
     def no_run(self, longest: int) -> RecordingError:
         """Return the error for a log without a run that can be used."""
@@ -280,11 +260,15 @@ class _CutLog:
 
 
 def _by_id(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
-    """Cut a log by the ids in the last column of the map, beside the channels; raises RecordingError."""
-    *others, last = channels.sources
-    channels = replace(channels, sources=tuple(others))
-    ids = source.columns[last.keys[0]]
-    if ids.words and any(last.keys[0] in other.keys for other in others):
+    """Cut a log by the column of ids, which is in the map beside the channels; raises RecordingError."""
+    if _ID not in channels:
+        raise RecordingError(
+            f"operations '{cut.by}:{cut.column}': does not name a field of a topic", f"write {cut.by}:TOPIC FIELD"
+        )
+    key = next(item.keys[0] for item in channels.sources if item.channel == _ID)
+    channels = replace(channels, sources=tuple(item for item in channels.sources if item.channel != _ID))
+    ids = source.columns[key]
+    if ids.words and any(key in other.keys for other in channels.sources):
         raise RecordingError(f"column '{cut.column}' has texts", "map another column to the channel")
     values = ids.values.reshape(len(ids.values), -1)
     if values.shape[1] != 1:
@@ -293,11 +277,11 @@ def _by_id(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
             "select one element, e.g. data[0]",
         )
     time, id_values = ids.time, values[:, 0]
-    if channels.topics and time is not None and np.any(time[1:] < time[:-1]):
+    if time is not None and np.any(time[1:] < time[:-1]):
         order = np.argsort(time, kind="stable")
         time, id_values = time[order], id_values[order]
     segments = segments_by_id(id_values, ids.words, cut.by == "column")
-    if not channels.topics or time is None:
+    if time is None:
         return _CutLog(source, channels, cut, segments, {0: _consecutive(segments)})
     begins, ends = time[segments.start], np.append(time, np.inf)[segments.stop]
     rows = {clock: _between(stamps, begins, ends) for clock, stamps in _clocks(source, channels).items()}
@@ -316,8 +300,7 @@ def _by_reset(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
             "has no clock that could start again: [channels] time states a rate",
             'cut it by a column: by = "column:NAME"',
         )
-    clocks = _clocks(source, channels) if channels.topics else {0: source.columns[channels.time.key].values}
-    found = {clock: segments_by_reset(time) for clock, time in clocks.items()}
+    found = {clock: segments_by_reset(time) for clock, time in _clocks(source, channels).items()}
     counts = sorted({len(item) for item in found.values()})
     if len(counts) > 1:
         raise RecordingError(
@@ -329,10 +312,15 @@ def _by_reset(source: Source, channels: ChannelMap, cut: RunCut) -> _CutLog:
     return _CutLog(source, channels, cut, next(iter(found.values())), rows)
 
 
+def _clock_of(column: Column) -> int:
+    return 0 if column.time is None else id(column.time)
+
+
 def _clocks(source: Source, channels: ChannelMap) -> dict[int, FloatArray]:
-    """Return the clocks of the channels by their identity; empty for a table."""
+    """Return the clocks of the channels; that of a table in its unit, none if [channels] time states a rate."""
     columns = (source.columns[key] for item in channels.sources for key in item.keys)
-    return {id(column.time): column.time for column in columns if column.time is not None}
+    clocks = {id(column.time): column.time for column in columns if column.time is not None}
+    return {0: source.columns[channels.time.key].values} if not clocks and channels.time.key else clocks
 
 
 def _consecutive(segments: Segments) -> list[Rows]:
@@ -351,39 +339,3 @@ def _between(time: FloatArray, begins: FloatArray, ends: FloatArray) -> list[Row
 
 def _described(cut: RunCut) -> str:
     return cut.by if cut.by == "clock-reset" else f"{cut.by} '{cut.column}'"
-
-
-def _common_map(maps: Sequence[ChannelMap]) -> ChannelMap:
-    """Return the map of all parts of a log; raises RecordingError if their channels differ."""
-    for other in maps[1:]:
-        if [item.channel for item in other.sources] != [item.channel for item in maps[0].sources]:
-            raise RecordingError("its parts have different channels", "cut each part as a log of its own")
-    return maps[0]
-
-
-def _joined(path: Path, parts: Sequence[Source]) -> Source:
-    """Return the columns of the parts of a log one after the other, on the clock of the first part."""
-    first = min(parts, key=lambda part: part.origin)
-    ordered = sorted(parts, key=lambda part: part.origin)
-    columns: dict[str, Column] = {}
-    clocks: dict[tuple[int, ...], FloatArray] = {}
-    for key in first.columns:
-        own = [part.columns[key] for part in ordered]
-        if len({item.values.shape[1:] for item in own}) > 1:
-            raise RecordingError(f"the length of '{key}' differs between its parts", "select one element")
-        times = [item.time for item in own if item.time is not None]
-        clock = tuple(map(id, times))
-        if clock not in clocks:
-            shifted = [time + (part.origin - first.origin) for time, part in zip(times, ordered, strict=True)]
-            clocks[clock] = np.concatenate(shifted)
-        columns[key] = replace(own[0], values=np.concatenate([item.values for item in own]), time=clocks[clock])
-    findings = [item for part in ordered for item in with_file_name(part.path, part.findings)]
-    findings += missing_part_findings(path, [part.path for part in ordered])
-    return replace(
-        first,
-        path=path,
-        columns=columns,
-        findings=tuple(findings),
-        details=join_details(ordered),
-        topics=join_topics(ordered),
-    )

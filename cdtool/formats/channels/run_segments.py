@@ -12,14 +12,12 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.plain_text import plain, shorten
-from cdtool.recordings.clock.stamps import GAP_PERIODS, StrayStampMarker
+from cdtool.recordings.clock.stamps import StrayStampMarker, wrapped_bits
 
 # The clock starts again if so many consecutive time stamps are below the highest one; fewer are single stray rows.
 _RESTART_ROWS = 3
 # A clock that starts again returns to the first half of the run before it; a smaller step back is rows out of order.
 _RETURN = 0.5
-# Widths [bits] of counters that wrap instead of starting again.
-_COUNTER_BITS = (16, 32)
 _SLASHES = re.compile(r"[/\\]+")
 # Length of an id in names [characters].
 _LONGEST = 60
@@ -141,16 +139,11 @@ def _resets(stamps: FloatArray) -> list[int]:
             continue
         if float(x[k]) > float(x[begin]) + _RETURN * (highest - float(x[begin])):
             continue
-        if whole and _wraps(float(x[k - 1]), float(x[k]), usual):
+        if whole and wrapped_bits(float(x[k - 1]), float(x[k]), usual, float(x[k - 1])):
             continue
         resets.append(int(known[k]))
         begin, highest = k, -np.inf
     return resets
-
-
-def _wraps(before: float, after: float, usual: float) -> bool:
-    """Return whether a counter has reached its largest number and continues at zero."""
-    return any(before < 2.0**bits and 0.0 < after - before + 2.0**bits <= GAP_PERIODS * usual for bits in _COUNTER_BITS)
 
 
 def _occurrences(ids: FloatArray) -> Rows:

@@ -6,7 +6,7 @@ dropped. Whether a row is stray depends on the rows before it and at most the ne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -171,7 +171,7 @@ class ClockCleaner:
 
     def findings(self, first_row: int, with_repeated: bool = True) -> list[Finding]:
         """Return the findings on dropped rows; `first_row` is the file's line of the first sample (0: unknown)."""
-        restart = self._restart.cause(lambda: self._steps.median if self._steps.count else 0.0)
+        restart = self._restart.cause(self._steps.median if self._steps.count else 0.0)
         kinds = [(self._unknown, None), (self._stray, None), (self._backward, restart)]
         kinds += [(self._repeated, None)] if with_repeated else []
         return [finding for rows, cause in kinds for finding in rows.findings(self._rows, first_row, cause)]
@@ -308,16 +308,18 @@ class _RestartDetector:
         self._run = (runs[-1] if runs and edges[-1] == len(backward) else 0) if len(backward) else self._run
         self._last = known[-1:]
 
-    def cause(self, usual_step: Callable[[], float]) -> dict[str, Any] | None:
-        """Return the cause; None for stray time stamps. `usual_step` returns the median forward step, 0 if unknown."""
+    def cause(self, usual_step: float) -> dict[str, Any] | None:
+        """Return the cause; None for stray time stamps. `usual_step` is the median forward step, 0 if unknown."""
         if self._step_back is None:
             return None
-        before, after = self._step_back
-        for bits in _COUNTER_BITS if self._whole else ():
-            modulus = 2.0**bits
-            if self._largest < modulus and 0.0 < after - before + modulus <= GAP_PERIODS * usual_step():
-                return {"wrapped_bits": bits}
-        return {"wrapped_bits": 0} if self._longest >= _RESTART_ROWS else None
+        bits = wrapped_bits(*self._step_back, usual_step, self._largest) if self._whole else 0
+        return {"wrapped_bits": bits} if bits or self._longest >= _RESTART_ROWS else None
+
+
+def wrapped_bits(before: float, after: float, usual_step: float, largest: float) -> int:
+    """Return the width of a counter of whole numbers, up to `largest`, that continues at zero; 0 if it restarts."""
+    step = after - before
+    return next((k for k in _COUNTER_BITS if largest < 2.0**k and 0.0 < step + 2.0**k <= GAP_PERIODS * usual_step), 0)
 
 
 def _median_step(stamps: FloatArray) -> float:

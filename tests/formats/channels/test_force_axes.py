@@ -10,9 +10,11 @@ import pytest
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.findings import Finding
 from cdtool.commands.convert.converting import convert
 from cdtool.formats.channels.channel_map import ChannelSource
-from cdtool.formats.channels.reading import join_axes, read_as_logged
+from cdtool.formats.channels.force_axes import on_one_clock
+from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
@@ -212,7 +214,8 @@ def source() -> ChannelSource:
 
 def test_axes_with_clocks_of_their_own_are_held_and_never_from_the_future():
     slow, fast = np.arange(100) * 0.01, np.arange(1000) * 0.001 + 0.0004
-    column, findings = join_axes(source(), [Column("a", fast.copy(), fast), Column("b", slow.copy(), slow)])
+    findings: list[Finding] = []
+    column = on_one_clock(source(), [Column("a", fast.copy(), fast), Column("b", slow.copy(), slow)], findings)
     assert column.time is not None and column.time.tolist() == slow.tolist()
     held = column.values[1:, 0]
     assert np.all(held <= slow[1:]) and np.all(held > slow[1:] - 0.0011)
@@ -225,7 +228,7 @@ def test_an_axis_that_pauses_is_missing_and_not_held():
     slow, fast = np.arange(100) * 0.01, np.arange(1000) * 0.001
     kept = (fast < 0.3) | (fast > 0.5)
     axes = [Column("a", fast[kept], fast[kept]), Column("b", slow.copy(), slow)]
-    column, _ = join_axes(source(), axes)
+    column = on_one_clock(source(), axes, [])
     missing = slow[np.isnan(column.values[:, 0])]
     assert missing[0] == pytest.approx(0.31, abs=0.011) and missing[-1] == pytest.approx(0.5, abs=0.011)
 
@@ -233,4 +236,4 @@ def test_an_axis_that_pauses_is_missing_and_not_held():
 def test_an_axis_without_samples_is_refused():
     time = np.arange(10.0)
     with pytest.raises(RecordingError, match=r"'b' .* has no sample"):
-        join_axes(source(), [Column("a", time, time), Column("b", time[:0], time[:0])])
+        on_one_clock(source(), [Column("a", time, time), Column("b", time[:0], time[:0])], [])

@@ -13,11 +13,13 @@ from hypothesis import strategies as st
 from cdtool import convert
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.channels.parts import missing_part_findings
+from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+from cdtool.formats.channels.parts import join_parts, missing_part_findings
 from cdtool.formats.channels.reading import log_parts, read_recording, survey
+from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.source import TopicDetails
+from cdtool.formats.source import Source, TopicDetails
 from tests.base.findings.facts import fact_of
 
 START = 1_700_000_000
@@ -216,25 +218,52 @@ def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
     assert losses(source.findings) == [("part_missing", {"part": "bag_2.db3", "metadata": "metadata.yaml"})]
 
 
-@pytest.mark.parametrize("pause", [0.0, 0.01, 5.0])
-def test_a_pause_between_two_parts_is_reported(tmp_path, pause):
-    folder = tmp_path / "log"
-    folder.mkdir()
-    for number in range(3):
-        time = number + np.arange(100) / 100 + pause * (number == 2)
-        write_part(folder / f"bag_{number}.mcap", time, time)
-    findings = read_recording(folder, machine(tmp_path)).findings
-    gaps = [finding for finding in findings if finding.kind == "part_gap"]
-    if pause < 5.0:
-        assert not gaps
-    else:
-        assert gaps == [Finding("part_gap", "", {"gap": pytest.approx(5.01), "channels": ()}, file="bag_2.mcap")]
+@settings(max_examples=15, deadline=None)
+@given(cuts=st.lists(st.integers(1, 199), max_size=4, unique=True), pause=st.sampled_from([0.0, 0.01, 5.0]))
+def test_a_log_cut_anywhere_is_read_as_the_whole_log(tmp_path_factory, cuts, pause):
+    folder = tmp_path_factory.mktemp("cut")
+    time = np.arange(200) / 128.0 + pause * (np.arange(200) >= 100)
+    (folder / "bag").mkdir()
+    for i, (first, last) in enumerate(pairwise([0, *sorted(cuts), 200])):
+        write_part(folder / "bag" / f"{9 - i}.mcap", time[first:last], time[first:last])
+    whole = read_recording(write_part(folder / "whole.mcap", time, time), machine(folder))
+    parts = read_recording(folder / "bag", machine(folder))
+    assert parts.origin == whole.origin == START and parts.name == "bag"
+    np.testing.assert_array_equal(parts["speed"].values, whole["speed"].values)
+    np.testing.assert_allclose(parts["speed"].time, whole["speed"].time, rtol=0.0, atol=5e-7)
+    assert [item.kind for item in parts.findings] == [item.kind for item in whole.findings]
+    assert ("sample_gaps" in {item.kind for item in parts.findings}) == (pause == 5.0)
+
+
+def test_parts_that_overlap_are_refused(tmp_path):
+    folder = bag(tmp_path / "bag", count=1)
+    write_part(folder / "bag_1.mcap", 0.5 + np.arange(100) / 100, np.zeros(100))
+    with pytest.raises(RecordingError, match=r"bag_1\.mcap: overlaps the previous part"):
+        read_recording(folder, machine(tmp_path))
+
+
+def test_a_stray_stamp_at_the_beginning_of_a_part_is_no_overlap(tmp_path):
+    parts = []
+    for number in (0, 1):
+        time = number + np.arange(100) / 100
+        time[0] -= START * number  # the stamp of a header that is not set
+        column = Column("/speed data", np.arange(100.0), time)
+        parts.append(Source(tmp_path / f"bag_{number}.mcap", "mcap", {column.name: column}, START))
+    item = ChannelSource("speed", topic="/speed", field="data", keys=("/speed data",))
+    joined, _ = join_parts(
+        tmp_path, [(part, ChannelMap(TimeSource(), (item,), ("axis",), topics=True)) for part in parts]
+    )
+    assert len(joined.columns["/speed data"].values) == 200
 
 
 def test_a_table_with_the_suffix_of_a_part_is_one_line(tmp_path):
     folder = tmp_path / "log"
     folder.mkdir()
     (folder / "bag_0.mcap").write_text("t,x\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    columns = MACHINE.replace("[channels.mcap]", "[channels]\ntime = { column = 't', unit = 's' }")
+    (tmp_path / "machine.toml").write_text(columns.partition("speed")[0] + "speed = { column = 'x', unit = 'm/s' }\n")
     with pytest.raises(RecordingError, match=r"bag_0\.mcap: is not a log of topics"):
         convert(folder, tmp_path / "out.csv")
+    with pytest.raises(RecordingError, match=r"bag_0\.mcap: is not a log of topics"):
+        read_recording(folder, read_machine_file(tmp_path / "machine.toml"))
     assert not (tmp_path / "out.csv").exists()
