@@ -236,7 +236,8 @@ class Place:
     def key(self, name: str) -> str:
         """Return file and full key, for an error message; for one of `by_option`, the option that gave it."""
         full = f"{self.prefix}{name}"
-        return f"--set {full}" if full in self.by_option else f"{self.where}: {full}"
+        given = any(f"{option}.".startswith(f"{full}.") for option in self.by_option)
+        return f"--set {full}" if given else f"{self.where}: {full}"
 
     def home_of(self, name: str) -> str:
         """Return the table of the file that has a key of that name, if only one has; else an empty text."""

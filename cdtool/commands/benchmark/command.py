@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ from cdtool.commands.console.options import (
     OutputOption,
     QuietOption,
     RetriesOption,
+    SetOption,
     TimeoutOption,
     listed,
 )
@@ -29,6 +30,8 @@ from cdtool.commands.console.summary_table import finish
 from cdtool.commands.console.written_reports import show_results, write_reports
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from cdtool.commands.scoring.benchmark_result import StoreReport
     from cdtool.execution.store.store import Store
     from cdtool.execution.workers import Workers
@@ -68,6 +71,7 @@ def benchmark(
         str | None,
         typer.Option("--false-alarm-budget", help="Set each safety factor for this rate, as 1/1000op or 0.1/h."),
     ] = None,
+    settings: SetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
@@ -97,6 +101,7 @@ def benchmark(
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.scoring.benchmark import benchmark as run
     from cdtool.commands.scoring.benchmark_file import SECTIONS
     from cdtool.execution.store.store import Store
@@ -109,9 +114,11 @@ def benchmark(
     if store is None and (trust_mtime or retry_failed):
         raise UsageError(f"{'--trust-mtime' if trust_mtime else '--retry-failed'} needs --store", "add --store DIR")
     workers = Workers(jobs, timeout, retries, cluster)
+    changes = given_settings(settings or ())
     use = None if store is None else Store(store, trust_times=trust_mtime, retry_failed=retry_failed)
     if dry_run:
-        _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
+        work = (_named(detectors), false_alarm_budget, changes)
+        _show_dry_run(file, work, workers, use, as_json=as_json)
         return
     documents = SECTIONS.load("protocol")(file, protocol, output or [], force)
     check_outputs(documents.reports, force=force)
@@ -121,13 +128,14 @@ def benchmark(
             file,
             detectors=_named(detectors),
             false_alarm_budget=false_alarm_budget,
+            settings=changes,
             workers=workers,
             store=use,
             progress=advance,
         )
     evaluated: Evaluated = done.evaluated
     try:
-        command = _command(file, protocol, output or [], detectors, false_alarm_budget)
+        command = _command(file, protocol, output or [], detectors, false_alarm_budget, settings or [])
         evaluated = documents.verdict_of(done, command)
         lines = documents.write(done.inputs)
     finally:  # a protocol that cannot be made does not cost the reports
@@ -148,13 +156,19 @@ def benchmark(
 
 
 def _command(
-    file: Path, protocol: Path | None, output: list[Path], detectors: str | None, false_alarm_budget: str | None
+    file: Path,
+    protocol: Path | None,
+    output: list[Path],
+    detectors: str | None,
+    false_alarm_budget: str | None,
+    settings: list[str],
 ) -> str:
     """Return the command with the options that determine a protocol; of the outputs only their names."""
     options = [("-p", protocol), ("--detectors", detectors), ("--false-alarm-budget", false_alarm_budget)]
     given = [(name, value) for name, value in options if value is not None] + [
         ("-o", Path(path.name)) for path in output
     ]
+    given += [("--set", text) for text in settings]
     return shlex.join(["cdtool", "benchmark", str(file), *(str(word) for pair in given for word in pair)])
 
 
@@ -167,8 +181,7 @@ def _stored(outcomes: StoreReport | None) -> list[str]:
 
 def _show_dry_run(
     file: Path,
-    detectors: tuple[str, ...],
-    false_alarm_budget: str | None,
+    work: tuple[tuple[str, ...], str | None, Mapping[str, Any]],
     workers: Workers,
     store: Store | None,
     *,
@@ -179,7 +192,10 @@ def _show_dry_run(
 
     from cdtool.commands.scoring.dry_run import dry_run
 
-    found = dry_run(file, detectors=detectors, false_alarm_budget=false_alarm_budget, workers=workers, store=store)
+    detectors, budget, settings = work
+    found = dry_run(
+        file, detectors=detectors, false_alarm_budget=budget, settings=settings, workers=workers, store=store
+    )
     if as_json:
         print_json(asdict(found) | {"bytes": found.bytes})
         leave(found.skipped)

@@ -35,6 +35,19 @@ def thresholds(incomplete: str) -> list[str]:
     return _beginning(incomplete, THRESHOLDS.usable_names())
 
 
+def settings(incomplete: str) -> list[str]:
+    """Return the keys of the benchmark file that begin with the typed text, each with the = before its value."""
+    from cdtool.base.settings import alternatives, bare_type, is_model, keys_of
+    from cdtool.commands.judging.settings_table import JudgingTable
+
+    def keys(model: object, prefix: str) -> Iterable[str]:
+        for name, key in keys_of(model).items():
+            tables = [bare_type(part) for part in alternatives(key.hint) if is_model(bare_type(part))]
+            yield from (f"{prefix}{name}=",) if not tables else keys(tables[0], f"{prefix}{name}.")
+
+    return _beginning(incomplete, [*keys(JudgingTable, ""), "threshold.name="])
+
+
 def operations(incomplete: str) -> list[str]:
     """Return the ways to divide a log that begin with the typed text."""
     from cdtool.recordings.operations import HOW_TO_CUT

@@ -165,6 +165,15 @@ RetriesOption = Annotated[
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print the conclusion and what is wrong; no tables, no progress.")
 ]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="A key of the benchmark file in place of its value, repeatable, as activation.debounce=9.",
+        autocompletion=completions.settings,
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 

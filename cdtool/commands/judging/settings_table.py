@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from cdtool.alarms.activation import Activation
+from cdtool.base.errors import UsageError
+from cdtool.base.files.bounded_loading import ContentError, parse_toml
 from cdtool.base.settings import NotNegative, Positive, setting
 from cdtool.commands.judging.named_logs import OnsetTable
 from cdtool.thresholds.signature import Signature
@@ -83,4 +85,23 @@ def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> di
             table[above] = dict(inner) if isinstance(inner, dict) else {"name": inner} if inner else {}
             table = table[above]
         table[name] = value
+    return found
+
+
+def given_settings(texts: Iterable[str]) -> dict[str, Any]:
+    """Return the values of --set KEY=VALUE, as TOML has them; a bare word is a text. Raises UsageError.
+
+    >>> given_settings(["activation.debounce=9", "threshold.name=cusum"])
+    {'activation.debounce': 9, 'threshold.name': 'cusum'}
+    """
+    found = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            hint = "give KEY=VALUE, as activation.debounce=9; docs/benchmark-file.md has the keys"
+            raise UsageError(f"--set is '{text}'", hint)
+        try:
+            found[name] = parse_toml(f"value = {value}")["value"]
+        except ContentError:
+            found[name] = value
     return found

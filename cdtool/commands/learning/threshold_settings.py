@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from cdtool.base.errors import UsageError, nearest
-from cdtool.base.files.bounded_loading import ContentError, parse_toml
 from cdtool.base.settings import Place, keys_of, read
+from cdtool.commands.judging.settings_table import given_settings
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.fitted_signature import Sides
@@ -68,7 +68,7 @@ def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], defau
 
     Raises ConfigurationError for an unknown name or key, or a wrong value.
     """
-    settings = dict(map(setting_of, given))
+    settings = given_settings(given)
     place = Place("--set")
     if name == _DEFAULT:
         signature, settings = {**signature, **settings}, {}
@@ -76,14 +76,3 @@ def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], defau
     rule = threshold_of({"name": name, **settings}, own, default_sides, place)
     place.finish()
     return rule[1]
-
-
-def setting_of(text: str) -> tuple[str, Any]:
-    """Parse KEY=VALUE with a TOML value; a bare word is a text."""
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not (name and equals and value):
-        raise UsageError(f"--set is '{text}'", "give KEY=VALUE, as drift=0.5; the keys are in docs/thresholds.md")
-    try:
-        return name, parse_toml(f"value = {value}")["value"]
-    except ContentError:
-        return name, value

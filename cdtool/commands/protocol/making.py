@@ -82,7 +82,9 @@ def make_protocol(file: ProtocolFile, done: BenchmarkResult, command: str = "") 
     --------
     `cdtool benchmark -p` writes it.
     """
-    setup = read_benchmark_file(done.inputs[0], detectors=done.results.detectors)
+    setup = read_benchmark_file(
+        done.inputs[0], detectors=done.results.detectors, settings=done.results.provenance.get("settings")
+    )
     if file.benchmark and file.benchmark.resolve() != setup.path.resolve():
         raise ConfigurationError(
             f"{file.path}: protocol.benchmark: is {file.benchmark}, the command has {setup.path}", "use the same file"

@@ -50,11 +50,12 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.normal_choice import NormalMotions
 
 
-def benchmark(
+def benchmark(  # noqa: PLR0913  # the public function: a keyword for each setting
     file: str | Path | BenchmarkFile,
     *,
     detectors: Sequence[str | Detector] = (),
     false_alarm_budget: str | None = None,
+    settings: Mapping[str, Any] | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
     store: Store | None = None,
@@ -71,6 +72,9 @@ def benchmark(
         every registered detector that can learn from these logs; the others are listed in `results.findings`.
     false_alarm_budget : str, optional
         As "1/1000op" or "0.1/h": sets each detector's safety factor on the runs learned from.
+    settings : mapping, optional
+        Values in place of keys of the file, as {"activation.debounce": 9, "threshold.name": "cusum"}; stated in the
+        results. Not with a BenchmarkFile.
     jobs : int, optional
         Number of logs processed at a time; the results do not depend on it.
     workers : Workers, optional
@@ -106,7 +110,7 @@ def benchmark(
     [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
     workers = workers or Workers(jobs)
-    work = BenchmarkWork.of(file, detectors, false_alarm_budget)
+    work = BenchmarkWork.of(file, detectors, false_alarm_budget, settings)
     work = replace(work, setup=work.setup.with_made(workers, progress))
     if store is not None:
         store.create()
@@ -125,10 +129,16 @@ class BenchmarkWork:
 
     @classmethod
     def of(
-        cls, file: str | Path | BenchmarkFile, detectors: Sequence[str | Detector], budget: str | None
+        cls,
+        file: str | Path | BenchmarkFile,
+        detectors: Sequence[str | Detector],
+        budget: str | None,
+        settings: Mapping[str, Any] | None = None,
     ) -> BenchmarkWork:
         """Read a benchmark file unless it has been read; raises as `benchmark`."""
-        setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
+        if not isinstance(file, BenchmarkFile):
+            file = read_benchmark_file(file, detectors=detectors, settings=settings)
+        setup = file
         limits = setup.limits
         setup = with_detectors(setup, detectors) if detectors else setup
         setup = replace(setup, budget=Budget.parse(budget)) if budget is not None else setup
@@ -256,6 +266,7 @@ def _provenance(
         "tool": "cdtool",
         "tool_version": __version__,
         "benchmark_sha256": setup.digest,
+        **({"settings": dict(setup.settings)} if setup.settings else {}),
         "machine": setup.machine_file.machine.name,
         "machine_sha256": setup.machine_file.digest,
         "gains": {detector.name: asdict(detector) for detector in detectors},

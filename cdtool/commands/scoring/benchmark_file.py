@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -193,7 +194,8 @@ class BenchmarkFile:
     that are used, `learned_sections` those of the logs learned from, which end `guard` [s] before
     their first contact; None: they have no contact. `split`: which runs stay together where runs set a limit for
     others. `made`: the groups that a command makes before they are scored; `not_made`: their logs and contacts that
-    were left out. `force_limits`: the file of the force profiles; None: the shipped ones.
+    were left out. `force_limits`: the file of the force profiles; None: the shipped ones. `settings`: what took the
+    place of keys of the file.
     """
 
     path: Path
@@ -225,6 +227,7 @@ class BenchmarkFile:
     made: MadeGroups | None = None
     not_made: tuple[Skipped, ...] = ()
     force_limits: Path | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     def with_made(self, workers: Workers, progress: Progress | None = None) -> BenchmarkFile:
         """Return the benchmark with the groups that a command makes for it; unchanged without one."""
@@ -388,7 +391,8 @@ def read_benchmark_file(
     if machine_file is None:
         place.finish()
     assert machine_file is not None
-    benchmark = _resolved(file, table, place, machine_file, _Wanted(learning, tuple(also_known), tuple(detectors)))
+    wanted = _Wanted(learning, tuple(also_known), tuple(detectors), dict(settings or {}))
+    benchmark = _resolved(file, table, place, machine_file, wanted)
     place.finish()
     if learning:
         _refuse_unknown_locations(benchmark)
@@ -402,13 +406,14 @@ class _Wanted:
     learning: bool
     also_known: tuple[str, ...]
     detectors: tuple[str | Detector, ...]
+    settings: Mapping[str, Any]
 
 
 def _resolved(
     file: Path, table: BenchmarkTable, place: Place, machine_file: MachineFile, wanted: _Wanted
 ) -> BenchmarkFile:
     """Return the benchmark that the tables describe, its logs found, with the mistakes in `place`."""
-    machine = machine_file.machine
+    machine, settings = machine_file.machine, wanted.settings
     names: tuple[str, ...] = place.tried((), _detectors, table, place, machine_file, wanted)
     otherwise: tuple[str, Threshold, Signature] = ("signature", table.signature, table.signature)
     given = (table.threshold, table.signature, machine.default_sides, place)
@@ -460,7 +465,7 @@ def _resolved(
                 for kind in _kinds(machine_file, labels)
             ],
         ),
-        digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
+        digest=_digest(file, settings),
         window=table.window_s,
         sections=sections,
         learned_sections={path: section for path, section in learn.items() if section},
@@ -468,6 +473,7 @@ def _resolved(
         split=table.learn.split if table.learn else Split.RECORDING,
         made=made,
         force_limits=_force_limits(table.force, file.parent),
+        settings=settings,
     )
     for joint in table.joints:
         if joint not in machine.joints:
@@ -475,9 +481,11 @@ def _resolved(
             place.note("joints", problem, nearest(joint, machine.joints))
     if table.points and not any(group.force for group in impacts.values()):
         place.note("points", "there is no force profile to check them against", "set [force] profile")
-    for check in (refuse_limits_by_hand, _refuse_overlap):
+    with place.noting():
+        _refuse_overlap(benchmark)
+    if not wanted.detectors:  # with others, the command knows how many they are
         with place.noting():
-            check(benchmark)
+            refuse_limits_by_hand(benchmark)
     return benchmark
 
 
@@ -485,6 +493,12 @@ def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:
     """Return the kinds of contacts that a limit may name; empty if none has a kind."""
     kinds = dict.fromkeys((*machine_file.label_kinds, *(labels.kinds if labels else ())))
     return (*kinds, "") if kinds else ()
+
+
+def _digest(file: Path, settings: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of the file, and of the settings that took the place of its keys, if there are any."""
+    content = read_bytes(file, ConfigurationError)
+    return hashlib.sha256(content + (json.dumps(settings, sort_keys=True).encode() if settings else b"")).hexdigest()
 
 
 def _detectors(table: BenchmarkTable, place: Place, machine_file: MachineFile, wanted: _Wanted) -> tuple[str, ...]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from cdtool.base.remote.remote_path import is_remote
 from cdtool.commands.judging.runs import load_runs, shown_path
@@ -61,6 +62,7 @@ def dry_run(
     *,
     detectors: Sequence[str | Detector] = (),
     false_alarm_budget: str | None = None,
+    settings: Mapping[str, Any] | None = None,
     workers: Workers | None = None,
     store: Store | None = None,
 ) -> DryRun:
@@ -75,7 +77,7 @@ def dry_run(
         As `cdtool.benchmark`, apart from errors of the logs.
     """
     workers = workers or Workers()
-    work = BenchmarkWork.of(file, detectors, false_alarm_budget)
+    work = BenchmarkWork.of(file, detectors, false_alarm_budget, settings)
     setup, to_inject = work.setup.made.found(work.setup) if work.setup.made else (work.setup, 0)
     return replace(_dry_run(replace(work, setup=setup), workers, store), to_inject=to_inject)
 

@@ -12,7 +12,7 @@ from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
-from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption, listed
+from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption, SetOption, listed
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ def tune(
         float, typer.Option("--shortest-debounce", min=0.0, help="Shortest debounce to try [ms].")
     ] = 3.0,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Decides which recordings assess which others.")] = 0,
+    settings: SetOption = None,
     force: ForceOption = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of candidates to measure in parallel.")] = 1,
     quiet: QuietOption = False,
@@ -87,6 +88,7 @@ def tune(
 
     Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
     """
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.scoring.benchmark_file import read_benchmark_file
     from cdtool.commands.tune.files import open_folder, write_tuning
     from cdtool.commands.tune.options import TuningOptions
@@ -108,7 +110,7 @@ def tune(
         workers=Workers(jobs),
         watch=_unwatched if quiet else _watch,
     )
-    setup = read_benchmark_file(file, detectors=names)
+    setup = read_benchmark_file(file, detectors=names, settings=given_settings(settings or ()))
     searches = open_folder(output, setup.inputs, setup.detectors, force=force)
     with progress("reading", quiet=quiet) as advance:
         done = tune_detectors(setup, replace(options, journals=searches, progress=advance))

@@ -1,0 +1,84 @@
+"""--set KEY=VALUE: the same results as the key in the file, stated in them, and computed anew with a store."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import cdtool as api
+from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.commands.judging.settings_table import apply_settings, given_settings
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file
+from tests.command import cdtool
+
+MORE = '[activation]\ndebounce = 4\n[threshold]\nname = "limit"\nlimits = 250.0\n'
+SET = ("--set", "activation.debounce=4", "--set", "threshold.name=limit", "--set", "threshold.limits=250.0")
+
+
+@pytest.fixture(scope="module")
+def results(gate_folder, tmp_path_factory):
+    """Results by name, of a file with the keys, and of one whose keys --set gives."""
+    folder = tmp_path_factory.mktemp("set")
+    text = (gate_folder / "benchmark.toml").read_text(encoding="utf-8")
+    (gate_folder / "edited.toml").write_text(text + MORE, encoding="utf-8")
+    store = folder / "store"
+    for name, file, more in (
+        ("plain", "benchmark.toml", ("--store", store)),
+        ("set", "benchmark.toml", ("--store", store, *SET)),
+        ("edited", "edited.toml", ()),
+    ):
+        done = cdtool("benchmark", gate_folder / file, "--detectors", "gm", *more, "-o", folder / f"{name}.json")
+        assert done.status in (0, 1), done.err
+    return {name: json.loads((folder / f"{name}.json").read_text()) for name in ("plain", "set", "edited")}
+
+
+def test_a_setting_does_what_the_key_in_the_file_does(results):
+    assert results["set"]["contacts"] == results["edited"]["contacts"] != results["plain"]["contacts"]
+    assert results["set"]["false_alarms"] == results["edited"]["false_alarms"]
+
+
+def test_results_state_the_settings_and_differ_in_their_digest(results):
+    stated = {"activation.debounce": 4, "threshold.name": "limit", "threshold.limits": 250.0}
+    assert results["set"]["provenance"]["settings"] == stated and "settings" not in results["plain"]["provenance"]
+    assert results["set"]["provenance"]["benchmark_sha256"] != results["plain"]["provenance"]["benchmark_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("activation.debounce=many", "--set activation.debounce: is 'many'"),
+        ("activation.debonce=3", "--set activation.debonce: unknown key (did you mean debounce?"),
+        ("activaton.debounce=3", "--set activaton: unknown key (did you mean activation"),
+        ("debounce", "--set is 'debounce' (give KEY=VALUE"),
+    ],
+)
+def test_a_wrong_setting_is_one_line_that_names_the_option(gate_folder, text, said):
+    done = cdtool("benchmark", gate_folder / "benchmark.toml", "--set", text)
+    assert done.status == 2 and said in done.err and "Traceback" not in done.err
+
+
+def test_values_are_those_of_toml_and_a_bare_word_is_a_text():
+    found = given_settings(["a.b=1.5", "a.c=word", "a.d=[1, 2]", "e=true", 'f="x"'])
+    assert found == {"a.b": 1.5, "a.c": "word", "a.d": [1, 2], "e": True, "f": "x"}
+    assert apply_settings({"a": {"b": 1}, "z": 2}, found) == {
+        "a": {"b": 1.5, "c": "word", "d": [1, 2]},
+        "z": 2,
+        "e": True,
+        "f": "x",
+    }
+    with pytest.raises(UsageError, match="--set is '=3'"):
+        given_settings(["=3"])
+
+
+def test_a_threshold_named_by_a_text_may_get_settings():
+    assert apply_settings({"threshold": "cusum"}, {"threshold.drift": 0.5}) == {
+        "threshold": {"name": "cusum", "drift": 0.5}
+    }
+
+
+def test_python_has_the_same(gate_folder):
+    setup = read_benchmark_file(gate_folder / "benchmark.toml", settings={"window_s": 0.3})
+    assert setup.window == 0.3
+    with pytest.raises(ConfigurationError, match="--set window_s: is -1"):
+        api.benchmark(gate_folder / "benchmark.toml", detectors=["gm"], settings={"window_s": -1})
