@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 from cdtool.base.plain_text import counted
-from cdtool.recordings.recording import REFERENCES
 from cdtool.results.explanation.departure import COMMANDS, OUTSIDE, STAYED, UNKNOWN, Departure
 from cdtool.results.explanation.explanation import Explanation
 from cdtool.results.explanation.glitch import Glitch
@@ -140,25 +139,17 @@ def _compared(item: Explanation) -> str:
 
 
 def _departed(item: Explanation) -> list[str]:
-    learned = item.absent is None
-    # Compared with impact-free runs, the references show the command and are listed separately. A run's own past cannot
-    # distinguish a command from the response to it.
-    shown = [found for found in item.departed if not (learned and found.channel in REFERENCES)]
-    left = [found for found in shown if not math.isnan(found.time)]
+    left = [found for found in item.departed if not math.isnan(found.time)]
     end = item.alarm.time if item.alarm else math.inf
     sooner, later = [found for found in left if found.time <= end], [found for found in left if found.time > end]
-    course = "normal" if learned else "previous"
+    course = "previous" if item.absent else "normal"
     lines = [f"No single channel had clearly left its {course} course{' by then' if later else ''}."]
     if sooner:
-        lines = [f"Moved first: {_in_order(sooner, item)}."]
-        lines += [] if learned else _commands(sooner, item)
-        lines += _first_input(sooner, item)
+        lines = [f"Moved first: {_in_order(sooner, item)}.", *_commands(sooner, item), *_first_input(sooner, item)]
     if later:
         lines.append(f"After the alarm: {_in_order(later, item)}.")
-    if learned:
-        lines += _references(item)
     for reason in (STAYED, OUTSIDE, UNKNOWN):
-        names = [f"{_channel(found, item)}{_numbers(found)}" for found in shown if found.reason == reason]
+        names = [f"{_channel(found, item)}{_numbers(found)}" for found in item.departed if found.reason == reason]
         if names:
             lines.append(f"{reason.capitalize()}: {', '.join(names)}.")
     return lines
@@ -170,16 +161,6 @@ def _commands(sooner: Sequence[Departure], item: Explanation) -> list[str]:
         moved = "moved first" if commanded else "also moved"
         return [f"The command {moved}: the detector may have responded to it, not to a contact."]
     return []
-
-
-def _references(item: Explanation) -> list[str]:
-    """Return the references compared with the impact-free runs."""
-    found = [each for each in item.departed if each.channel in REFERENCES]
-    left = [each for each in found if not math.isnan(each.time)]
-    parts = [_in_order(left, item)] if left else []
-    stayed = [_channel(each, item) for each in found if each.reason == STAYED]
-    parts += [f"{STAYED} of {', '.join(stayed)}"] if stayed else []
-    return [f"References: {'; '.join(parts)}."] if parts else []
 
 
 def _first_input(left: Sequence[Departure], item: Explanation) -> list[str]:
