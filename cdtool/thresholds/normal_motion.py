@@ -205,9 +205,17 @@ def _signal(recording: Recording, channel: str, motion: MotionClass) -> Signal:
 
 
 def levels_of(series: Series) -> FloatArray:
-    """Return at each sample the mean of a channel (n, J) over the last `LEVEL_SECONDS`; stored with the channel.
+    """Return at each sample the mean of a channel over the last `LEVEL_SECONDS`, computed once and stored with it.
 
-    NaN where more than half of the usual number of samples is missing.
+    Parameters
+    ----------
+    series : Series
+        The channel; a lone spike of one sample does not count.
+
+    Returns
+    -------
+    ndarray of float, shape (n, J)
+        Its level, in the unit of the channel; NaN where more than half of the usual number of samples is missing.
 
     Examples
     --------
