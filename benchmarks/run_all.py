@@ -15,7 +15,7 @@ QUESTIONS = (
     *("friction_ekf", "momentum", "robot_dynamics", "detectors"),
     *("start_up", "whole_benchmark", "reports", "interval_coverage", "compare_builds"),
     *("reading",),
-    *("gate_accuracy", "arm_accuracy", "explain_causes", "missing_force", "time_bounds", "structure"),
+    *("gate_accuracy", "arm_accuracy", "missing_force", "time_bounds", "structure"),
 )
 
 

@@ -92,7 +92,7 @@ class SignatureFile:
         """
         if self.normal is not None:
             return ""
-        parts = "the speed profiles, plausible ranges and normal motions of its runs"
+        parts = f"the {'' if self.plausible else 'speed profiles, plausible ranges and '}normal motions of its runs"
         return f"of an earlier version, without {parts}: relearn it with cdtool learn-signature to add them"
 
     @property

@@ -27,9 +27,9 @@ from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.normal_motion import NormalMotion
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
 
-SCHEMA_VERSION = 4
-# Version 3 has no normal motions, plausible ranges and speed courses; everything else is the same.
-_READABLE = (3, SCHEMA_VERSION)
+SCHEMA_VERSION = 5
+# Version 3 has no plausible ranges and speed courses, and before 5 there were other normal motions, or none.
+_READABLE = (3, 4, SCHEMA_VERSION)
 _KIND = "cdtool signature"
 # Beginning of every signature file: `_to_json` writes its kind first.
 SIGNATURE = Kind(f'"kind": "{_KIND}"'.encode(), "signature")
@@ -135,7 +135,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
     if not all(isinstance(name, str) for name in joints):
         raise ValueError("joints must be a list of names")
     _check_fitted(current, first, joints)
-    normal = values.get("normal_motion") if values["schema_version"] > 3 else None
+    normal = values.get("normal_motion") if values["schema_version"] == SCHEMA_VERSION else None
     return SignatureFile(
         machine=str(values["machine"]["name"]),
         machine_fingerprint=str(values["machine"]["fingerprint"]),

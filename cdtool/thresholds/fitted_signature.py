@@ -291,15 +291,13 @@ class FittedSignature(SendsFields):
 
     def progress(self, recording: Recording, clock: FloatArray) -> Progress:
         """Return where in its stroke a recording is at each time of `clock`; raises RecordingError."""
-        speed = self.motion.nominal_speed
-        return progress(
-            recording,
-            clock,
-            self.motion.direction,
-            START_SHARE * speed,
-            RUNNING_SHARE * speed,
-            self.motion.joint,
-        )
+        return progress_of(recording, clock, self.motion)
+
+
+def progress_of(recording: Recording, clock: FloatArray, motion: MotionClass) -> Progress:
+    """Return where in a stroke of a class a recording is at each time of `clock` [s]; raises RecordingError."""
+    start, running = START_SHARE * motion.nominal_speed, RUNNING_SHARE * motion.nominal_speed
+    return progress(recording, clock, motion.direction, start, running, motion.joint)
 
 
 def axes_of(by_time: Curve, by_position: Curve, where: Progress) -> tuple[tuple[Curve, FloatArray], ...]:

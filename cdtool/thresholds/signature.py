@@ -12,13 +12,15 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import NothingValidError, SignatureError, UsageError
 from cdtool.base.settings import NotNegative, Positive, check, setting
 from cdtool.detectors.detection import Signal
-from cdtool.recordings.motion.progress import RUNNING_SHARE, START_SHARE, Alignment, Progress, progress
+from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.progress import Alignment, Progress
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
     FittedSignature,
     Rule,
     axes_of,
+    progress_of,
 )
 from cdtool.thresholds.settings import SidesOfMachine
 from cdtool.thresholds.signature_curve import Curve, resample
@@ -123,18 +125,11 @@ class Signature:
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSignature:
         """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""
         self._check_number(len(pairs))
-        motion = common_class([recording for recording, _ in pairs], self.alignment)
-        wheres = [
-            progress(
-                recording,
-                signal.time,
-                motion.direction,
-                START_SHARE * motion.nominal_speed,
-                RUNNING_SHARE * motion.nominal_speed,
-                motion.joint,
-            )
-            for recording, signal in pairs
-        ]
+        return self.fit_class(pairs, common_class([recording for recording, _ in pairs], self.alignment))
+
+    def fit_class(self, pairs: Sequence[tuple[Recording, Signal]], motion: MotionClass) -> FittedSignature:
+        """Learn from impact-free runs that are known to be of one class of motion; raises as `fit`."""
+        wheres = [progress_of(recording, signal.time, motion) for recording, signal in pairs]
         joints = pairs[0][1].values.shape[1]
         # In time the grid and the window are what they are in position at the nominal speed.
         pace = 1.0 / motion.nominal_speed

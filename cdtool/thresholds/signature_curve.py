@@ -12,11 +12,10 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.derived import SendsFields
-from cdtool.base.kernels import READ_ONLY, kernel, read_only
+from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion.progress import Progress
 from cdtool.recordings.motion.smoothing import moving_mean
-from cdtool.thresholds.curve_lookup import LearnedColumn
 
 # A grid point has a limit once this share of the runs has been there.
 COVERAGE = 0.8
@@ -132,26 +131,6 @@ class Curve(SendsFields):
         for part in band:
             part.flags.writeable = False
         return band
-
-    @cached_property
-    def columns(self) -> tuple[LearnedColumn, ...]:
-        """The pooled band of each joint, to be looked up at any location."""
-        mean, spread = self.band(pooled=True)
-        return tuple(self._column(mean[:, j], spread[:, j]) for j in range(mean.shape[1]))
-
-    def _column(self, mean: FloatArray, spread: FloatArray) -> LearnedColumn:
-        widths = np.diff(self.grid)
-        with np.errstate(invalid="ignore", over="ignore"):
-            mean_slope, spread_slope = np.diff(mean) / widths, np.diff(spread) / widths
-        return LearnedColumn(
-            grid=self.grid,
-            mean=read_only(mean),
-            spread=read_only(spread),
-            mean_slope=read_only(mean_slope),
-            spread_slope=read_only(spread_slope),
-            step=self.step,
-            infinite=float(np.isinf(mean).any() or np.isinf(spread).any()),
-        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the curve as JSON values."""

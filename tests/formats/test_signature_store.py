@@ -56,7 +56,7 @@ def test_it_survives_writing_and_reading(tmp_path, learned):
     assert (loaded.rule, loaded.origin, loaded.activation) == (learned.rule, learned.origin, learned.activation)
     assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
     values = json.loads(path.read_text())
-    assert values["schema_version"] == 4 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
+    assert values["schema_version"] == 5 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
 
 
 def test_on_another_machine_the_parameters_that_differ_are_named(tmp_path, learned, gate):
@@ -108,26 +108,28 @@ def test_what_normal_runs_look_like_is_stored_with_it(tmp_path, learned, simulat
     (loaded,) = read_signature(path).normal or ()
     one, other = (item.compare(recordings[0], "torque") for item in (normal, loaded))
     assert (loaded.motion, loaded.runs, loaded.joints) == (normal.motion, 4, normal.joints)
-    assert (one.mean[3000], one.spread[3000]) == (other.mean[3000], other.spread[3000])
+    assert (one[1][3000], one[2][3000]) == (other[1][3000], other[2][3000])
 
 
-def test_a_file_of_version_3_is_still_read_and_has_no_normal_motions(tmp_path, learned):
+@pytest.mark.parametrize("version", [3, 4])
+def test_a_file_of_an_earlier_version_is_read_without_normal_motions(tmp_path, learned, version):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     values = json.loads(path.read_text())
-    del values["normal_motion"]
-    path.write_text(json.dumps({**values, "schema_version": 3}))
+    # Version 4 had other ones.
+    values["normal_motion"] = [{"direction": 1, "channels": {"torque": {"unit": "N", "samples": {}, "level": {}}}}]
+    path.write_text(json.dumps({**values, "schema_version": version}))
     loaded = read_signature(path)
     assert loaded.normal is None and loaded.current[0].to_dict() == learned.current[0].to_dict()
-    write_signature(path, loaded)  # an update: now version 4, still without normal motions
-    assert json.loads(path.read_text())["schema_version"] == 4 and read_signature(path).normal is None
+    write_signature(path, loaded)  # an update: now version 5, still without normal motions
+    assert json.loads(path.read_text())["schema_version"] == 5 and read_signature(path).normal is None
 
 
 def test_invalid_normal_motions_are_a_damaged_file(tmp_path, learned):
     path = tmp_path / "s.json"
     write_signature(path, learned)
     values = json.loads(path.read_text())
-    for wrong in ([{}], [{"joints": ["a"], "channels": {"force": {}}}], 7):
+    for wrong in ([{}], [{"force": {}}], 7):
         path.write_text(json.dumps({**values, "normal_motion": wrong}))
         with pytest.raises(SignatureError, match="damaged signature file"):
             read_signature(path)

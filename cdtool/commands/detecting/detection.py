@@ -39,7 +39,7 @@ from cdtool.results.results import ContactResult, RecordingFinding, Skipped
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.baseline import Baseline
 from cdtool.thresholds.limit import Limit
-from cdtool.thresholds.normal_choice import Absence, NormalMotions
+from cdtool.thresholds.normal_motion import Absence, NormalMotions
 from cdtool.truth.matching import Matching, belongs, windows
 from cdtool.truth.missing_samples import longest_step
 

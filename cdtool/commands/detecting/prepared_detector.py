@@ -25,7 +25,7 @@ from cdtool.recordings.plausible import LearnedRanges
 from cdtool.recordings.recording import Recording
 from cdtool.results.results import RecordingFinding, Skipped
 from cdtool.thresholds.base import is_per_run
-from cdtool.thresholds.normal_choice import NormalMotions
+from cdtool.thresholds.normal_motion import NormalMotions
 
 
 @dataclass(frozen=True)

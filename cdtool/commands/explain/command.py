@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,8 +28,7 @@ from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
     from cdtool.commands.explain.explaining import ExplainedRun
-    from cdtool.results.explanation.cause import Cause
-    from cdtool.results.explanation.explanation import AlarmExplanation, Explanation, MissExplanation
+    from cdtool.results.explanation.explanation import Explanation
     from cdtool.results.explanation.margin import Moment
 
 # Events that are printed and drawn; --json has all.
@@ -54,7 +52,7 @@ def explain(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Explain the cause of each alarm in a log and why each missed contact was missed.
+    """Explain each alarm in a log and why each missed contact was missed.
 
     With --benchmark, all settings and the threshold come from that file; the results match those of `cdtool benchmark`.
 
@@ -122,14 +120,13 @@ def _show_explained(explained: ExplainedRun) -> None:
 def _show_event(item: Explanation) -> None:
     """Print the headline, the sentences, and the margin over time."""
     from cdtool.report.explanation_words import words
-    from cdtool.results.explanation.explanation import AlarmExplanation
 
     headline, *sentences = words(item)
     say(f"{item.operation}, {item.detector}: {headline}")
     for sentence in sentences:
         say(sentence, indent="  ")
     # Without an onset or an alarm to count from, one column stays empty and is dropped.
-    alarm = item.alarm.time if isinstance(item, AlarmExplanation) else None
+    alarm = item.alarm.time if item.alarm else None
     rows = [
         (
             f"{1e3 * (moment.time - item.contact.start):.0f}" if item.contact else "",
@@ -151,7 +148,6 @@ def _show_event(item: Explanation) -> None:
 def _as_json_value(log: str, explained: ExplainedRun) -> dict[str, Any]:
     """Return the same as JSON values."""
     from cdtool.commands.console.contact_rows import contact_as_json
-    from cdtool.results.explanation.explanation import AlarmExplanation
 
     items = [item for _, item in explained.events]
     return {
@@ -165,12 +161,13 @@ def _as_json_value(log: str, explained: ExplainedRun) -> dict[str, Any]:
             for detection, rows in zip(explained.found.detections, explained.found.contact_rows, strict=True)
             for row in rows
         ],
-        "alarms": [_alarm_as_json(item) for item in items if isinstance(item, AlarmExplanation)],
-        "missed": [_miss_as_json(item) for item in items if not isinstance(item, AlarmExplanation)],
+        "alarms": [_alarm_as_json(item) for item in items if item.alarm],
+        "missed": [_miss_as_json(item) for item in items if not item.alarm],
     }
 
 
-def _alarm_as_json(item: AlarmExplanation) -> dict[str, Any]:
+def _alarm_as_json(item: Explanation) -> dict[str, Any]:
+    assert item.alarm is not None, "of an alarm"
     return {
         **_common(item),
         "role": item.role,
@@ -181,25 +178,15 @@ def _alarm_as_json(item: AlarmExplanation) -> dict[str, Any]:
         "onset_s": item.contact.start if item.contact else None,
         "left_band_s": item.left,
         "missing_samples_skipped": item.skipped,
-        "likely_cause": _cause_as_json(item.cause),
     }
 
 
-def _cause_as_json(cause: Cause) -> dict[str, Any]:
-    return {
-        "kind": str(cause.kind),
-        "shifts": [asdict(shift) for shift in cause.shifts],
-        "transient": asdict(cause.transient) if cause.transient else None,
-        "lost": asdict(cause.loss) if cause.loss else None,
-    }
-
-
-def _miss_as_json(item: MissExplanation) -> dict[str, Any]:
+def _miss_as_json(item: Explanation) -> dict[str, Any]:
     return {
         **_common(item),
-        "outcome": item.outcome,
+        "outcome": item.role,
         "reason": item.reason or None,
-        "onset_s": item.contact.start,
+        "onset_s": item.zero,
         "watched_ms": 1e3 * item.watched,
         "not_judged": dict(item.not_judged),
         "joints": [
@@ -240,9 +227,21 @@ def _common(item: Explanation) -> dict[str, Any]:
                 "value": found.value,
                 "normal_mean": found.mean,
                 "normal_spread": found.spread,
-                "brief": found.brief,
             }
-            for found in item.moved
+            for found in item.departed
+        ],
+        "glitches": [
+            {
+                "kind": found.kind,
+                "channel": found.channel,
+                "joint": found.joint or None,
+                "unit": found.unit or None,
+                "start_s": found.start,
+                "end_s": found.end,
+                "samples": found.samples,
+                "size": found.size,
+            }
+            for found in item.glitches
         ],
         "margins": [_moment_as_json(moment) for moment in item.moments],
     }

@@ -100,8 +100,8 @@ def explain(  # noqa: PLR0913  # the public function: a keyword for each setting
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
     >>> explained = cdtool.explain(log, machine, detector="momentum", limit=[400.0])
-    >>> [type(explanation).__name__ for _, explanation in explained.events]
-    ['AlarmExplanation']
+    >>> [explanation.role for _, explanation in explained.events]
+    ['detection']
     """
     options = DetectionOptions(
         machine,

@@ -17,9 +17,9 @@ from cdtool.report.explanation_words import words
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import Legend, count_from, draw_alarm, draw_force, draw_onset, draw_signal, frame_signal
 from cdtool.report.plots.style import BAND, look_of
-from cdtool.results.explanation.explanation import AlarmExplanation, Explanation
+from cdtool.results.explanation.departure import Departure
+from cdtool.results.explanation.explanation import Explanation
 from cdtool.results.explanation.margin import joint_margins
-from cdtool.results.explanation.movement import Movement
 from cdtool.results.traces.decimation import decimate
 from cdtool.results.traces.trace import Span, StatisticCurve
 
@@ -57,8 +57,8 @@ def _figure(detection: Detection, item: Explanation) -> Figure:
         force = recording["force"]
         draw_force(panels[0], force.time, force.values[:, 0], span, contact=True)
         _name(panels[0], f"load cell\n[{unit_label(force.unit)}]")
-    for axes, movement in zip(panels[int(forced) :], channels, strict=False):
-        _draw_channel(axes, recording, movement, item, span)
+    for axes, departure in zip(panels[int(forced) :], channels, strict=False):
+        _draw_channel(axes, recording, departure, item, span)
     _draw_statistic(panels[-2], detection, item, span, legend)
     _draw_margin(panels[-1], detection, item, span)
     for axes in panels:
@@ -75,20 +75,20 @@ def _figure(detection: Detection, item: Explanation) -> Figure:
     return figure
 
 
-def _channels(item: Explanation) -> list[Movement]:
+def _channels(item: Explanation) -> list[Departure]:
     """Return the channels that moved, in order, then those that the detector reads and that did not."""
-    moved = [found for found in item.moved if not math.isnan(found.time)]
-    still = [found for found in item.moved if math.isnan(found.time) and found.channel in item.inputs]
+    moved = [found for found in item.departed if not math.isnan(found.time)]
+    still = [found for found in item.departed if math.isnan(found.time) and found.channel in item.inputs]
     return [*moved, *still][:_MOST_CHANNELS]
 
 
 def _span(item: Explanation, recording: Recording) -> Span:
-    moved = [found.time for found in item.moved if not math.isnan(found.time)]
+    moved = [found.time for found in item.departed if not math.isnan(found.time)]
     if item.contact is None:
         start, end = min([item.zero, *moved]), item.zero
     else:
         start = item.zero
-        if isinstance(item, AlarmExplanation):
+        if item.alarm:
             last = item.alarm.time
         else:
             last = max([start + min(item.watched, _LONGEST), *(found.nearest.time for found in item.approaches[:1])])
@@ -96,20 +96,20 @@ def _span(item: Explanation, recording: Recording) -> Span:
     return max(start - _BEFORE, recording.start), min(end + _AFTER, recording.end)
 
 
-def _draw_channel(axes: Axes, recording: Recording, movement: Movement, item: Explanation, span: Span) -> None:
-    series = recording[movement.channel].between(*span)
-    value = series.values[:, recording.joints.index(movement.joint)]
-    colour = _colour(movement, item)
+def _draw_channel(axes: Axes, recording: Recording, departure: Departure, item: Explanation, span: Span) -> None:
+    series = recording[departure.channel].between(*span)
+    value = series.values[:, recording.joints.index(departure.joint)]
+    colour = _colour(departure, item)
     axes.plot(*decimate(series.time, value, _PIXELS), color=colour, linewidth=1.0)
-    joint = f"\n{label(movement.joint, 14)}" if movement.joint != item.joint else ""
-    _name(axes, f"{label(movement.channel, 20)}{joint}\n[{unit_label(series.unit)}]")
-    if math.isnan(movement.time):
-        _write(axes, movement.reason, (span[1], 1.0), (0, 2), "right")
+    joint = f"\n{label(departure.joint, 14)}" if departure.joint != item.joint else ""
+    _name(axes, f"{label(departure.channel, 20)}{joint}\n[{unit_label(series.unit)}]")
+    if math.isnan(departure.time):
+        _write(axes, departure.reason, (span[1], 1.0), (0, 2), "right")
         return
-    axes.axvline(movement.time, color=colour, linewidth=0.9, linestyle=":")
-    axes.plot([movement.time], [1.0], marker="v", color=colour, transform=axes.get_xaxis_transform(), clip_on=False)
-    after = f"{1e3 * (movement.time - item.zero):+.0f} ms".replace("-", "−")
-    _write(axes, after, (movement.time, 1.0), (6, -1), "left")
+    axes.axvline(departure.time, color=colour, linewidth=0.9, linestyle=":")
+    axes.plot([departure.time], [1.0], marker="v", color=colour, transform=axes.get_xaxis_transform(), clip_on=False)
+    after = f"{1e3 * (departure.time - item.zero):+.0f} ms".replace("-", "−")
+    _write(axes, after, (departure.time, 1.0), (6, -1), "left")
 
 
 def _draw_statistic(axes: Axes, detection: Detection, item: Explanation, span: Span, legend: Legend) -> None:
@@ -132,7 +132,7 @@ def _draw_margin(axes: Axes, detection: Detection, item: Explanation, span: Span
     low, high = _range(value)
     axes.set_ylim(low, high)
     axes.axhspan(0.0, high, color=BAND, linewidth=0, zorder=0)
-    if isinstance(item, AlarmExplanation):
+    if item.alarm:
         axes.axvspan(item.left, item.alarm.time, color=colour, alpha=0.25, linewidth=0)
         debounce = f"outside for {counted(item.debounce, 'sample')}"
         _write(axes, debounce, (item.left, 0.0), (-4, 4), "right")
@@ -156,11 +156,11 @@ def _range(value: FloatArray) -> Span:
 def _draw_event(axes: Axes, item: Explanation, legend: Legend) -> None:
     if item.contact:
         draw_onset(axes, item.contact.start, legend)
-    if isinstance(item, AlarmExplanation):
+    if item.alarm:
         draw_alarm(axes, item.alarm, look_of(item.detector).colour, legend)
 
 
-def _more_handles(item: Explanation, channels: list[Movement]) -> list[Artist]:
+def _more_handles(item: Explanation, channels: list[Departure]) -> list[Artist]:
     from matplotlib.lines import Line2D
 
     handles: list[Artist] = []
@@ -174,8 +174,8 @@ def _more_handles(item: Explanation, channels: list[Movement]) -> list[Artist]:
     return handles
 
 
-def _colour(movement: Movement, item: Explanation) -> str:
-    return look_of(item.detector).colour if movement.channel in item.inputs else _OTHER
+def _colour(departure: Departure, item: Explanation) -> str:
+    return look_of(item.detector).colour if departure.channel in item.inputs else _OTHER
 
 
 def _write(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], side: str) -> None:

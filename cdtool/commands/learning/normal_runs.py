@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from statistics import median
 
 from cdtool.base.findings import remark
@@ -14,8 +14,7 @@ from cdtool.recordings.operations import Operation
 from cdtool.results.results import RecordingFinding
 from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
-from cdtool.thresholds.normal_choice import Absence, NormalMotions
-from cdtool.thresholds.normal_motion import NormalMotion, learn_normal_motion
+from cdtool.thresholds.normal_motion import Absence, NormalMotion, NormalMotions, learn_normal_motion
 
 
 def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
@@ -34,20 +33,6 @@ def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
 def normals_for(operations: Sequence[Operation], rule: Threshold) -> NormalMotions:
     """Return the normal motions of the operations that a rule learned from, or why they are missing."""
     return NormalMotions(normal_motions(operations), Absence.PER_RUN if is_per_run(rule) else Absence.FEW_RUNS)
-
-
-@dataclass(frozen=True)
-class NormalsWithout:
-    """The normal motion of the operations that a rule learned from, without those of one `log`; made when needed."""
-
-    operations: Sequence[Operation]
-    log: str
-    rule: Threshold
-
-    def for_one_operation(self) -> NormalMotions:
-        """Return the normal motions to compare an operation of the log with."""
-        others = [item for item in self.operations if item.whole.name != self.log]
-        return normals_for(others, self.rule).for_one_operation()
 
 
 def normals_of(file: SignatureFile) -> NormalMotions:

@@ -34,7 +34,7 @@ from cdtool.recordings.operations import Operation
 from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import ALL, unchecked
 from cdtool.results.results import RecordingFinding, RecordingResult, Results, Skipped
-from cdtool.thresholds.normal_choice import NormalMotions
+from cdtool.thresholds.normal_motion import NormalMotions
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
@@ -156,7 +156,7 @@ class _TriggerScoring:
         for log in found:
             beside = [row for name, said in self.said.items() for row in _beside(log, name, said, self.clock)]
             rows = replace(log.rows, skipped=(*log.rows.skipped, *beside))
-            outcomes.append(outcome_of(replace(log, rows=rows), self.setup, NormalMotions(), wanted))
+            outcomes.append(outcome_of(replace(log, rows=rows), self.setup, NormalMotions, wanted))
         return outcomes
 
     def _listed_runs(self, found: list[ScoredLog]) -> list[ScoredLog]:

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,7 +15,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.registry import plugin_packages
 from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import to_be_seen
-from cdtool.commands.learning.normal_runs import NormalsWithout
+from cdtool.commands.learning.normal_runs import normals_for
 from cdtool.commands.learning.threshold_settings import set_by_hand
 from cdtool.commands.scoring.benchmark_file import (
     HOLDOUT,
@@ -47,7 +48,7 @@ from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import LimitRule, unchecked
 from cdtool.results.results import Results, Skipped
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.thresholds.normal_choice import NormalMotions
+from cdtool.thresholds.normal_motion import NormalMotions
 
 
 def benchmark(  # noqa: PLR0913  # the public function: a keyword for each setting
@@ -207,17 +208,18 @@ class _LogScoring:
         chosen = self if detectors is None else self._with_only(detectors)
         detect = detect_with(chosen.setup, chosen.detectors, chosen.thresholds.without, chosen.unusable)
         scored = score_runs(chosen.setup, group, path, detect, chosen.factors, chosen.ranges)
-        return [outcome_of(item, chosen.setup, chosen._normals_for(item), wanted) for item in scored]
+        return [outcome_of(item, chosen.setup, partial(chosen._normals_for, item), wanted) for item in scored]
 
     def _with_only(self, names: tuple[str, ...]) -> _LogScoring:
         chosen = tuple(detector for detector in self.detectors if detector.name in names)
         return replace(self, detectors=chosen, thresholds=self.thresholds.with_only(names))
 
-    def _normals_for(self, scored: ScoredLog) -> NormalMotions | NormalsWithout:
+    def _normals_for(self, scored: ScoredLog) -> NormalMotions:
         """Return the normal motion that a log is compared with: without its own."""
         if not self.runs or scored.recording is None:
             return self.normals
-        return NormalsWithout(self.runs, scored.recording.name, self.setup.rule)
+        others = [item for item in self.runs if item.whole.name != scored.recording.name]
+        return normals_for(others, self.setup.rule)
 
 
 def scoring_of(

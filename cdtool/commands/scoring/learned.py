@@ -28,8 +28,7 @@ from cdtool.recordings.operations import Operation
 from cdtool.recordings.plausible import LearnedRanges, PlausibleRanges
 from cdtool.results.results import CalibrationResult, RecordingFinding, Skipped
 from cdtool.thresholds.base import FittedThreshold, Threshold
-from cdtool.thresholds.normal_choice import Absence, NormalMotions
-from cdtool.thresholds.normal_motion import NormalMotion
+from cdtool.thresholds.normal_motion import Absence, NormalMotion, NormalMotions
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict
 
 

@@ -6,13 +6,13 @@ without the others, and its outcome be kept.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.commands.judging.judged_operation import Judged
 from cdtool.commands.judging.matched_log import MatchedLog, UncutStrokes
-from cdtool.commands.learning.normal_runs import NormalsWithout
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.detector_inputs import inputs_of
 from cdtool.commands.scoring.scoring import LeftOut, LogRows, ScoredLog
@@ -28,11 +28,8 @@ from cdtool.results.results import (
 )
 from cdtool.results.traces.choice import TraceChoice
 from cdtool.results.traces.trace import Trace, make_trace
-from cdtool.thresholds.normal_choice import NormalMotions
+from cdtool.thresholds.normal_motion import NormalMotions
 from cdtool.truth.matching import Matching
-
-# The normal motion of impact-free runs, or how it is made when it is needed.
-Normals = NormalMotions | NormalsWithout
 
 
 @dataclass(frozen=True)
@@ -185,7 +182,9 @@ class TheseTraces:
 Wanted = WantedTraces | TheseTraces
 
 
-def outcome_of(scored: ScoredLog, setup: BenchmarkFile, normals: Normals, wanted: Wanted | None) -> LogOutcome:
+def outcome_of(
+    scored: ScoredLog, setup: BenchmarkFile, normals: Callable[[], NormalMotions], wanted: Wanted | None
+) -> LogOutcome:
     """Return what remains of a scored log; alarms are explained by comparison with `normals`, for wanted traces."""
     detections, matched = scored.detections, scored.matched
     judged = matched.judged if matched else ()
@@ -208,8 +207,9 @@ def outcome_of(scored: ScoredLog, setup: BenchmarkFile, normals: Normals, wanted
     )
     if wanted is None:
         return outcome
+    compared = cache(normals)
     traces = [
-        _trace(item, setup, normals) if wanted.is_wanted(item.group, tuple(outcome.of_operation(number))) else None
+        _trace(item, setup, compared()) if wanted.is_wanted(item.group, tuple(outcome.of_operation(number))) else None
         for number, item in enumerate(judged)
     ]
     return replace(outcome, traces=tuple(traces))
@@ -236,8 +236,7 @@ def _on_operation(detector: str, matched: MatchedLog | None, number: int) -> Ope
     return None
 
 
-def _trace(judged: Judged, setup: BenchmarkFile, normals: Normals) -> Trace:
-    compared = normals.for_one_operation()
+def _trace(judged: Judged, setup: BenchmarkFile, normals: NormalMotions) -> Trace:
     return make_trace(
         judged.group,
         judged.operation,
@@ -245,7 +244,7 @@ def _trace(judged: Judged, setup: BenchmarkFile, normals: Normals) -> Trace:
         judged.detections,
         judged.matchings,
         [
-            _explained(detection, matching, setup, compared)
+            _explained(detection, matching, setup, normals)
             for detection, matching in zip(judged.detections, judged.matchings, strict=True)
         ],
     )

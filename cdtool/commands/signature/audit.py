@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.signature.deviation import Axis
 from cdtool.recordings.motion import MotionClass
-from cdtool.statistics.interval import Interval
 from cdtool.statistics.trends import ChangeOverRuns
 
 
@@ -34,16 +32,14 @@ class AuditedRun:
 
 @dataclass(frozen=True)
 class Shown:
-    """A change that is shown: its trend over the runs, its location (None: the whole stroke), and the runs left.
+    """A change that is shown: its trend over the runs, and its location (None: the whole stroke).
 
-    `outward`: it goes towards a limit. `runs_left`: after how many more runs a typical run would raise an alarm if the
-    change continues; infinite if it does not approach the limit.
+    `outward`: it goes towards a limit.
     """
 
     course: ChangeOverRuns
     place: float | None
     outward: bool
-    runs_left: Interval
 
 
 @dataclass(frozen=True)
@@ -74,11 +70,6 @@ class JointDrift:
         """Return the runs' deviation (runs,) at the nearest location."""
         column: FloatArray = self.deviation[:, int(np.argmin(np.abs(self.places - place)))]
         return column
-
-    @property
-    def runs_left(self) -> float:
-        """The number of runs until a typical run alarms if the changes continue; infinite if it never does."""
-        return min((item.runs_left.value for item in self.shown), default=math.inf)
 
 
 @dataclass(frozen=True)

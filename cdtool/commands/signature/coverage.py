@@ -202,37 +202,25 @@ class NoLimit:
         )
 
 
-@dataclass(frozen=True)
-class _Changeover:
-    """The change from time to travel: at most this time after the start of motion [s], at least this travel."""
-
-    time: float = np.inf
-    travel: float = 0.0
-
-
-def _changeover(signature: FittedSignature, runs: Sequence[tuple[Recording, Signal]]) -> _Changeover:
-    """Return the latest and nearest end of acceleration in some runs; the default if only one axis counts."""
-    if signature.alignment != "time_then_position":
-        return _Changeover()
-    times, travels = [], []
-    for recording, signal in runs:
+def _changeover(signature: FittedSignature, runs: Sequence[tuple[Recording, Signal]]) -> tuple[float, float]:
+    """Return the latest time and the nearest travel at which travel counts instead of time; all of both if one does."""
+    changes = []
+    for recording, signal in runs if signature.alignment == "time_then_position" else ():
         where = signature.progress(recording, signal.time)
-        running = np.flatnonzero(where.running)
-        if len(running):
-            times.append(float(where.elapsed[running[0]]))
-            travels.append(float(where.travel[running[0]]))
-    return _Changeover(max(times, default=np.inf), min(travels, default=0.0))
+        changes += [(where.elapsed[k], where.travel[k]) for k in np.flatnonzero(where.running)[:1]]
+    return (
+        (float(max(time for time, _ in changes)), float(min(way for _, way in changes))) if changes else (np.inf, 0.0)
+    )
 
 
-def gaps_of(signature: FittedSignature, change: _Changeover | None = None) -> tuple[NoLimit, ...]:
-    """Return the parts without a limit, joint by joint; without a `change`, of the whole of both curves."""
-    at = change or _Changeover()
+def gaps_of(signature: FittedSignature, change: tuple[float, float] = (np.inf, 0.0)) -> tuple[NoLimit, ...]:
+    """Return the parts without a limit, joint by joint, up to a time and from a travel on."""
     found: list[NoLimit] = []
     for joint in range(len(signature.joints)):
         if signature.alignment != "position":
-            found += _gaps(signature, "time", joint, (0.0, at.time))
+            found += _gaps(signature, "time", joint, (0.0, change[0]))
         if signature.alignment != "time":
-            found += _gaps(signature, "travel", joint, (at.travel, np.inf))
+            found += _gaps(signature, "travel", joint, (change[1], np.inf))
     return tuple(found)
 
 

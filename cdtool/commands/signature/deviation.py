@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection
-from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.detectors.detection import Status
 from cdtool.results.curves.sweep import critical_factor
 from cdtool.thresholds.fitted_signature import FittedSignature
@@ -65,34 +65,12 @@ def deviations_of(signature: FittedSignature, detections: Sequence[Detection]) -
     return Deviations(axis, places, curve.window, typical / _median(spread, axis=0), pooled, beyond)
 
 
-def critical_of(
-    detection: Detection, activation: Activation, joint: int, keep: BoolArray | None = None, side: int = 0
-) -> float:
-    """The critical factor of one joint, of the samples `keep` (n,) alone, on one side of the band (+1 above, -1 below).
-
-    See `critical_factor`; -inf if it is nowhere assessable.
-    """
-    statistic = detection.statistic
-    judged = np.zeros(statistic.values.shape, dtype=bool)
-    judged[:, joint] = True if keep is None else keep
-    if side:
-        # The other half of the band is as far from this side's limit as can be.
-        middle = 0.5 * (detection.band.lower + detection.band.upper)
-        with np.errstate(invalid="ignore"):
-            judged &= ~np.isfinite(middle) | (side * (statistic.values - middle) >= 0.0)
-    hidden = ~judged & (statistic.status == Status.VALID)
-    status = np.where(hidden, np.uint8(Status.NO_LIMIT), statistic.status)
-    return critical_factor(replace(detection, statistic=replace(statistic, status=status)), activation)
-
-
-def near(signature: FittedSignature, detection: Detection, place: float, window: float) -> BoolArray:
-    """The samples (n,) of a run within `window` of a place along the audit's axis."""
-    recording = detection.operation.recording.without_ground_truth()
-    where = signature.progress(recording, detection.statistic.time)
-    along = where.elapsed if axis_of(signature) == "time" else where.travel
-    with np.errstate(invalid="ignore"):
-        found: BoolArray = np.abs(along - place) <= window
-    return found
+def critical_of(detection: Detection, activation: Activation, joint: int) -> float:
+    """Return the critical factor of one joint; -inf if it is nowhere assessable. See `critical_factor`."""
+    status = detection.statistic.status
+    hidden = (np.arange(status.shape[1]) != joint) & (status == Status.VALID)
+    status = np.where(hidden, np.uint8(Status.NO_LIMIT), status)
+    return critical_factor(replace(detection, statistic=replace(detection.statistic, status=status)), activation)
 
 
 def _sample(signature: FittedSignature, detection: Detection, axis: Axis) -> FloatArray:

@@ -12,10 +12,9 @@ from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection, judge
 from cdtool.base.errors import SignatureError
 from cdtool.commands.signature.audit import AuditedRun, DriftAudit, JointDrift, Shown
-from cdtool.commands.signature.deviation import Deviations, critical_of, deviations_of, near
+from cdtool.commands.signature.deviation import Deviations, critical_of, deviations_of
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.operations import Operation
-from cdtool.statistics.interval import Interval
 from cdtool.statistics.trends import ChangeOverRuns, change_over_runs, may_change
 from cdtool.thresholds.fitted_signature import FittedSignature
 
@@ -147,36 +146,11 @@ class _JointAudit:
 
     def _shown(self, course: ChangeOverRuns, place: float | None) -> Shown:
         outward = course.change > 0.0
-        side = 0
         if not self.signature.watched:
             # Of two limits the one counts towards which the signal goes, if it is not on its way back to the middle.
-            found = self.found.overall if place is None else self.found.pooled[:, self._index(place), :]
-            values = found[np.isfinite(found[:, self.joint]), self.joint]
-            outward = course.change * float(np.median(values[-max(course.n // 4, 1) :])) > 0.0
-            side = 1 if course.change > 0.0 else -1
-        left = Interval(math.inf, math.inf, math.inf)
-        if course.kind == "drift" and outward:
-            left = self._runs_left(course, place, side)
-        return Shown(course, place, outward, left)
-
-    def _index(self, place: float) -> int:
-        return int(np.argmin(np.abs(self.found.places - place)))
-
-    def _runs_left(self, course: ChangeOverRuns, place: float | None, side: int) -> Interval:
-        """(k - c) / b: the critical factor c grows by the slope b a run, from where it is after the last one."""
-        trend = course.trend
-        if trend is None:
-            return Interval(math.nan, math.nan, math.nan)
-        critical = np.array([self._critical(item, place, side) for item in self.detections])
-        runs = np.flatnonzero(np.isfinite(critical))
-        last = len(critical) - 1
-        bounds = []
-        for slope in (trend.slope.value, trend.slope.high, trend.slope.low):
-            rise = abs(slope) if slope * trend.slope.value > 0.0 else 0.0
-            now = float(np.median(critical[runs] + rise * (last - runs))) if len(runs) else math.nan
-            bounds.append(max(self.signature.safety_factor - now, 0.0) / rise if rise > 0.0 else math.inf)
-        return Interval(bounds[0], min(bounds[1:]), max(bounds[1:]), trend.slope.level)
-
-    def _critical(self, detection: Detection, place: float | None, side: int) -> float:
-        keep = None if place is None else near(self.signature, detection, place, self.found.window)
-        return critical_of(detection, self.activation, self.joint, keep, side)
+            values = self.found.overall[:, self.joint]
+            if place is not None:
+                values = self.found.pooled[:, int(np.argmin(np.abs(self.found.places - place))), self.joint]
+            last = values[np.isfinite(values)][-max(course.n // 4, 1) :]
+            outward = course.change * float(np.median(last)) > 0.0
+        return Shown(course, place, outward)

@@ -208,7 +208,6 @@ def _drift_as_json(found: DriftAudit) -> dict[str, Any]:
             {
                 "joint": joint.joint,
                 "verdicts": list(verdicts(joint)),
-                "runs_left": joint.runs_left,
                 "runs": [asdict(run) for run in joint.runs],
             }
             for joint in found.joints

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
-from cdtool.base.plain_text import counted, digits
+from cdtool.base.plain_text import counted
 from cdtool.commands.signature.audit import JointDrift, Shown
 from cdtool.statistics.interval import Interval
-from cdtool.statistics.trends import LEAST_RUNS
+from cdtool.statistics.trends import LEAST_RUNS, Step
 
 NOTHING_SHOWN = "no drift shown"
 _INSPECT = "inspect the machine there before relearning"
-# A slope that uses the margin up in more runs than this is as good as none.
-_MANY = 100_000
 
 
 def verdicts(item: JointDrift) -> tuple[str, ...]:
@@ -54,34 +52,26 @@ def _alarms(item: JointDrift) -> str:
 
 
 def _overall(shown: Shown, item: JointDrift) -> str:
-    if shown.course.kind == "step":
-        return f"{_step(shown, item)}: if something was changed then, relearn from the runs since"
-    trend = shown.course.trend
-    if trend is None:
-        return NOTHING_SHOWN
+    course = shown.course
+    if course.kind == "step" and course.step is not None:
+        return f"{_step(course.step, item)}: if something was changed then, relearn from the runs since"
+    slope = slope_words(course.trend.slope) if course.trend is not None else ""
     if shown.outward:
-        return f"drifts by {slope_words(trend.slope)}; {_left(shown.runs_left)}: relearn"
+        return f"drifts by {slope}: relearn"
     if item.two_sided:
-        return f"drifts back towards the middle of the band by {slope_words(trend.slope)}"
-    return f"drifts away from the limit by {slope_words(trend.slope)}; contacts are detected later: relearn"
+        return f"drifts back towards the middle of the band by {slope}"
+    return f"drifts away from the limit by {slope}; contacts are detected later: relearn"
 
 
 def _local(shown: Shown, item: JointDrift) -> str:
-    place = place_of(shown.place if shown.place is not None else math.nan, item.axis, item.unit)
-    if shown.course.kind == "step":
-        return f"{_step(shown, item)} {place}: {_INSPECT}"
-    trend = shown.course.trend
-    if trend is None:
-        return NOTHING_SHOWN
-    if shown.outward:
-        return f"grows {place} by {slope_words(trend.slope)}; {_left(shown.runs_left)}: {_INSPECT}"
-    return f"changes {place} by {slope_words(trend.slope)}: {_INSPECT}"
+    course, place = shown.course, place_of(shown.place if shown.place is not None else math.nan, item.axis, item.unit)
+    if course.kind == "step" and course.step is not None:
+        return f"{_step(course.step, item)} {place}: {_INSPECT}"
+    slope = slope_words(course.trend.slope) if course.trend is not None else ""
+    return f"{'grows' if shown.outward else 'changes'} {place} by {slope}: {_INSPECT}"
 
 
-def _step(shown: Shown, item: JointDrift) -> str:
-    step = shown.course.step
-    if step is None:
-        return NOTHING_SHOWN
+def _step(step: Step, item: JointDrift) -> str:
     return f"step of {step.height:+.2g} spreads at run {step.run + 1} ({item.runs[step.run].name})"
 
 
@@ -91,21 +81,3 @@ def slope_words(slope: Interval) -> str:
     decimals = max(1 - math.floor(math.log10(largest)), 0)
     value, low, high = (f"{x:z.{decimals}f}" for x in (slope.value, slope.low, slope.high))
     return f"{float(value):+.{decimals}f} spreads per run (95 %: {low} to {high})"
-
-
-def _left(runs: Interval) -> str:
-    if runs.value < 1.0:
-        return "the margin is used up"
-    if not runs.value < _MANY:
-        return f"the margin is used up in more than {_MANY} runs"
-    about = counted(_rounded(runs.value), "run")
-    return f"the margin is used up in about {about} ({_count(runs.low)} to {_count(runs.high)})"
-
-
-def _count(runs: float) -> str:
-    return digits(_rounded(runs)) if runs < _MANY else "more"
-
-
-def _rounded(runs: float) -> float:
-    """Whole runs, two digits of them."""
-    return float(f"{round(runs):.2g}")

@@ -18,10 +18,7 @@ import numpy.typing as npt
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import FloatArray
-from cdtool.base.kernels import kernel
-from cdtool.detectors.detection import REASONS, Status, StatusArray
-
-_COLUMN = "Array(float64, 1, 'A', readonly=True)"
+from cdtool.detectors.detection import REASONS, Status
 
 
 @dataclass(frozen=True)
@@ -91,22 +88,14 @@ class JointMargin:
         share = detection.exceedance()[:, self.joint] / detection.threshold.safety_factor
         return np.where(detection.statistic.status[:, self.joint] == Status.VALID, share, np.nan)
 
-    def _share(self, k: int) -> float:
-        """Return the share of an assessable sample."""
-        if self.detection.threshold is None:
-            return math.nan
-        return float(self.detection.exceedance()[k, self.joint] / self.detection.threshold.safety_factor)
-
     def moment(self, k: int) -> Moment:
         """Sample k."""
         statistic, band, j = self.detection.statistic, self.detection.band, self.joint
         time, value = float(self.time[k]), float(statistic.values[k, j])
         reason = REASONS.get(int(statistic.status[k, j]), "")
-        if reason:
-            return Moment(time, value, math.nan, math.nan, math.nan, reason)
         lower, upper = float(band.lower[k, j]), float(band.upper[k, j])
-        limit = upper if upper - value <= value - lower else lower
-        return Moment(time, value, limit, float(np.minimum(upper - value, value - lower)), self._share(k))
+        limit = math.nan if reason else upper if upper - value <= value - lower else lower
+        return Moment(time, value, limit, float(self.margin[k]), float(self.share[k]), reason)
 
     def moments(self, times: Sequence[float]) -> tuple[Moment, ...]:
         """Return the last sample at or before each of `times` [s]; in order of time, each sample once."""
@@ -120,10 +109,10 @@ class JointMargin:
 
         Missing samples do not interrupt a run and do not count.
         """
-        statistic, band, j = self.detection.statistic, self.detection.band, self.joint
-        columns = statistic.values[:, j], band.lower[:, j], band.upper[:, j], statistic.status[:, j]
-        runs = np.empty((len(statistic.time) // 2 + 1, 3), dtype=np.int64)
-        return runs[: find_runs(*columns, runs)]
+        present = np.flatnonzero(self.detection.statistic.status[:, self.joint] != Status.GAP)
+        outside = np.concatenate(([False], self.margin[present] < 0.0, [False]))
+        first, after = np.flatnonzero(np.diff(outside)).reshape(-1, 2).T
+        return np.column_stack((present[first], present[after - 1], after - first))
 
     def approach(self, start: float, end: float, debounce: int) -> Approach | None:
         """Return how near it came to an alarm from `start` to `end` [s]; None without limit or assessable sample."""
@@ -186,31 +175,3 @@ def _held(share: FloatArray, debounce: int) -> float:
         return math.nan
     least = np.lib.stride_tricks.sliding_window_view(share, debounce).min(axis=1)
     return math.nan if np.isnan(least).all() else float(np.nanmax(least))
-
-
-@kernel(f"int64({_COLUMN}, {_COLUMN}, {_COLUMN}, Array(uint8, 1, 'A', readonly=True), int64[:, ::1])", exact=True)
-def find_runs(
-    value: FloatArray, lower: FloatArray, upper: FloatArray, status: StatusArray, runs: npt.NDArray[np.int64]
-) -> int:
-    """Fill `runs` with the runs of assessable samples outside their limits, and return how many there are.
-
-    First and last sample of each, and its number of samples; missing ones do not interrupt it and do not count.
-    """
-    found = count = first = last = 0
-    for k in range(len(value)):
-        if status[k] == Status.GAP:
-            continue
-        above, below = upper[k] - value[k], value[k] - lower[k]
-        is_outside = (above < 0.0 and not math.isnan(below)) or (below < 0.0 and not math.isnan(above))
-        if is_outside and status[k] == Status.VALID:
-            first = k if count == 0 else first
-            last = k
-            count += 1
-        elif count > 0:
-            runs[found, 0], runs[found, 1], runs[found, 2] = first, last, count
-            found += 1
-            count = 0
-    if count > 0:
-        runs[found, 0], runs[found, 1], runs[found, 2] = first, last, count
-        found += 1
-    return found

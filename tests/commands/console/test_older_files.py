@@ -47,7 +47,7 @@ def test_every_command_reports_once_what_is_missing_from_an_older_signature_file
 def test_adding_runs_does_not_migrate_an_older_file(gate_folder, signature):
     machine = ("-m", gate_folder / "machine.toml")
     assert cdtool("signature", "update", signature, gate_folder / "holdout" / "01.csv", *machine).status == 0
-    assert json.loads(signature.read_text(encoding="utf-8"))["schema_version"] == 4
+    assert json.loads(signature.read_text(encoding="utf-8"))["schema_version"] == 5
     assert SAID in cdtool("signature", "show", signature).err
 
 

@@ -69,7 +69,7 @@ def test_an_alarm_shows_channels_in_order_signal_margin_onset_and_debounce(drawn
     assert "after the contact (onset at 2.000 s, load cell)" in shown
     order = [shown.index(name) for name in ("load cell", "speed", "torque", "margin to limit")]
     assert order == sorted(order)
-    for expected in ("+21 ms", "outside for 9 samples", "contact onset", "alarm", "normal band", "read by momentum"):
+    for expected in ("+20 ms", "outside for 9 samples", "contact onset", "alarm", "normal band", "read by momentum"):
         assert expected in shown, expected
     assert "time from contact onset [ms]" in shown
     assert "reference_speed" not in shown  # it neither moved nor does the detector read it

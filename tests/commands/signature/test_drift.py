@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -36,7 +35,7 @@ def near(travel: np.ndarray, place: float) -> np.ndarray:
 def test_a_steady_season_shows_nothing():
     found = audited()
     (joint,) = found.joints
-    assert not found.drifts and not found.alarms and joint.runs_left == math.inf
+    assert not found.drifts and not found.alarms
     (line,) = verdicts(joint)
     assert line.startswith("no drift shown at a level of 1 %: ") and " spreads per run (" in line
     assert advice(None, found) == "keep the signature"
@@ -47,32 +46,14 @@ def test_a_steady_season_rarely_shows_anything():
     assert sum(shown) <= 1
 
 
-def test_a_drift_of_the_whole_stroke_is_reported_with_slope_and_runs_left():
+def test_a_drift_of_the_whole_stroke_is_reported_with_its_slope():
     (joint,) = audited(lambda number, _: 0.04 * number).joints
     assert joint.local is None
     slope = joint.overall.course.trend.slope
     spread = float(np.nanmedian(FITTED.by_position.band(True)[1]))
     assert slope.low < 0.04 / spread < slope.high
-    used = [run.critical_factor for run in joint.runs]
-    expected = (5.5 - np.median(np.array(used) + slope.value * (39 - np.arange(40)))) / slope.value
-    assert joint.runs_left == pytest.approx(expected)
-    left = joint.overall.runs_left
-    assert left.low < left.value < left.high
     (line,) = verdicts(joint)
-    assert line.startswith("drifts by +0.0") and "used up in about" in line and line.endswith(": relearn")
-
-
-def test_the_predicted_runs_left_are_right():
-    """A season that continues: a typical run alarms about when the first half predicted it."""
-
-    def change(number: int, _: np.ndarray) -> float:
-        return 0.06 * number
-
-    (joint,) = audited(change, 40).joints
-    later = audited(change, 40 + round(2.0 * joint.runs_left)).joints[0]
-    alarmed = [i for i, run in enumerate(later.runs) if run.alarm]
-    half = next(i for i in range(len(later.runs)) if sum(run.alarm for run in later.runs[i : i + 9]) >= 5)
-    assert alarmed and half - 40 == pytest.approx(joint.runs_left, rel=0.35)
+    assert line.startswith("drifts by +0.0") and line.endswith("): relearn")
 
 
 def test_a_local_growth_is_reported_with_its_location_and_not_as_a_whole_drift():
@@ -104,7 +85,6 @@ def test_a_shape_that_grows_with_the_whole_is_not_a_separate_location():
 def test_a_step_is_reported_with_its_run():
     (joint,) = audited(lambda number, _: 1.5 * (number >= 25)).joints
     assert joint.overall.course.kind == "step" and joint.overall.course.step.run == 25
-    assert joint.overall.runs_left.value == math.inf
     (line,) = [line for line in verdicts(joint) if "step" in line]
     assert line.startswith("step of +1.") and "at run 26 (run25): if something was changed then" in line
     (place,) = audited(lambda number, travel: 3.0 * (number >= 25) * near(travel, 0.3)).joints
@@ -112,9 +92,9 @@ def test_a_step_is_reported_with_its_run():
     assert "at run 26 (run25) at 0." in line and "before relearning" in line
 
 
-def test_one_sided_a_drift_away_from_the_limit_has_no_runs_left():
+def test_one_sided_a_drift_away_from_the_limit_is_named():
     (joint,) = audited(lambda number, _: -0.05 * number).joints
-    assert not joint.overall.outward and joint.runs_left == math.inf
+    assert not joint.overall.outward
     assert "drifts away from the limit by -0.0" in verdicts(joint)[0] and "detected later" in verdicts(joint)[0]
     (place,) = audited(lambda number, travel: -0.1 * number * near(travel, 0.4)).joints
     assert place.local is None
@@ -133,15 +113,14 @@ def test_backward_a_signed_signal_approaches_the_limit_by_falling():
 def test_two_sided_both_directions_approach_a_limit(sign):
     (joint,) = audited(lambda number, _: sign * 0.05 * number, sides="two").joints
     assert joint.overall.outward and sign * joint.overall.course.change > 0.0
-    assert 10.0 < joint.runs_left < 200.0
     (place,) = audited(lambda number, travel: sign * 0.1 * number * near(travel, 0.4), sides="two").joints
     assert place.local is not None and place.local.outward
 
 
-def test_two_sided_a_drift_to_the_middle_has_no_runs_left():
+def test_two_sided_a_drift_to_the_middle_is_named():
     found = audited(lambda number, _: 2.0 - 0.045 * number, sides="two")
     (joint,) = found.joints
-    assert not joint.overall.outward and joint.runs_left == math.inf
+    assert not joint.overall.outward
     assert verdicts(joint)[-1].startswith("drifts back towards the middle of the band by -0.0")
     assert advice(None, found) == "keep the signature"
 

@@ -21,7 +21,7 @@ def test_no_channel_departs_before_the_onset_of_a_contact(folder, detector):
         for _, item in explain(log, benchmark=prepared).events:
             assert item.contact is not None
             events += 1
-            earliest = item.contact.start - item.contact.uncertainty - 2e-3
-            moved = [each for each in item.moved if not math.isnan(each.time)]
+            earliest = item.contact.start - item.contact.uncertainty - 5e-3
+            moved = [each for each in item.departed if not math.isnan(each.time)]
             early += [(log.name, each.channel, each.joint) for each in moved if each.time < earliest]
     assert events >= 6 and early == []
