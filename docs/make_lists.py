@@ -4,18 +4,34 @@ docs/detectors/index.md is written as a whole; in README.md, docs/choosing.md an
 the two comments is. A detector's page gives its rows in its first lines: the heading is the title, the first paragraph
 says what the detector looks at, the second one says "Good at: ... Weak at: ... Use it: ...". A format's row is made of
 its class: its suffixes and the first words of its docstring, and of the extra of its name in pyproject.toml.
+
+A table of keys, between `<!-- keys: NAME -->` and `<!-- end -->`, has a row for each field of its model.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import MISSING, Field, dataclass, fields
 from pathlib import Path
+from typing import Any
 
+from cdtool.alarms.activation import Activation
+from cdtool.base.settings import keys_of, kind_in_words
+from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
+from cdtool.commands.judging.named_logs import OnsetTable
+from cdtool.commands.judging.settings_table import ForceTable
 from cdtool.detectors import DETECTORS
 from cdtool.formats import FORMATS
+from cdtool.machines.joint_machine import JointTable
+from cdtool.machines.linear_axis import LinearAxisTable
+from cdtool.machines.planar_arm import PlanarArmTable
+from cdtool.machines.rotary_axis import RotaryAxisTable
+from cdtool.machines.urdf_robot import UrdfRobotTable
+from cdtool.thresholds.signature import Signature
+from cdtool.truth.force.limits import ForceProfile
 
 DOCS = Path(__file__).resolve().parent
 _BEGIN, _END = "<!-- made by docs/make_lists.py -->\n", "<!-- end -->\n"
@@ -30,6 +46,33 @@ Each page gives the equation, the signal and its unit, the gains with their defa
 """
 _README = "| detector | short | needs | good at | weak at |\n|---|---|---|---|---|\n"
 _CONTAINERS = "| format | what it reads | suffixes | `pip install` |\n|---|---|---|---|\n"
+_KEYS = "| key | type | default | meaning |\n|---|---|---|---|\n"
+_MODELS: Mapping[str, Any] = {
+    "activation": Activation,
+    "axis": LinearAxisTable,
+    "force": ForceTable,
+    "inject": InjectTable,
+    "machine": JointTable,
+    "obstacle": ObstacleTable,
+    "onset": OnsetTable,
+    "planar_arm": PlanarArmTable,
+    "profile": ForceProfile,
+    "rotary_axis": RotaryAxisTable,
+    "signature": Signature,
+    "urdf_robot": UrdfRobotTable,
+}
+_SHORT = (
+    ("one number or a list of numbers", "number(s)"),
+    (", without quotes", ""),
+    (" in quotes", ""),
+    (" of at least", " ≥"),
+    (" above", " >"),
+    (" and of at most", ", ≤"),
+    (" and below", ", <"),
+)
+_KEY_PAGES = ("benchmark-file", "machine-file", "force-limits")
+# The keys that every machine has stand once, in the table "machine".
+_ADDS_TO = dict.fromkeys(("axis", "rotary_axis", "planar_arm", "urdf_robot"), "machine")
 _CHOOSING = "| detector | short | needs | use it |\n|---|---|---|---|\n"
 
 
@@ -57,7 +100,51 @@ def files() -> Mapping[Path, str]:
         readme: _with_table(readme, _README, map(_readme_line, rows)),
         choosing: _with_table(choosing, _CHOOSING, map(_choosing_line, rows)),
         containers: _with_table(containers, _CONTAINERS, map(_format_line, FORMATS.names())),
+        **{
+            page: _with_keys(page)
+            for page in (DOCS / f"{name}.md" for name in ("benchmark-file", "machine-file", "force-limits"))
+        },
     }
+
+
+def _with_keys(page: Path) -> str:
+    """Return a page with its tables of keys made anew."""
+
+    def made(found: re.Match[str]) -> str:
+        return f"{found[1]}\n{_KEYS}{''.join(_key_lines(found[2]))}\n{_END}"
+
+    return re.sub(r"(<!-- keys: (\w+) -->\n).*?<!-- end -->\n", made, page.read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+def _key_lines(name: str) -> Iterator[str]:
+    known = keys_of(_MODELS[_ADDS_TO[name]]) if name in _ADDS_TO else {}
+    defaults = {item.name: item for item in fields(_MODELS[name])}
+    for key in keys_of(_MODELS[name]).values():
+        if key.name not in known:
+            unit = f" [{key.extra['unit']}]" if key.extra.get("unit") else ""
+            kind = f"{_kind(kind_in_words(key.hint))}{unit}"
+            yield _line(f"`{key.name}`", kind, _default(defaults[key.attribute]), key.meaning)
+
+
+def _kind(words: str) -> str:
+    """`a number of at least 0 and below 1` -> `number ≥ 0, < 1`."""
+    for long, short in _SHORT:
+        words = words.replace(long, short)
+    return words.removeprefix("a ")
+
+
+def _default(item: Field[Any]) -> str:
+    """Return the default as it is written in a file; empty if the meaning says it."""
+    if item.default is MISSING and item.default_factory is MISSING:
+        return "required"
+    value = item.default
+    if isinstance(value, tuple) and len(value) == 1:
+        (value,) = value
+    if value in (None, "", (), MISSING, math.inf):
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'`"{value}"`' if isinstance(value, str) else f"{value:g}"
 
 
 def _row(name: str) -> Row:

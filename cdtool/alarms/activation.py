@@ -47,7 +47,7 @@ class Activation:
     """
 
     debounce: Annotated[
-        Debounce | None, setting("consecutive samples outside the limits that raise the alarm; default: 9 ms")
+        Debounce | None, setting("consecutive samples outside the limits that raise the alarm; default: those of 9 ms")
     ] = None
     rearm: Annotated[
         NotNegative,

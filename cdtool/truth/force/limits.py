@@ -81,11 +81,14 @@ class ForceProfile:
     name: Annotated[str, NOT_A_KEY]
     title: Annotated[Text, setting("what it limits, for reports")]
     source: Annotated[Text, setting("standard, edition and clause")]
-    checked: Annotated[bool, setting("whether someone has checked the values against the text of the standard")]
+    checked: Annotated[bool, setting("whether someone has checked the values against the text of the standard")] = False
     steps: Annotated[
         tuple[ForceStep, ...],
-        setting("the limits", hint="give a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]"),
-    ]
+        setting(
+            "the limits, required",
+            hint="give a list such as [{ from_s = 0.0, at_most_n = 400.0, name = 'dynamic' }]",
+        ),
+    ] = ()
     average_of: Annotated[Count, setting("tests at one point that are averaged; 1: each is assessed on its own")] = 1
     note: Annotated[str, setting("for reports")] = ""
     sample_rate_at_least_hz: Annotated[NotNegative, setting("required of a measurement; 0: nothing", unit="Hz")] = 0.0
@@ -188,6 +191,7 @@ def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
     place = Place(where)
     values = read_toml(file, "a file of force limits", place)
     if not values:
+        place.finish()
         raise ConfigurationError(
             f"{where}: contains no profile", "write one table per profile, see docs/force-limits.md"
         )
@@ -195,7 +199,7 @@ def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
     for name, table in values.items():
         if not isinstance(table, dict):
             place.note(name, f"is {value_in_words(table)}", f"add a table [{name}]")
-        elif profile := read(ForceProfile, {"checked": False, **table}, place.below(name), name=name):
+        elif profile := read(ForceProfile, table, place.below(name), name=name):
             profiles[name] = profile
     place.finish()
     return profiles
