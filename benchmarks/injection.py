@@ -159,10 +159,10 @@ def identified_model(seed: int, references: bool, contacts: int = 0) -> AxisMode
         front_stiffness=GATE.post_stiffness,
         observed_wind_up=fit.largest_wind_up,
     )
-    of_controller = identify_controller(runs)
-    slope = {item.key: item.numbers for item in of_controller.identified.not_identifiable}.get("slew_limit", {})
-    controller = of_controller.controller
-    if controller is not None:
+    of_controller = identify_controller(runs) if references else None
+    controller = of_controller.controller if of_controller else None
+    if of_controller is not None and controller is not None:
+        slope = {item.key: item.numbers for item in of_controller.identified.not_identifiable}.get("slew_limit", {})
         controller = replace(controller, observed_slope=slope.get("largest_n_per_s", 0.0))
     model = replace(model, drive=drive, controller=controller)
     if not contacts:

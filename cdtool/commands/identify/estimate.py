@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from enum import Enum
+from typing import Any
 
 from cdtool.base.errors import CdtoolError
 
@@ -78,6 +79,11 @@ class Estimate:
         """Return standard error / |value|; infinite for a value of 0."""
         return self.standard_error / abs(self.value) if self.value else math.inf
 
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return the estimate as JSON values."""
+        return {**asdict(self), "method": self.method.value}
+
 
 @dataclass(frozen=True)
 class NotIdentifiable:
@@ -92,6 +98,11 @@ class NotIdentifiable:
     numbers: Mapping[str, float] = field(default_factory=dict)
     joint: int = 0
 
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {**asdict(self), "missing": [missing.name.lower() for missing in self.missing]}
+
 
 @dataclass(frozen=True)
 class Identified:
@@ -99,6 +110,14 @@ class Identified:
 
     estimates: tuple[Estimate, ...]
     not_identifiable: tuple[NotIdentifiable, ...] = ()
+
+    @classmethod
+    def of(cls, answers: Sequence[Estimate | NotIdentifiable]) -> Identified:
+        """Return answers in their order, those that are estimates apart from the others."""
+        return cls(
+            tuple(item for item in answers if isinstance(item, Estimate)),
+            tuple(item for item in answers if isinstance(item, NotIdentifiable)),
+        )
 
     def __getitem__(self, key: str) -> Estimate:
         for estimate in self.estimates:

@@ -11,7 +11,6 @@ from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import plain
 from cdtool.commands.identify.fleet_identification import FleetIdentification
-from cdtool.commands.identify.identification_outputs import JointEvidence, identification_summary
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.report.output_names import check_output_names
 
@@ -41,7 +40,7 @@ def check_identification_files(
 
 
 def write_identification(
-    done: IdentifiedMachine, evidence: Sequence[JointEvidence], targets: Sequence[Path], inputs: Sequence[Path] = ()
+    done: IdentifiedMachine, targets: Sequence[Path], inputs: Sequence[Path] = ()
 ) -> tuple[Path, ...]:
     """Write what was identified of one machine; return the files, which are replaced together, or none.
 
@@ -52,7 +51,7 @@ def write_identification(
     def page() -> str:
         from cdtool.commands.identify.page import identification_html
 
-        return identification_html(done, evidence)
+        return identification_html(done)
 
     texts: dict[Path, str] = {}
     for target in targets:
@@ -64,7 +63,7 @@ def write_identification(
     written = (*texts, *(target for target in targets if target.suffix.lower() == JSON))
     for target in targets:
         if target.suffix.lower() == JSON:
-            texts[target] = strict_json(identification_summary(done, evidence, written)) + "\n"
+            texts[target] = strict_json({**done.summary, "outputs": [str(path) for path in written]}) + "\n"
     return _write(texts, inputs)
 
 

@@ -17,7 +17,8 @@ from cdtool.base.errors import CdtoolError, UsageError
 from cdtool.base.log_names import log_stem
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.commands.identify.identifying import IdentifiedMachine, JointIdentification, identify
+from cdtool.commands.identify.identifying import IdentifiedMachine, identify
+from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.judging.log_groups import by_machine, day_in_path, day_of
 from cdtool.commands.judging.runs import find_logs, read, several_logs, shown_path
 from cdtool.execution.workers import Progress, Workers, in_order

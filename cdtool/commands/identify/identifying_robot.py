@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.remote.remote_path import joined
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Identified, Method, NotIdentifiable
+from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
 from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
 from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
@@ -29,6 +30,12 @@ from cdtool.commands.identify.robot.robot_dynamics import (
     identify_robot,
     joint_estimates,
 )
+from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence, joint_evidence
+from cdtool.commands.identify.robot.robot_excitation import (
+    PlannedRobotMotion,
+    measure_joint_motion,
+    plan_robot_motion,
+)
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
@@ -41,6 +48,8 @@ from cdtool.recordings.recording import Recording
 _EXPLAINED = 0.5
 # More unexplained moments than this share of the motion are no exceptions.
 _MOST_UNEXPLAINED = 0.1
+# Units of inertia, force, travel and viscous friction.
+_REVOLUTE, _PRISMATIC = ("kg m2", "N m", "rad", "N m s/rad"), ("kg", "N", "m", "N s/m")
 # Physical links may raise the residual of least squares by this share, and shift a base parameter by so many errors.
 _MOST_RISE, _MOST_SHIFT = 0.1, 3.0
 
@@ -89,35 +98,59 @@ class InertiaIdentification:
 class RobotIdentification:
     """What was identified of a robot; `joints` and `refused` (reason by method) in the order of the machine's joints.
 
-    `inertias` None: they could not be looked at. `gains`: torque constants, None without loaded runs; with them the
-    logged torques are multiplied by `torque_factors` (J,).
-    `unexplained_share`: of the equations left out, because no friction explains their torque. `urdf`: the text of the
-    updated URDF, empty if it stays as it is.
+    `gains`: torque constants, None without loaded runs; with them the
+    logged torques were multiplied. `unexplained_share`: of the equations left out, because no friction explains their
+    torque. `evidence`: what the outputs show of each joint. `urdf`: the text of the updated URDF, empty if it stays as
+    it is.
     """
 
+    machine: CoupledMachine
     joints: tuple[JointFriction, ...]
     refused: tuple[Mapping[str, str], ...]
-    inertias: InertiaIdentification | None
+    inertias: InertiaIdentification
     gains: Identified | None
-    torque_factors: FloatArray
     repeated: RepeatedRuns
     unexplained_share: float
-    urdf: str = ""
+    evidence: tuple[RobotJointEvidence, ...]
+    urdf: str
+
+    @property
+    def by_joint(self) -> tuple[JointIdentification, ...]:
+        """Return the joints of the machine with what was identified of each."""
+        machine = self.machine
+        slides = [False] * len(machine.joints)
+        if isinstance(machine, UrdfRobot):
+            prismatic = {joint.name: joint.prismatic for joint in machine.tree.joints}
+            slides = [prismatic[name] for name in machine.tree.order]
+        rows = zip(machine.joints, slides, self.refused, self.joints, self.evidence, strict=True)
+        return tuple(
+            JointIdentification(
+                name, units=_PRISMATIC if is_slide else _REVOLUTE, refused=refused, robot=friction, evidence=evidence
+            )
+            for name, is_slide, refused, friction, evidence in rows
+        )
+
+    @property
+    def plan(self) -> PlannedRobotMotion | None:
+        """Return the motion that would show the inertias of all links; None if nothing is missing, or nothing moves."""
+        for refused in self.inertias.not_identifiable:
+            count = int(refused.numbers.get("base_parameters", 0.0))
+            return plan_robot_motion([item.motion for item in self.evidence], count)
+        return None
 
     @property
     def summary(self) -> dict[str, Any]:
         """Return what belongs to the whole robot as JSON values."""
         inertias = self.inertias
         return {
-            "base_parameters": inertias
-            and {
+            "base_parameters": {
                 "names": list(inertias.base.names),
                 "values": inertias.base.values.tolist(),
                 "standard_errors": inertias.base.standard_errors.tolist(),
                 "excitation": inertias.base.excitation.tolist(),
                 "identifiable": list(inertias.base.identifiable),
                 "condition_number": inertias.condition_number,
-                "not_identifiable": [missing_as_json(item) for item in inertias.not_identifiable],
+                "not_identifiable": [item.summary for item in inertias.not_identifiable],
                 "torque_error": {key: value.tolist() for key, value in vars(inertias.errors).items()},
                 "refused": inertias.refused or None,
                 "is_new": inertias.is_new,
@@ -125,28 +158,13 @@ class RobotIdentification:
             },
             "torque_constants": self.gains
             and {
-                "estimates": [{**asdict(item), "method": item.method.value} for item in self.gains.estimates],
-                "not_identifiable": [missing_as_json(item) for item in self.gains.not_identifiable],
+                "estimates": [item.summary for item in self.gains.estimates],
+                "not_identifiable": [item.summary for item in self.gains.not_identifiable],
             },
             "run_to_run_torque": self.repeated.floor.tolist(),
             "repeated_pairs": self.repeated.pairs,
             "unexplained_share": self.unexplained_share,
         }
-
-
-def missing_as_json(item: NotIdentifiable) -> dict[str, Any]:
-    """Return a parameter that is not identifiable as JSON values."""
-    return {**asdict(item), "missing": [missing.name.lower() for missing in item.missing]}
-
-
-def joint_summary(friction: JointFriction) -> dict[str, Any]:
-    """Return the friction of a joint as JSON values: RMS of the torque on parts left out of the fit by form."""
-    return {
-        "form": friction.form.name.lower(),
-        "torque_error_on_unseen_parts": {form.name.lower(): error for form, error in friction.errors.items()},
-        "torque": friction.torque,
-        "refitted": [{**asdict(item), "method": item.method.value} for item in friction.refitted],
-    }
 
 
 def identify_joints(
@@ -200,13 +218,19 @@ def identify_joints(
             f"no friction explains the torque during {100.0 * explained.share:.0f} % of the motion",
             "leave out logs with contacts and stops; check the order, signs and units of the channels",
         )
-    joints = choose_friction(explained.runs, machine, HALF_WIDTH)
-    inertias, joints, urdf = _with_inertias(explained.runs, machine, joints, given, folder)
+    joints, fits = choose_friction(explained.runs, machine, HALF_WIDTH)
+    whole = identify_robot(explained.runs, machine, RobotParameters(inertial=True, half_width=HALF_WIDTH))
+    inertias, joints, urdf = _with_inertias(whole, joints, given, folder)
     refused: tuple[Mapping[str, str], ...] = ({},) * len(joints)
-    if not (inertias and inertias.is_new):
+    if not inertias.is_new:
         joints, refused = _refuse_unexplained(joints, machine)
     floor = repeated_runs(runs, HALF_WIDTH)
-    return RobotIdentification(joints, refused, inertias, gains, factors, floor, explained.share, urdf)
+    fits = {**fits, FrictionForm.WITH_INERTIAS: whole}
+    evidence = tuple(
+        joint_evidence(motion, friction.compared, fits, explained.runs)
+        for motion, friction in zip(measure_joint_motion(runs, machine), joints, strict=True)
+    )
+    return RobotIdentification(machine, joints, refused, inertias, gains, floor, explained.share, evidence, urdf)
 
 
 def _runs_of(recordings: Sequence[Recording]) -> tuple[list[RobotRun], str]:
@@ -267,18 +291,13 @@ def _refuse_unexplained(
 
 def _as_before(friction: JointFriction) -> JointFriction:
     nothing = Identified((), friction.identified.not_identifiable)
-    return replace(friction, form=FrictionForm.PREVIOUS, identified=nothing, together=())
+    return replace(friction, form=FrictionForm.PREVIOUS, identified=nothing, together=(), is_explained=False)
 
 
 def _with_inertias(
-    runs: Sequence[RobotRun],
-    machine: CoupledMachine,
-    joints: tuple[JointFriction, ...],
-    given: Mapping[str, Any],
-    folder: Path,
-) -> tuple[InertiaIdentification | None, tuple[JointFriction, ...], str]:
+    fit: RobotFit, joints: tuple[JointFriction, ...], given: Mapping[str, Any], folder: Path
+) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
     """Return the inertias, the joints, and the text of the URDF, new where the runs determine the inertias."""
-    fit = identify_robot(runs, machine, RobotParameters(inertial=True, half_width=HALF_WIDTH))
     missing = tuple(item for item in fit.identified.not_identifiable if item.key == "base_parameters")
     found = InertiaIdentification(fit.base, fit.condition_number, fit.torque_error, missing)
     if missing:
@@ -286,7 +305,7 @@ def _with_inertias(
     if not _predicts_better(fit, joints):
         return replace(found, refused="the present inertias predict unseen parts as well"), joints, ""
     try:
-        if isinstance(machine, UrdfRobot):
+        if isinstance(fit.machine, UrdfRobot):
             return _new_urdf(fit, found, joints, joined(folder, str(given["machine"]["urdf"])))
         return _new_links(fit, found, joints)
     except CdtoolError as fault:

@@ -12,8 +12,9 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation, RigidAxisFit
+from cdtool.commands.identify.axis.speed_controller import ControllerComparison
+from cdtool.commands.identify.axis.two_mass import StartComparison
 from cdtool.commands.identify.fleet_identification import ParameterSeries
-from cdtool.commands.identify.identification_outputs import ControllerComparison, StartComparison, UnseenRun
 from cdtool.detectors.look import BLUE, RED
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure
@@ -28,36 +29,28 @@ _MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RED, "0.85"
 _MOST_POINTS = 4000
 
 
-def draw_unseen_run(unseen: UnseenRun, validation: CrossValidation | None, unit: str) -> Figure:
-    """Draw measured and predicted force of a run that the fit did not see, and below them the residual.
+def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
+    """Draw measured and predicted force of the run that is described worst, and below them the residual, in motion.
 
-    The band is the deviation between equal strokes: what is left over beyond it is the model's. Samples at rest are
-    pale: the model says nothing about them.
+    The band is the deviation between equal strokes: what is left over beyond it is the model's.
     """
-    shown = np.isfinite(unseen.residual)
-    index = _thinned(np.flatnonzero(shown))
-    time, residual = unseen.time[index], unseen.residual[index]
-    moving = unseen.moving[index]
+    unseen = validation.worst
+    index = _thinned(np.arange(len(unseen.time)))
+    time, measured, predicted = unseen.time[index], unseen.measured[index], unseen.predicted[index]
     with drawing():
         figure = new_figure(_WIDTH, 4.6)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        above.plot(time, _gaps(time, unseen.measured[index]), color=_UNDER, linewidth=2.4, label="measured")
-        above.plot(time, _gaps(time, unseen.predicted[index]), color=_MODEL, linewidth=1.0, label="model")
+        above.plot(time, _gaps(time, measured), color=_UNDER, linewidth=2.4, label="measured")
+        above.plot(time, _gaps(time, predicted), color=_MODEL, linewidth=1.0, label="model")
         above.set_ylabel(f"force [{unit}]")
         above.legend(loc="upper right", ncols=2)
-        what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "last part of the only run"
-        error = number(unseen.moving_error)
-        above.set_title(
-            f"{label(unseen.run)}, left out of the fit ({what}): {error} {unit} RMS while moving", loc="left"
-        )
-        floor = validation.floor if validation is not None and validation.repeats else math.nan
-        if math.isfinite(floor):
-            below.axhspan(
-                -floor, floor, color=_BAND, linewidth=0, label="between equal strokes (± 1 standard deviation)"
-            )
-        below.plot(time, _gaps(time, residual), color="0.75", linewidth=0.8)
-        in_motion = np.where(moving, residual, np.nan)
-        below.plot(time, _gaps(time, in_motion), color=_RESIDUAL, linewidth=0.9, label="residual while moving")
+        what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "strokes of the only run"
+        error = number(unseen.error)
+        above.set_title(f"{label(unseen.run)}, left out of the fit ({what}): {error} {unit} RMS", loc="left")
+        if validation.repeats:
+            name = "between equal strokes (± 1 standard deviation)"
+            below.axhspan(-validation.floor, validation.floor, color=_BAND, linewidth=0, label=name)
+        below.plot(time, _gaps(time, measured - predicted), color=_RESIDUAL, linewidth=0.9, label="residual")
         below.axhline(0.0, color="0.3", linewidth=0.6)
         below.set_ylabel(f"residual [{unit}]")
         below.set_xlabel("time [s]")
@@ -73,18 +66,17 @@ def draw_friction(fit: RigidAxisFit, units: tuple[str, str, str]) -> Figure:
     a profile there is friction that depends on the position.
     """
     force, speed, travel = units
-    residuals = fit.residuals
     curve = fit.friction_curve
     with drawing():
         figure = new_figure(_WIDTH, 3.4)
         left, right = figure.subplots(1, 2)
-        every = _thinned(np.arange(len(residuals.speed)))
-        left.plot(residuals.speed[every], residuals.friction[every], ".", color="0.8", markersize=1.5, zorder=1)
+        every = _thinned(np.arange(len(fit.speed)))
+        left.plot(fit.speed[every], fit.friction[every], ".", color="0.8", markersize=1.5, zorder=1)
         _bars(left, curve, _MEASURED, "measured, mean ± 2 standard errors")
         for side in (1.0, -1.0):
-            inside = np.sign(residuals.speed) == side
+            inside = np.sign(fit.speed) == side
             if inside.any():
-                x, y = _model_curve(residuals.speed[inside], (residuals.friction - residuals.residual)[inside])
+                x, y = _model_curve(fit.speed[inside], (fit.friction - fit.residual)[inside])
                 left.plot(x, y, color=_MODEL, linewidth=1.6, zorder=3, label="model")
         left.set_xlabel(f"speed [{speed}]")
         left.set_ylabel(f"friction [{force}]")
@@ -108,30 +100,32 @@ def draw_starts(start: StartComparison, units: tuple[str, str, str]) -> Figure:
     `units` of force, speed and travel. The lowest panel of each channel is the difference.
     """
     force, speed, travel = units
-    names = [name for name in ("speed", "torque", "acceleration") if name in start.measured]
+    ensemble = start.ensemble
+    names = [name for name in ("speed", "torque", "acceleration") if name in start.modelled]
     of_channel = {"speed": speed, "torque": force, "acceleration": f"{travel}/s²"}
     titles = {"speed": "speed", "torque": "force", "acceleration": "acceleration"}
+    time = ensemble.period * (np.arange(len(ensemble), dtype=np.float64) - ensemble.start_index)
     with drawing():
         figure = new_figure(_WIDTH, 4.4)
         panels = figure.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(3, 2))
         for (above, below), name in zip(panels.T, names, strict=True):
-            measured, model, deviation = start.measured[name], start.modelled[name], start.deviation[name]
-            above.plot(start.time, measured, color=_UNDER, linewidth=2.6, label=f"mean of {start.count} starts")
-            above.plot(start.time, model, color=_MODEL, linewidth=1.2, label="model")
+            measured, model, deviation = ensemble.mean[name], start.modelled[name], ensemble.deviation[name]
+            above.plot(time, measured, color=_UNDER, linewidth=2.6, label=f"mean of {ensemble.count} starts")
+            above.plot(time, model, color=_MODEL, linewidth=1.2, label="model")
             above.set_ylabel(f"{titles[name]} [{of_channel[name]}]")
-            if start.count > 1:
+            if ensemble.count > 1:
                 below.fill_between(
-                    start.time, -deviation, deviation, color=_BAND, linewidth=0, label="between runs (± 1 st. dev.)"
+                    time, -deviation, deviation, color=_BAND, linewidth=0, label="between runs (± 1 st. dev.)"
                 )
-            below.plot(start.time, measured - model, color=_RESIDUAL, linewidth=0.9, label="measured − model")
+            below.plot(time, measured - model, color=_RESIDUAL, linewidth=0.9, label="measured − model")
             below.axhline(0.0, color="0.3", linewidth=0.6)
             below.set_ylabel(f"difference [{of_channel[name]}]")
             below.set_xlabel("time from the start of the motion [s]")
         panels[0, 0].legend(loc="lower right")
         panels[1, 0].legend(loc="upper right")
-        direction = "forward" if start.direction > 0 else "backward"
+        direction = "forward" if ensemble.direction > 0 else "backward"
         figure.suptitle(
-            f"Starts {direction} to {number(start.nominal_speed)} {speed}, driven by their mean force",
+            f"Starts {direction} to {number(ensemble.nominal_speed)} {speed}, driven by their mean force",
             fontsize=9,
             x=0.01,
             ha="left",
@@ -140,7 +134,7 @@ def draw_starts(start: StartComparison, units: tuple[str, str, str]) -> Figure:
 
 
 def draw_controller(compared: ControllerComparison, unit: str) -> Figure:
-    """Draw the logged command and the identified controller's along a run, and their difference."""
+    """Draw the logged command and the identified controller's, and their difference."""
     index = _thinned(np.arange(len(compared.time)))
     time = compared.time[index]
     measured, computed = compared.measured[index], compared.computed[index]
@@ -154,7 +148,7 @@ def draw_controller(compared: ControllerComparison, unit: str) -> Figure:
         above.set_ylabel(f"{name} [{unit}]")
         above.legend(loc="upper right", ncols=2)
         error = number(float(np.sqrt(np.mean(difference**2))))
-        above.set_title(f"{label(compared.run)}: {name}, difference {error} {unit} RMS", loc="left")
+        above.set_title(f"{name}, difference {error} {unit} RMS", loc="left")
         below.plot(time, difference[index], color=_RESIDUAL, linewidth=0.8)
         below.axhline(0.0, color="0.3", linewidth=0.6)
         below.set_ylabel(f"difference [{unit}]")

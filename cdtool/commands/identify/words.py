@@ -9,9 +9,10 @@ from cdtool.base.plain_text import counted, digits
 from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion
 from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.commands.identify.identifying_robot import RobotIdentification
+from cdtool.commands.identify.joint import JointIdentification
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, JointFriction
 from cdtool.commands.identify.robot.robot_dynamics import FEWEST_RUNS
-from cdtool.commands.identify.robot.robot_evidence import FrictionAnswer, FrictionDecision
-from cdtool.commands.identify.robot.robot_excitation import JointMotion, PlannedRobotMotion
+from cdtool.commands.identify.robot.robot_excitation import PlannedRobotMotion
 from cdtool.report.number_text import number, percent
 
 _BOTH = 2
@@ -53,21 +54,22 @@ def words_of_plan(plan: PlannedMotion, travel_unit: str) -> str:
     return words
 
 
-def words_of_joint_plan(plan: PlannedMotion, motion: JointMotion, travel_unit: str) -> str:
-    """Return a planned motion of a robot's joint in one line, with the logged one unless it is a series of runs."""
-    words = words_of_plan(plan, travel_unit)
-    if plan.runs or not motion.is_moving:
+def words_of_joint_plan(plan: PlannedMotion, joint: JointIdentification) -> str:
+    """Return a planned motion of a joint in one line; of a robot with the logged one unless it is a series of runs."""
+    travel = joint.units[2]
+    words = words_of_plan(plan, travel)
+    if plan.runs or joint.evidence is None or not joint.evidence.motion.is_moving:
         return words
+    motion = joint.evidence.motion
     speed = short_number(motion.excitation.highest_speed)
-    return f"{words} (logged: {short_number(motion.range)} {travel_unit}, up to {speed} {travel_unit}/s)"
+    return f"{words} (logged: {short_number(motion.range)} {travel}, up to {speed} {travel}/s)"
 
 
-def words_of_decision(decision: FrictionDecision) -> str:
+def words_of_decision(friction: JointFriction) -> str:
     """Return whether the friction of a joint is new, which, and why the old one stays."""
-    if decision.answer is FrictionAnswer.NEW:
-        assert decision.form is not None
-        return f"new: {decision.form.value}"
-    return f"old: {decision.answer.value}"
+    if friction.answer is FrictionAnswer.NEW:
+        return f"new: {friction.form.value}"
+    return f"old: {friction.answer.value}"
 
 
 def words_of_base_set(item: NotIdentifiable) -> str:
@@ -88,36 +90,34 @@ def words_of_base_set(item: NotIdentifiable) -> str:
     )
 
 
-def words_of_robot_plan(plan: PlannedRobotMotion, names: Sequence[str], units: Sequence[str]) -> str:
+def words_of_robot_plan(plan: PlannedRobotMotion, joints: Sequence[JointIdentification]) -> str:
     """Return the motion that would show the inertias of all links: duration, and range and speed of each joint."""
     parts = []
     for demand in plan.joints:
-        unit = units[demand.joint]
+        name, unit = joints[demand.joint].joint, joints[demand.joint].units[2]
         logged = f"{short_number(demand.logged_range, 2)} {unit}, {short_number(demand.logged_speed, 2)} {unit}/s"
         wanted = f"{short_number(demand.range, 2)} {unit} at up to {short_number(demand.speed, 2)} {unit}/s"
-        parts.append(f"{names[demand.joint]} over {wanted} ({f'logged: {logged}' if demand.is_more else 'as logged'})")
+        parts.append(f"{name} over {wanted} ({f'logged: {logged}' if demand.is_more else 'as logged'})")
     return (
         f"{short_number(plan.duration)} s of all joints at once, each at its own frequencies "
         f"(logged: {short_number(plan.logged_duration, 2)} s): {'; '.join(parts)}"
     )
 
 
-def words_of_robot(
-    robot: RobotIdentification, plan: PlannedRobotMotion | None, names: Sequence[str], units: Sequence[str], runs: int
-) -> list[str]:
+def words_of_robot(robot: RobotIdentification, joints: Sequence[JointIdentification], runs: int) -> list[str]:
     """Return what is known of a whole robot from so many runs, a line each: inertias, torque constants, and so on."""
-    lines = [words_of_base_set(item) for item in (robot.inertias.not_identifiable if robot.inertias else ())]
-    if plan is not None:
-        lines.append(f"plan: {words_of_robot_plan(plan, names, units)}")
-    if robot.inertias is not None and robot.inertias.refused:
-        lines.append(f"inertias kept: {robot.inertias.refused}")
-    if robot.inertias is not None and robot.inertias.is_new:
-        count = len(robot.inertias.base)
-        lines.append(
-            f"new inertias: {counted(count, 'base parameter')}, {_conditioned(robot.inertias.condition_number)}"
-        )
+    inertias = robot.inertias
+    lines = [words_of_base_set(item) for item in inertias.not_identifiable]
+    if robot.plan is not None:
+        lines.append(f"plan: {words_of_robot_plan(robot.plan, joints)}")
+    if inertias.refused:
+        lines.append(f"inertias kept: {inertias.refused}")
+    if inertias.is_new:
+        count = len(inertias.base)
+        lines.append(f"new inertias: {counted(count, 'base parameter')}, {_conditioned(inertias.condition_number)}")
     for item in robot.gains.not_identifiable if robot.gains else ():
-        lines.append(f"{names[item.joint]}: not identifiable: torque constant: add {words_of_needs(item.missing)}")
+        name = joints[item.joint].joint
+        lines.append(f"{name}: not identifiable: torque constant: add {words_of_needs(item.missing)}")
     if robot.unexplained_share > 0.0:
         lines.append(
             f"left out: {percent(robot.unexplained_share)} of the motion, of which no friction explains the torque "

@@ -8,9 +8,10 @@ from dataclasses import replace
 import pytest
 
 from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion
-from cdtool.commands.identify.estimate import Missing, NotIdentifiable
-from cdtool.commands.identify.robot.friction_choice import FrictionForm
-from cdtool.commands.identify.robot.robot_evidence import FrictionAnswer, FrictionDecision
+from cdtool.commands.identify.estimate import Identified, Missing, NotIdentifiable
+from cdtool.commands.identify.joint import JointIdentification
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction
+from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence
 from cdtool.commands.identify.robot.robot_excitation import JointDemand, JointMotion, PlannedRobotMotion
 from cdtool.commands.identify.words import (
     listed_numbers,
@@ -126,16 +127,22 @@ def test_the_answer_about_the_base_parameters_has_its_numbers() -> None:
     ],
 )
 def test_a_decision_states_why_the_old_friction_stays(answer: FrictionAnswer, words: str) -> None:
-    decision = FrictionDecision(answer, FrictionForm.FRICTION_ALONE, 4.0, 3.0, 30.0, math.nan)
-    assert words_of_decision(decision) == words
+    before = math.nan if answer is FrictionAnswer.NOT_MOVED else 4.0
+    form = FrictionForm.FRICTION_ALONE if answer is FrictionAnswer.NEW else FrictionForm.PREVIOUS
+    errors = {FrictionForm.FRICTION_ALONE: 3.0, FrictionForm.PREVIOUS: before}
+    friction = JointFriction(0, form, Identified(()), (), errors, 30.0)
+    assert friction.answer is answer
+    assert words_of_decision(friction) == words
 
 
 def test_the_plan_of_a_robot_has_its_numbers() -> None:
     plan = PlannedRobotMotion((JointDemand(0, 2.0, 0.56, 0.32, 0.56), JointDemand(1, 3.0, 1.0, 3.0, 1.0)), 23.0, 4.9)
-    assert words_of_robot_plan(plan, ["elbow", "lift"], ["rad", "m"]) == (
+    units = {"elbow": ("kg m2", "N m", "rad", "N m s/rad"), "lift": ("kg", "N", "m", "N s/m")}
+    motion = RobotJointEvidence(JointMotion(0, EXCITATION, 0.5, 1.25))
+    joints = [JointIdentification(name, units=unit, evidence=motion) for name, unit in units.items()]
+    assert words_of_robot_plan(plan, joints) == (
         "23 s of all joints at once, each at its own frequencies (logged: 4.9 s): "
         "elbow over 2 rad at up to 0.56 rad/s (logged: 0.32 rad, 0.56 rad/s); lift over 3 m at up to 1 m/s (as logged)"
     )
-    motion = JointMotion(0, EXCITATION, 0.5, 1.25)
     other = PlannedMotion(Missing.OTHER_MOTION, ("machine.constant_force",))
-    assert words_of_joint_plan(other, motion, "rad").endswith("(logged: 0.75 rad, up to 0.26 rad/s)")
+    assert words_of_joint_plan(other, joints[0]).endswith("(logged: 0.75 rad, up to 0.26 rad/s)")

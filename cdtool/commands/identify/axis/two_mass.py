@@ -22,7 +22,6 @@ from cdtool.base.errors import ConfigurationError
 from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.filtered_regression import IntArray
 from cdtool.commands.identify.axis.friction_profile import (
-    FrictionProfile,
     friction_profile,
     friction_shares,
     random_phases,
@@ -93,21 +92,44 @@ class TwoMassSettings:
 
 
 @dataclass(frozen=True, eq=False)
+class StartComparison:
+    """Aligned starts and the model's channels (n,) that are compared with their means, driven by their mean force.
+
+    The model includes the friction along the travel where it is known, and is corrected weakly towards the measured
+    speed: what `torque` differs by from the measured one is the force that the model does not explain.
+    """
+
+    ensemble: StartEnsemble
+    modelled: Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
 class TwoMassFit:
     """The identified model and how well it follows the log.
 
-    `relative_error`: RMS error by channel over its RMS. `condition_number` of the scaled Jacobian. `largest_wind_up`
-    [m, rad] of the drive in the starts, or its take-up travel: beyond it nothing is known of its stiffness. `profiles`:
-    of the friction along the travel, by ensemble.
+    `starts`: by ensemble. `condition_number` of the scaled Jacobian. `largest_wind_up` [m, rad] of the drive in the
+    starts, or its take-up travel: beyond it nothing is known of its stiffness.
     """
 
     identified: Identified
     model: AxisModel
-    ensembles: tuple[StartEnsemble, ...]
-    relative_error: Mapping[str, float]
+    starts: tuple[StartComparison, ...]
     condition_number: float
     largest_wind_up: float
-    profiles: tuple[FrictionProfile, ...]
+
+    @property
+    def relative_error(self) -> dict[str, float]:
+        """Return the RMS error by channel over its RMS."""
+        totals: dict[str, list[tuple[float, float]]] = {}
+        for start in self.starts:
+            for name, values in start.modelled.items():
+                measured = start.ensemble.mean[name]
+                squares = float(np.mean((values - measured) ** 2)), float(np.mean(measured**2))
+                totals.setdefault(name, []).append(squares)
+        return {
+            name: math.sqrt(sum(a for a, _ in pairs) / max(sum(b for _, b in pairs), 1e-300))
+            for name, pairs in totals.items()
+        }
 
 
 def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> TwoMassFit:
@@ -377,11 +399,12 @@ class _Problem:
         return TwoMassFit(
             identified=self._identified(vector, relative, condition),
             model=replace(model, controller=None),
-            ensembles=self.ensembles,
-            relative_error=self._relative_error(model, frictions),
+            starts=tuple(
+                StartComparison(ensemble, self.channels(self.simulated(model, number, frictions[number]), ensemble))
+                for number, ensemble in enumerate(self.ensembles)
+            ),
             condition_number=condition,
             largest_wind_up=min(self.largest_wind_up(vector), model.drive.take_up_travel),
-            profiles=tuple(replace(profile, shares=_shares(vector)) for profile in self.profiles),
         )
 
     def _relative_deviation(self, inverse: FloatArray, vector: FloatArray) -> FloatArray:
@@ -451,20 +474,6 @@ class _Problem:
         """Return the keys of the Coulomb friction in the directions of the starts."""
         keys = {1: "coulomb_forward", -1: "coulomb_backward"}
         return [keys[direction] for direction in (1, -1) if any(item.direction == direction for item in self.ensembles)]
-
-    def _relative_error(self, model: AxisModel, frictions: Sequence[FloatArray]) -> dict[str, float]:
-        totals: dict[str, list[tuple[float, float]]] = {}
-        for number, ensemble in enumerate(self.ensembles):
-            motion = self.simulated(model, number, frictions[number])
-            for name, values in self.channels(motion, ensemble).items():
-                measured = ensemble.mean[name]
-                totals.setdefault(name, []).append(
-                    (float(np.mean((values - measured) ** 2)), float(np.mean(measured**2)))
-                )
-        return {
-            name: math.sqrt(sum(a for a, _ in pairs) / max(sum(b for _, b in pairs), 1e-300))
-            for name, pairs in totals.items()
-        }
 
 
 def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float]:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -39,23 +40,77 @@ class FrictionForm(Enum):
     WITH_INERTIAS = "viscous and Coulomb friction, constant force, with the inertias of all links"
 
 
+class FrictionAnswer(Enum):
+    """Whether the friction of a joint is new, and why the old one stays."""
+
+    NEW = "new friction"
+    NOT_BETTER = "not better by more than one standard error"
+    NOT_IDENTIFIABLE = "new friction is not identifiable"
+    NOT_MOVED = "the joint does not move"
+    UNEXPLAINED = "the machine explains too little of the torque"
+
+
 @dataclass(frozen=True, eq=False)
 class JointFriction:
     """The friction of a joint.
 
     `identified`: the estimates of the `form`, and what the runs cannot show. `together`: values that are not
-    identifiable alone. `refitted`: estimates of the full friction, also where they do not replace the present ones.
-    `errors`: RMS [N m, N] of the torque that each form does not explain in parts left out of its fit; NaN: no motion.
-    `torque`: RMS of the joint's torque in motion [N m, N].
+    identifiable alone. `errors`: RMS [N m, N] of the torque that each form does not explain in parts left out of its
+    fit; NaN: no motion. `torque`: RMS of the joint's torque in motion [N m, N]. `is_explained`: by the machine.
     """
 
     joint: int
     form: FrictionForm
     identified: Identified
     together: tuple[Estimate, ...]
-    refitted: tuple[Estimate, ...]
     errors: Mapping[FrictionForm, float]
     torque: float
+    is_explained: bool = True
+
+    @property
+    def answer(self) -> FrictionAnswer:
+        """Return whether the friction is new, and why the old one stays."""
+        if self.form is not FrictionForm.PREVIOUS:
+            return FrictionAnswer.NEW
+        if not self.is_explained:
+            return FrictionAnswer.UNEXPLAINED
+        if not math.isfinite(self.before):
+            return FrictionAnswer.NOT_MOVED
+        return FrictionAnswer.NOT_BETTER if self.compared else FrictionAnswer.NOT_IDENTIFIABLE
+
+    @property
+    def compared(self) -> FrictionForm | None:
+        """Return the new form, or that which predicted best of those compared with the old one; None without any."""
+        if self.form is not FrictionForm.PREVIOUS:
+            return self.form
+        forms = (FrictionForm.FRICTION_ALONE, FrictionForm.FRICTION)
+        known = [form for form in forms if math.isfinite(self.errors.get(form, math.nan))]
+        if known:
+            return min(known, key=lambda form: self.errors[form])
+        has_offset = math.isfinite(self.errors.get(FrictionForm.OFFSET, math.nan))
+        return FrictionForm.OFFSET if has_offset else None
+
+    @property
+    def before(self) -> float:
+        """Return the error with the old friction [N m, N]."""
+        return self.errors.get(FrictionForm.PREVIOUS, math.nan)
+
+    @property
+    def after(self) -> float:
+        """Return the error with the `compared` form [N m, N]."""
+        return self.errors.get(self.compared, math.nan) if self.compared else math.nan
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return the decision, and the RMS errors by form, as JSON values."""
+        return {
+            "answer": self.answer.name.lower(),
+            "form": self.compared.name.lower() if self.compared else None,
+            "before": self.before,
+            "after": self.after,
+            "torque": self.torque,
+            "errors": {form.name.lower(): error for form, error in self.errors.items()},
+        }
 
     @property
     def explained_share(self) -> float:
@@ -64,15 +119,19 @@ class JointFriction:
         return 1.0 - (min(known) / self.torque) ** 2 if known and self.torque > 0.0 else float("nan")
 
 
-def choose_friction(runs: Sequence[RobotRun], machine: CoupledMachine, half_width: float) -> tuple[JointFriction, ...]:
-    """Return the friction of each joint from contact-free runs, in the order of the joints.
+def choose_friction(
+    runs: Sequence[RobotRun], machine: CoupledMachine, half_width: float
+) -> tuple[tuple[JointFriction, ...], Mapping[FrictionForm, RobotFit]]:
+    """Return the friction of each joint from contact-free runs, in the order of the joints, and the fits by form.
 
     `half_width` [s] as in RobotParameters. The constant force of a joint is kept where that predicts better, and where
     runs in one direction show only its sum with Coulomb friction: then both are known only together.
     Raises IdentificationError without any motion, UsageError for runs of another machine.
     """
     choice = _Choice(runs, machine, RobotParameters(half_width=half_width))
-    return tuple(choice.of_joint(joint) for joint in range(len(machine.joints)))
+    candidates = (choice.friction, choice.friction_alone, choice.offset, choice.drive)
+    joints = tuple(choice.of_joint(joint) for joint in range(len(machine.joints)))
+    return joints, {item.form: item.fit for item in candidates}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +192,6 @@ class _Choice:
             form=FrictionForm.PREVIOUS if chosen is None else chosen.form,
             identified=Identified(alone, missing),
             together=tuple(replace(item, standard_error=math.nan) for item in known if item not in alone),
-            refitted=self.friction.estimates(joint),
             errors=errors,
             torque=self._moving_torque(joint),
         )

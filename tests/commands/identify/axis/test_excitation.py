@@ -18,7 +18,7 @@ from cdtool.commands.identify.axis.excitation import (
     plan_motions,
 )
 from cdtool.commands.identify.axis.filtered_regression import filter_run
-from cdtool.commands.identify.axis.rigid_axis import RigidAxisSettings, identify_rigid_axis
+from cdtool.commands.identify.axis.rigid_axis import identify_rigid_axis
 from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction
@@ -106,9 +106,6 @@ AXIS = AxisModel(
 )
 
 
-QUICK = RigidAxisSettings(cross_validate=False)
-
-
 def driven(speed: float, direction: int, number: int, acceleration: float = 1.0, travel: float = 0.3) -> AxisRun:
     """Return a log of the simulated axis: rest, one stroke at a speed over the travel, rest; noise on all channels."""
     rng = np.random.default_rng([number, round(1e4 * speed), direction + 1])
@@ -141,7 +138,7 @@ def suggested(plans: Sequence[PlannedMotion]) -> list[AxisRun]:
 
 def answers(runs: Sequence[AxisRun]) -> tuple[dict[str, float], set[str], tuple[PlannedMotion, ...]]:
     """Return the values by key, the keys that are not identifiable, and the plan for them."""
-    fit = identify_rigid_axis(runs, 0.0, QUICK)
+    fit = identify_rigid_axis(runs, 0.0)
     missing = fit.identified.not_identifiable
     values = {item.key: item.value for item in fit.identified.estimates}
     return values, {item.key for item in missing}, plan_motions(missing, fit.excitation)
@@ -212,7 +209,7 @@ def test_directions_follow_what_is_logged_and_what_is_missing():
 def test_weak_acceleration_is_answered_with_one_that_shows_the_mass():
     slow = [driven(0.06, direction, 1, acceleration=0.005, travel=0.05) for direction in (1, -1)]
     gentle = [replace(run, speed=None, reference_speed=None, position=noisy(run)) for run in slow]
-    fit = identify_rigid_axis(gentle, 0.0, QUICK)
+    fit = identify_rigid_axis(gentle, 0.0)
     missing = [item for item in fit.identified.not_identifiable if item.key == "load_mass"]
     assert missing[0].missing == (Missing.ACCELERATION, Missing.FINER_MOTION)
     plan, finer = plan_motions(missing, fit.excitation)
@@ -220,7 +217,7 @@ def test_weak_acceleration_is_answered_with_one_that_shows_the_mass():
     assert plan.acceleration >= 2.0 * fit.excitation.acceleration_noise
     added = suggested([replace(plan, speeds=(0.06,), travel=0.05)])
     more = [replace(run, position=noisy(run), speed=None, reference_speed=None) for run in added]
-    again = identify_rigid_axis([*gentle, *more], 0.0, QUICK)
+    again = identify_rigid_axis([*gentle, *more], 0.0)
     assert again.identified["load_mass"].value == pytest.approx(95.0, rel=0.3)
 
 
