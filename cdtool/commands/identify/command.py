@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cdtool.base.errors import UsageError, nearest
+from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted, digits
 from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
@@ -20,13 +20,11 @@ from cdtool.commands.console.place import Place, location
 if TYPE_CHECKING:
     from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
     from cdtool.commands.identify.estimate import NotIdentifiable
-    from cdtool.commands.identify.fleet_identification import FleetIdentification
     from cdtool.commands.identify.identifying import IdentifiedMachine
     from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
     from cdtool.commands.identify.joint import JointIdentification
     from cdtool.execution.workers import Workers
 
-_DIVISIONS = ("machine", "day")
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
 _MUCH_MORE = 3.0
 _DOUBT = (
@@ -53,10 +51,6 @@ def identify(
             parser=location,
             help="Output, repeatable: .toml (machine file: the same or a new one), .html, .json. Default: none.",
         ),
-    ] = None,
-    by: Annotated[
-        str | None,
-        typer.Option("--by", help="machine or day: one identification for each, and what changes; -o .html, .json."),
     ] = None,
     loaded_logs: Annotated[
         list[str] | None,
@@ -100,19 +94,12 @@ def identify(
     from cdtool.execution.workers import Workers
 
     targets = output or []
-    if by is not None and by not in _DIVISIONS:
-        raise UsageError(f"--by is '{by}'", nearest(by, _DIVISIONS))
-    check_identification_files(targets, machine, force=force, of_fleet=by is not None)
+    check_identification_files(targets, machine, force=force)
     loaded = _loaded_runs(loaded_logs, payload, payload_link, payload_centre)
     struck = _contact_logs(contacts or (), presses or (), lever_arm)
     if loaded is not None and struck is not None:
         raise UsageError("--loaded-logs with --contacts or --presses", "these are for robots, those for axes")
-    if by is not None and (loaded or struck) is not None:
-        raise UsageError("--by with logs of a payload or of contacts", "identify one machine at a time with them")
-    if by is not None:
-        _identify_fleet(logs, machine, by, targets, Workers(jobs), as_json=as_json, quiet=quiet)
-    else:
-        _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
+    _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
 
 
 def _loaded_runs(
@@ -185,57 +172,6 @@ def _identify_machine(
     else:
         _show(done, written, targets, quiet=quiet)
     leave(done.skipped)
-
-
-def _identify_fleet(
-    logs: Sequence[str],
-    machine: Path,
-    by: str,
-    targets: Sequence[Path],
-    workers: Workers,
-    *,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    from cdtool.commands.identify.files import write_fleet
-    from cdtool.commands.identify.fleet_identification import Division, identify_fleet
-    from cdtool.commands.judging.runs import find_logs
-
-    with progress("identifying", quiet=quiet) as advance:
-        fleet = identify_fleet(logs, machine, Division(by), workers=workers, progress=advance)
-    write_fleet(fleet, targets, [machine, *find_logs(logs, Path(), "LOGS")])
-    print_skipped(fleet.skipped, fleet.findings)
-    if as_json:
-        print_json(fleet.summary)
-    else:
-        _show_fleet(fleet, targets, quiet=quiet)
-    leave(fleet.skipped)
-
-
-def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path], *, quiet: bool) -> None:
-    rows = [
-        (
-            item.machine,
-            series.name,
-            number(series.values[0], 4),
-            number(series.values[-1], 4),
-            series.unit,
-            number(series.drift.standard_errors),
-        )
-        for item in fleet.machines
-        for series in item.changed
-    ]
-    if rows and not quiet:
-        columns = [("machine", "left"), ("parameter", "left"), ("first", "right"), ("last", "right"), ("unit", "left")]
-        table([*columns, ("change in\nstandard errors", "right")], rows)
-    changed = sum(bool(item.changed) for item in fleet.machines)
-    assessable = sum(any(len(series.periods) > 1 for series in item.series) for item in fleet.machines)
-    typer.echo(
-        f"{counted(len(fleet.machines), 'machine')} identified, {assessable} assessable over time, {changed} changed "
-        f"beyond 3 standard errors"
-    )
-    for target in targets:
-        typer.echo(f"written: {plain(target)}")
 
 
 def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path], *, quiet: bool) -> None:

@@ -1,4 +1,4 @@
-"""The HTML page of an identification, or of a fleet's: one file in the style of the benchmark report, without script.
+"""The HTML page of an identification: one file in the style of the benchmark report, without script.
 
 Text from logs and files is escaped by the template. A content security policy allows only this style and the figures.
 """
@@ -12,11 +12,10 @@ from functools import partial
 from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.excitation import PlannedMotion
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation
-from cdtool.commands.identify.fleet_identification import FleetIdentification, ParameterSeries
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.machine_update import MachineChange
-from cdtool.commands.identify.plots import draw_controller, draw_drift, draw_friction, draw_starts, draw_unseen_run
+from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
 from cdtool.commands.identify.robot.sections import robot_sections
 from cdtool.commands.identify.words import (
     listed_numbers,
@@ -28,10 +27,7 @@ from cdtool.commands.identify.words import (
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
 from cdtool.report.number_text import NOTHING, number, percent
-from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
-
-# The most machines with a figure, those that changed first: each takes 150 KB.
-_MOST_FIGURES = 40
+from cdtool.report.table import Cell, Heading, Table, number_cell, tabulate
 
 
 def identification_html(done: IdentifiedMachine) -> str:
@@ -193,75 +189,3 @@ def _prediction_table(validation: CrossValidation, force: str) -> Table:
 def _refused_table(joint: JointIdentification) -> Table:
     rows = [[Cell(method.replace("_", "-")), Cell(visible(reason))] for method, reason in joint.refused.items()]
     return Table("refused", "Methods that could not be used", (Heading("method"), Heading("reason")), rows)
-
-
-def drift_html(fleet: FleetIdentification) -> str:
-    """Return the page of a fleet: which parameters changed, and the parameters of each machine over time."""
-    changed = [(item.machine, series) for item in fleet.machines for series in item.changed]
-    names = dict.fromkeys(machine for machine, _ in changed)
-    assessable = sum(any(len(series.periods) > 1 for series in item.series) for item in fleet.machines)
-    sections = [
-        PageSection("Changed", (_drift_table(changed),) if changed else (), note=_DRIFT if changed else _NO_DRIFT),
-        PageSection("Machines", (_machines_table(fleet),)),
-    ]
-    for item in sorted(fleet.machines, key=lambda item: not item.changed)[:_MOST_FIGURES]:
-        several = [series for series in item.series if len(series.periods) > 1]
-        several.sort(key=lambda series: not series.drift.is_changed)
-        if several:
-            caption = visible(f"Periods: {', '.join(several[0].periods)}.")
-            image = images_of([(partial(draw_drift, several, item.machine), caption)])
-            sections.append(PageSection(visible(item.machine), images=image))
-    sections += left_out_sections(fleet.skipped, fleet.findings)
-    headline = f"{len(names)} of {counted(assessable, 'machine')} changed" if assessable else "No machine is assessable"
-    return SectionsPage(
-        "Identification",
-        "Model parameters over time",
-        headline,
-        f"A parameter changed if its change is beyond 3 standard errors. Divided by {fleet.by.value}.",
-        "unknown" if changed or not assessable else "good",
-        (counted(len(fleet.machines), "machine"), counted(sum(item.logs for item in fleet.machines), "log")),
-        tuple(section for section in sections if section.tables or section.images or section.note),
-    ).html()
-
-
-_DRIFT = (
-    "The standard errors contain the friction along the track, which is the same in all periods: a change that is not "
-    "listed may still exist. Temperature changes friction too."
-)
-_NO_DRIFT = "No parameter changed beyond 3 standard errors; a smaller change may exist."
-
-
-def _drift_table(changed: Sequence[tuple[str, ParameterSeries]]) -> Table:
-    fields = (
-        (Heading("machine"), lambda item: name_cell(visible(item[0]))),
-        (Heading("parameter"), lambda item: Cell(visible(item[1].name))),
-        (Heading("first period", numeric=True), lambda item: _value_cell(item[1], 0)),
-        (Heading("last period", numeric=True), lambda item: _value_cell(item[1], -1)),
-        (Heading("unit"), lambda item: Cell(item[1].unit)),
-        (Heading("change", numeric=True), lambda item: number_cell(item[1].drift.change)),
-        (Heading("in standard errors", numeric=True), lambda item: number_cell(item[1].drift.standard_errors)),
-        (Heading("kind"), lambda item: Cell(item[1].drift.kind.value)),
-    )
-    return tabulate("drift", "Parameters that changed beyond 3 standard errors", fields, changed)
-
-
-def _value_cell(series: ParameterSeries, period: int) -> Cell:
-    return Cell(f"{short_number(series.values[period], 4)} ± {short_number(series.standard_errors[period], 2)}")
-
-
-def _machines_table(fleet: FleetIdentification) -> Table:
-    """Return a row per machine and a column per parameter: value and standard error from all of its logs."""
-    names = dict.fromkeys((value.name, value.unit) for item in fleet.machines for value in item.parameters)
-    rows = []
-    for item in fleet.machines:
-        known = {(value.name, value.unit): value for value in item.parameters}
-        cells = [
-            Cell(f"{short_number(known[name].value, 5)} ± {short_number(known[name].standard_error, 2)}")
-            if name in known
-            else Cell(NOTHING)
-            for name in names
-        ]
-        rows.append([name_cell(visible(item.machine)), Cell(str(item.logs), key=item.logs), *cells])
-    headings = [f"{visible(name)} [{unit}]" if unit else visible(name) for name, unit in names]
-    columns = [Heading("machine"), Heading("logs", numeric=True), *(Heading(item, numeric=True) for item in headings)]
-    return Table("machines", "Parameters from all logs of a machine, ± standard error", columns, rows)

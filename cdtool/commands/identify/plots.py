@@ -1,20 +1,16 @@
-"""Figures of an identification that show the misfit: residuals of unseen runs, friction, starts, controller, drift."""
+"""Figures of an identification that show the misfit: residuals of unseen runs, friction, starts, controller."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation, RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerComparison
 from cdtool.commands.identify.axis.two_mass import StartComparison
-from cdtool.commands.identify.fleet_identification import ParameterSeries
 from cdtool.detectors.look import BLUE, RED
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure
@@ -154,39 +150,6 @@ def draw_controller(compared: ControllerComparison, unit: str) -> Figure:
         below.set_ylabel(f"difference [{unit}]")
         below.set_xlabel("time [s]")
         return figure
-
-
-def draw_drift(series: Sequence[ParameterSeries], machine: str) -> Figure:
-    """Draw a machine's parameters over its periods with two standard errors; changed ones are in another colour."""
-    columns = min(3, len(series))
-    rows = math.ceil(len(series) / columns)
-    with drawing():
-        figure = new_figure(3.1 * columns, 2.2 * rows + 0.3)
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for panel, item in zip(panels, series, strict=False):
-            _draw_series(panel, item)
-        for panel in panels[len(series) :]:
-            panel.set_visible(False)
-        figure.suptitle(f"{label(machine)}: parameters ± 2 standard errors over time", fontsize=9, x=0.01, ha="left")
-        return figure
-
-
-def _draw_series(axes: Axes, item: ParameterSeries) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    at = np.arange(1.0, len(item.periods) + 1.0)
-    colour = _RESIDUAL if item.drift.is_changed else _MEASURED
-    axes.errorbar(
-        at, item.values, yerr=2.0 * np.array(item.standard_errors), fmt="o", color=colour, markersize=4, capsize=2
-    )
-    if item.drift.is_changed:
-        axes.plot(at[[0, -1]], item.drift.line, color=colour, linewidth=1.0)
-    axes.set_xlim(0.5, len(at) + 0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylabel(f"[{item.unit}]" if item.unit else "")
-    changed = f": {item.drift.standard_errors:.1f} standard errors" if item.drift.is_changed else ""
-    axes.set_title(f"{label(item.name, 34)}{changed}", loc="left", color=colour, fontsize=8)
-    axes.set_xlabel(counted(len(at), "period") if len(at) < 2 else "period")
 
 
 def _thinned(index: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:

@@ -139,7 +139,6 @@ def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_writ
     [
         (["--payload", 2.0], "belong together"),
         (["--loaded-logs", "x.csv"], "belong together"),
-        (["--loaded-logs", "x.csv", "--payload", 2.0, "--by", "day"], "--by with logs of a payload or of contacts"),
         (["--loaded-logs", "x.csv", "--payload", -2.0], "--payload is -2"),
         (["--payload-link", "hand"], "--payload-link without --payload"),
         (["--payload-centre", "0,0,1"], "--payload-centre without --payload"),

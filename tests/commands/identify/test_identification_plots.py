@@ -11,8 +11,7 @@ from cdtool.commands.identify.axis.rigid_axis import CrossValidation, UnseenRun,
 from cdtool.commands.identify.axis.speed_controller import ControllerComparison
 from cdtool.commands.identify.axis.start_ensemble import StartEnsemble
 from cdtool.commands.identify.axis.two_mass import StartComparison
-from cdtool.commands.identify.fleet_identification import ParameterSeries, drift_of
-from cdtool.commands.identify.plots import draw_controller, draw_drift, draw_friction, draw_starts, draw_unseen_run
+from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
 from cdtool.report.plots.figures import png
 from tests.synthetic.gate_runs import GATE, free_runs
 
@@ -72,18 +71,6 @@ def test_the_controllers_difference_is_stated() -> None:
     above, below = draw_controller(compared, "N").axes
     assert "torque reference, difference 2.00 N RMS" in above.get_title(loc="left")
     assert np.all(below.get_lines()[0].get_ydata() == -2.0)
-
-
-def test_a_parameter_that_changed_has_another_colour_and_its_line() -> None:
-    errors = np.full(4, 2.0)
-    series = []
-    for name, values in (("grown", np.array([200.0, 210.0, 221.0, 230.0])), ("same", np.full(4, 5.0))):
-        periods = tuple("abcd")
-        series.append(ParameterSeries(name, "N", periods, tuple(values), tuple(errors), drift_of(values, errors)))
-    grown, same = [axes for axes in draw_drift(series, "gate").axes if axes.get_visible()]
-    assert "standard errors" in grown.get_title(loc="left")
-    assert same.get_title(loc="left") == "same"
-    assert len(grown.get_lines()) == len(same.get_lines()) + 1
 
 
 def test_the_same_content_has_the_same_bytes() -> None:
