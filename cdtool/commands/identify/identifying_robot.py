@@ -23,10 +23,7 @@ from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFr
 from cdtool.commands.identify.robot.planar_links import planar_links
 from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
 from cdtool.commands.identify.robot.robot_dynamics import (
-    HALF_WIDTH,
     RobotFit,
-    RobotParameters,
-    TorqueError,
     identify_robot,
     joint_estimates,
 )
@@ -80,14 +77,13 @@ class LoadedRuns:
 class InertiaIdentification:
     """The inertial parameters of all links: whether the runs determine them, and whether they replace the present ones.
 
-    `base`: the base parameters by least squares, with `condition_number` of the scaled equations and the `errors` of
-    their torques. `not_identifiable`: why they are no complete set; empty if they are. `refused`: why a complete set
-    does not replace the present inertias. `residual_rise`: relative, by links that are physical.
+    `base`: the base parameters by least squares, with `condition_number` of the scaled equations. `not_identifiable`:
+    why they are no complete set; empty if they are. `refused`: why a complete set does not replace the present
+    inertias. `residual_rise`: relative, by links that are physical.
     """
 
     base: BaseParameterSet
     condition_number: float
-    errors: TorqueError
     not_identifiable: tuple[NotIdentifiable, ...]
     refused: str = ""
     is_new: bool = False
@@ -151,7 +147,6 @@ class RobotIdentification:
                 "identifiable": list(inertias.base.identifiable),
                 "condition_number": inertias.condition_number,
                 "not_identifiable": [item.summary for item in inertias.not_identifiable],
-                "torque_error": {key: value.tolist() for key, value in vars(inertias.errors).items()},
                 "refused": inertias.refused or None,
                 "is_new": inertias.is_new,
                 "residual_rise": inertias.residual_rise,
@@ -212,19 +207,19 @@ def identify_joints(
         for item in gains.estimates:
             factors[item.joint] = item.value / present[item.joint]
         runs = [replace(run, torque=run.torque * factors) for run in runs]
-    explained = without_unexplained(runs, machine, HALF_WIDTH)
+    explained = without_unexplained(runs, machine)
     if explained.share > _MOST_UNEXPLAINED:
         raise IdentificationError(
             f"no friction explains the torque during {100.0 * explained.share:.0f} % of the motion",
             "leave out logs with contacts and stops; check the order, signs and units of the channels",
         )
-    joints, fits = choose_friction(explained.runs, machine, HALF_WIDTH)
-    whole = identify_robot(explained.runs, machine, RobotParameters(inertial=True, half_width=HALF_WIDTH))
+    joints, fits = choose_friction(explained.runs, machine)
+    whole = identify_robot(explained.runs, machine, frozenset(FrictionForm.WITH_INERTIAS.groups))
     inertias, joints, urdf = _with_inertias(whole, joints, given, folder)
     refused: tuple[Mapping[str, str], ...] = ({},) * len(joints)
     if not inertias.is_new:
         joints, refused = _refuse_unexplained(joints, machine)
-    floor = repeated_runs(runs, HALF_WIDTH)
+    floor = repeated_runs(runs)
     fits = {**fits, FrictionForm.WITH_INERTIAS: whole}
     evidence = tuple(
         joint_evidence(motion, friction.compared, fits, explained.runs)
@@ -299,7 +294,7 @@ def _with_inertias(
 ) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
     """Return the inertias, the joints, and the text of the URDF, new where the runs determine the inertias."""
     missing = tuple(item for item in fit.identified.not_identifiable if item.key == "base_parameters")
-    found = InertiaIdentification(fit.base, fit.condition_number, fit.torque_error, missing)
+    found = InertiaIdentification(fit.base, fit.condition_number, missing)
     if missing:
         return found, joints, ""
     if not _predicts_better(fit, joints):
@@ -321,8 +316,9 @@ def _predicts_better(fit: RobotFit, joints: Sequence[JointFriction]) -> bool:
     previous: dict[int, FloatArray] = {joint: fit.left_out.of_joint(joint, is_previous=True) for joint in moving}
     if any(fit.left_out.is_worse(joint, previous[joint], 1.0) for joint in moving):
         return False
-    new, alone = fit.torque_error.cross_validated, [joints[joint].errors[joints[joint].form] for joint in moving]
-    gain = sum(math.log(max(new[joint], 1e-300) / max(own, 1e-300)) for joint, own in zip(moving, alone, strict=True))
+    new = [fit.left_out.error(joint) for joint in moving]
+    alone = [joints[joint].errors[joints[joint].form] for joint in moving]
+    gain = sum(math.log(max(error, 1e-300) / max(own, 1e-300)) for error, own in zip(new, alone, strict=True))
     return gain < 0.0 and any(fit.left_out.is_better(joint, previous[joint], 1.0) for joint in moving)
 
 
@@ -363,7 +359,7 @@ def _joints_with_inertias(
         own = tuple(estimate for estimate in links if estimate.joint == item.joint)
         refused = fit.identified.not_identifiable
         missing = tuple(entry for entry in refused if entry.joint == item.joint and entry.key != "base_parameters")
-        errors = {**item.errors, FrictionForm.WITH_INERTIAS: float(fit.torque_error.cross_validated[item.joint])}
+        errors = {**item.errors, FrictionForm.WITH_INERTIAS: fit.left_out.error(item.joint)}
         complete.append(
             replace(
                 item,
