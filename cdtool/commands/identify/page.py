@@ -97,10 +97,9 @@ def _values(values: Sequence[float], significant: int) -> str:
 
 
 def _missing_table(joint: JointIdentification) -> Table:
-    excitation, travel = joint.excitation, joint.units[2]
     fields = (
         (Heading("parameter"), lambda item: Cell(f"{item.section}.{item.key}")),
-        (Heading("because"), lambda item: Cell(words_of_reason(item, excitation, travel))),
+        (Heading("because"), lambda item: Cell(words_of_reason(item))),
         (Heading("add"), lambda item: Cell(words_of_needs(item.missing) or NOTHING)),
     )
     return tabulate("missing", "Not identifiable from these logs", fields, joint.not_identifiable)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from cdtool.base.plain_text import counted, digits
-from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion
+from cdtool.commands.identify.axis.excitation import PlannedMotion, relative_error
 from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.commands.identify.identifying_robot import RobotIdentification
 from cdtool.commands.identify.joint import JointIdentification
@@ -139,73 +139,35 @@ def words_of_needs(missing: Sequence[Missing]) -> str:
     return ", ".join(kind.value for kind in missing)
 
 
-def words_of_reason(item: NotIdentifiable, excitation: Excitation | None, travel_unit: str) -> str:
+def words_of_reason(item: NotIdentifiable) -> str:
     """Return why a parameter is not identifiable, with the numbers that show it."""
-    reasons = [_REASONS[kind](item, excitation, travel_unit) for kind in item.missing if kind in _REASONS]
-    others = [f"not in these logs: {kind.value}" for kind in item.missing if kind not in _REASONS]
-    return "; ".join([*reasons, *others]) or "these logs show only its sum with another parameter"
+    reasons = [_REASONS.get(kind, f"not in these logs: {kind.value}") for kind in item.missing]
+    numbers = [text.format(item.numbers[key]) for key, text in _NUMBERS.items() if key in item.numbers]
+    if math.isfinite(relative := relative_error(item)):
+        numbers.append(f"its standard error is {percent(relative)} of its value")
+    words = "; ".join(reasons) or "these logs show only its sum with another parameter"
+    return f"{words} ({', '.join(numbers)})" if numbers else words
 
 
-def _few_speeds(item: NotIdentifiable, excitation: Excitation | None, travel_unit: str) -> str:
-    if excitation is not None and excitation.speeds:
-        held = f"{counted(len(excitation.speeds), 'speed')} ({listed_numbers(excitation.speeds)} {travel_unit}/s)"
-    else:
-        held = counted(int(item.numbers.get("speeds", 0.0)), "held speed")
-    return f"{held}: viscous friction cannot be told from Coulomb friction"
-
-
-def _one_direction(_: NotIdentifiable, excitation: Excitation | None, __: str) -> str:
-    share = "" if excitation is None else f" ({percent(max(excitation.forward_share, 1.0 - excitation.forward_share))})"
-    return f"one direction{share}: only the sum of friction and constant force is known"
-
-
-def _weak_acceleration(item: NotIdentifiable, excitation: Excitation | None, travel_unit: str) -> str:
-    if excitation is None or "acceleration" not in item.numbers:
-        return "hardly any acceleration"
-    return (
-        f"hardly any acceleration: {number(excitation.acceleration)} {travel_unit}/s² RMS, "
-        f"noise {number(excitation.acceleration_noise)}"
-    )
-
-
-def _too_uncertain(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    numbers = item.numbers
-    value, error = abs(numbers.get("value", 0.0)), numbers.get("standard_error", math.nan)
-    relative = numbers.get("relative_standard_error", error / value if value > 0.0 else math.nan)
-    return f"its standard error is {percent(relative)} of its value" if math.isfinite(relative) else "too few runs"
-
-
-def _no_limit(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    largest = item.numbers.get("largest_n")
-    return "the command never reached a limit" + ("" if largest is None else f" (largest: {number(largest)})")
-
-
-def _unknown_filter(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    lag = item.numbers.get("lag_s", math.nan)
-    size = f" of {number(1e3 * lag)} ms" if math.isfinite(lag) else ""
-    return f"the lag{size} between command and measured torque contains the unknown one of the torque's low-pass"
-
-
-def _other_controller(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    left = percent(item.numbers.get("unexplained_share", math.nan))
-    return (
-        f"P and PI control, alone or under a position controller, leave {left} of the controller's output unexplained "
-        "(feed-forward, or references of another log?)"
-    )
-
-
-def _no_position(_: NotIdentifiable, __: Excitation | None, ___: str) -> str:
-    return "no position channel: a delay of the speed channel looks like damping"
-
-
-_Reason = Callable[[NotIdentifiable, Excitation | None, str], str]
-_REASONS: Mapping[Missing, _Reason] = {
-    Missing.SECOND_SPEED: _few_speeds,
-    Missing.REVERSALS: _one_direction,
-    Missing.ACCELERATION: _weak_acceleration,
-    Missing.MORE_RECORDINGS: _too_uncertain,
-    Missing.SATURATION: _no_limit,
-    Missing.TORQUE_FILTER: _unknown_filter,
-    Missing.OTHER_CONTROLLER: _other_controller,
-    Missing.POSITION: _no_position,
+_REASONS: Mapping[Missing, str] = {
+    Missing.SECOND_SPEED: "too few speeds: viscous friction cannot be told from Coulomb friction",
+    Missing.REVERSALS: "one direction: only the sum of friction and constant force is known",
+    Missing.ACCELERATION: "hardly any acceleration",
+    Missing.MORE_RECORDINGS: "too few runs",
+    Missing.SATURATION: "the command never reached a limit",
+    Missing.TORQUE_FILTER: "the lag between command and measured torque contains that of the torque's low-pass",
+    Missing.OTHER_CONTROLLER: (
+        "P and PI control, alone or under a position controller, do not explain the controller's output (feed-forward, "
+        "or references of another log?)"
+    ),
+    Missing.POSITION: "no position channel: a delay of the speed channel looks like damping",
+}
+# Numbers of a parameter that is not identifiable, as they are shown.
+_NUMBERS: Mapping[str, str] = {
+    "speeds": "held: {:.0f}",
+    "acceleration": "RMS {:.3g}",
+    "acceleration_noise": "noise {:.3g}",
+    "largest_n": "largest: {:.3g}",
+    "lag_s": "{:.3g} s",
+    "unexplained_share": "left: {:.0%}",
 }

@@ -299,14 +299,15 @@ def _from_rest(plan: PlannedMotion, _: Excitation, __: Sequence[NotIdentifiable]
 
 def _more_runs(plan: PlannedMotion, excitation: Excitation, items: Sequence[NotIdentifiable]) -> PlannedMotion:
     """Return the plan with as many runs as bring the largest relative standard error down to what is wanted."""
-    relative = max((_relative_error(item) for item in items), default=math.nan)
+    relative = max((relative_error(item) for item in items), default=math.nan)
     strokes = max(excitation.strokes, 1)
     factor = (relative / _WANTED_ERROR) ** 2 - 1.0 if math.isfinite(relative) else 1.0
     runs = max(math.ceil(strokes * factor / len(plan.directions)), _RUNS)
     return replace(plan, speeds=plan.logged_speeds, runs=min(runs, _MOST_RUNS))
 
 
-def _relative_error(item: NotIdentifiable) -> float:
+def relative_error(item: NotIdentifiable) -> float:
+    """Return the relative standard error of a parameter that is too uncertain; NaN where it is not known."""
     numbers = item.numbers
     if "relative_standard_error" in numbers:
         return numbers["relative_standard_error"]

@@ -110,6 +110,8 @@ _FIRST_CORNER, _FIRST_ANTI_WINDUP = 0.15, 5.0
 # A lag of this share of a period is none; a fit with a limit begins with at most so many periods, as a limit that is
 # not in the model looks like a lag.
 _LEAST_LAG, _LONGEST_FIRST_LAG = 0.2, 15.0
+# A drive's torque follows within this time [s]: a longer lag would stand for an integral.
+_LONGEST_LAG = 0.2
 # A command above its limit by more than the log's rounding has another limit, or none.
 _BEYOND_LIMIT = 1.005
 # A value reached by so many samples, all within the log's quantum, is a limit.
@@ -366,7 +368,7 @@ def _lowest(name: str, period: float) -> float:
 
 
 def _highest(name: str, period: float) -> float:
-    return 1.0 / period if name == "speed_filter_hz" else math.inf
+    return {"speed_filter_hz": 1.0 / period, "lag": _LONGEST_LAG}.get(name, math.inf)
 
 
 @dataclass(frozen=True)
@@ -659,9 +661,8 @@ def _search(runs: Sequence[AxisRun], settings: ControllerSettings) -> _Search | 
         if sections is None:
             continue
         sections = sections.part(settings.compared_samples)
-        models = [_starting_model(sections, source, order) for order in source.orders]
-        fit = min((_OutputError(sections, model).fit(_CHOSEN) for model in models), key=lambda fit: fit.cost)
-        fit = _improved(fit, source, settings)
+        fits = [_first_fit(sections, _starting_model(sections, source, order), source) for order in source.orders]
+        fit = _improved(min(fits, key=lambda fit: fit.cost), source, settings)
         if found is None or fit.residual_rms**2 < _share_needed(source, found.source) * found.fit.residual_rms**2:
             found = _Search(source, fit)
         if found.needs_no_other:
@@ -700,6 +701,21 @@ def _starting_model(sections: _Sections, source: _Source, order: int) -> _Model:
     return _Model(values, tuple(free))
 
 
+def _first_fit(sections: _Sections, model: _Model, source: _Source) -> _Fit:
+    """Return the fit without limits, or with those that plateaus of a command show if they explain more."""
+    fit = _OutputError(sections, model).fit(_CHOSEN)
+    change: FloatArray = np.abs(np.diff(sections.output))
+    change[sections.starts[1:-1] - 1] = 0.0
+    slew, force = _plateau(change), _plateau(np.abs(sections.output))
+    limits = {"slew_limit": slew / sections.period} if slew is not None else {}
+    limits |= {"force_limit": force} if force is not None else {}
+    if not (source.is_command and limits):
+        return fit
+    limited = model.with_values({**limits, "anti_windup_rate": _FIRST_ANTI_WINDUP}, (*limits, "anti_windup_rate"))
+    other = _OutputError(sections, limited).fit(_CHOSEN)
+    return other if _is_better(other, fit) else fit
+
+
 def _improved(fit: _Fit, source: _Source, settings: ControllerSettings) -> _Fit:
     """Return the fit with what explains most, one after another: another delay, limits, an offset of the error."""
     while not fit.is_exact:
@@ -716,9 +732,10 @@ def _improved(fit: _Fit, source: _Source, settings: ControllerSettings) -> _Fit:
 def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[_Model]:
     """Yield the models that differ from a fit in one thing."""
     model, period = fit.model, fit.sections.period
-    # A limit that is not in the model looks like a lag.
+    # A delay or a limit that is not in the model looks like a filter, a limit also like a lag.
+    filtered = {"speed_filter_hz": _FIRST_CORNER / period} if "speed_filter_hz" in model.free else {}
     lag = min(model.values["lag"], _LONGEST_FIRST_LAG * period)
-    first = {"anti_windup_rate": model.values["anti_windup_rate"] or _FIRST_ANTI_WINDUP, "lag": lag}
+    first = {**filtered, "lag": lag, "anti_windup_rate": model.values["anti_windup_rate"] or _FIRST_ANTI_WINDUP}
     for name, candidates in (("slew_limit", _slew_candidates), ("force_limit", _force_candidates)):
         if name not in model.free:
             for value in candidates(fit, source):
@@ -727,7 +744,7 @@ def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[
     for delay in every:
         # In a measured torque, which lags, a delay shows from sample to sample only.
         if delay != present and (source.is_command or abs(delay - present) <= 1.0):
-            yield model.with_values({"delay_samples": float(delay)})
+            yield model.with_values({**filtered, "delay_samples": float(delay)})
     if "error_offset" not in model.free:  # as a bias of the logged speed has it
         yield model.with_values({}, ("error_offset",))
 
@@ -738,29 +755,21 @@ def _exceeds_its_limit(fit: _Fit) -> bool:
 
 
 def _slew_candidates(fit: _Fit, source: _Source) -> list[float]:
-    """Return slew limits to try [N/s]: a plateau of a command's steps, and high quantiles of the slope over samples."""
+    """Return slew limits to try [N/s]: high quantiles of the slope over several samples, so that noise is less."""
     sections = fit.sections
-    plateau = None
-    if source.is_command:
-        change: FloatArray = np.abs(np.diff(sections.output))
-        change[sections.starts[1:-1] - 1] = 0.0
-        plateau = _plateau(change)
     lags = min(fit.model.values["lag"] / sections.period, _LONGEST_FIRST_LAG)
     window = 4 if source.is_command else max(4, round(3.0 * lags))
     if window >= len(sections) // 4:
         return []
     smooth = sections.output if source.is_command else _mean_over(sections.output, window)
     slope = np.abs(smooth[window:] - smooth[:-window]) / (window * sections.period)
-    steep = [float(value) for value in np.quantile(slope, (0.8, 0.9, 0.95, 0.99)) if value > 0.0]
-    return steep if plateau is None else [plateau / sections.period, *steep]
+    return [float(value) for value in np.quantile(slope, (0.8, 0.95, 0.99)) if value > 0.0]
 
 
-def _force_candidates(fit: _Fit, source: _Source) -> list[float]:
-    """Return force limits to try [N]: a plateau of a command, and that above which only noise is."""
-    size = np.abs(fit.sections.output)
-    plateau = _plateau(size) if source.is_command else None
-    largest = float(np.quantile(size, 0.995))
-    return [value for value in (plateau, largest) if value]
+def _force_candidates(fit: _Fit, _: _Source) -> list[float]:
+    """Return a force limit to try [N]: that above which only noise is."""
+    largest = float(np.quantile(np.abs(fit.sections.output), 0.995))
+    return [largest] if largest > 0.0 else []
 
 
 def _plateau(values: FloatArray) -> float | None:
