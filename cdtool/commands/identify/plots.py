@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
+from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation, RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerComparison
@@ -32,25 +34,20 @@ def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
     """
     unseen = validation.worst
     index = _thinned(np.arange(len(unseen.time)))
-    time, measured, predicted = unseen.time[index], unseen.measured[index], unseen.predicted[index]
+    time = unseen.time[index]
+    measured, predicted = (_gaps(time, values[index]) for values in (unseen.measured, unseen.predicted))
+    what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "strokes of the only run"
+    floor = np.full(len(time), validation.floor) if validation.repeats else None
     with drawing():
         figure = new_figure(_WIDTH, 4.6)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        above.plot(time, _gaps(time, measured), color=_UNDER, linewidth=2.4, label="measured")
-        above.plot(time, _gaps(time, predicted), color=_MODEL, linewidth=1.0, label="model")
-        above.set_ylabel(f"force [{unit}]")
-        above.legend(loc="upper right", ncols=2)
-        what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "strokes of the only run"
-        error = number(unseen.error)
-        above.set_title(f"{label(unseen.run)}, left out of the fit ({what}): {error} {unit} RMS", loc="left")
-        if validation.repeats:
-            name = "between equal strokes (± 1 standard deviation)"
-            below.axhspan(-validation.floor, validation.floor, color=_BAND, linewidth=0, label=name)
-        below.plot(time, _gaps(time, measured - predicted), color=_RESIDUAL, linewidth=0.9, label="residual")
-        below.axhline(0.0, color="0.3", linewidth=0.6)
-        below.set_ylabel(f"residual [{unit}]")
-        below.set_xlabel("time [s]")
-        below.legend(loc="upper right", ncols=2)
+        panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _compare(
+            panels, time, (measured, predicted), f"force [{unit}]", (floor, "between equal strokes (± 1 st. dev.)")
+        )
+        title = f"{label(unseen.run)}, left out of the fit ({what}): {number(unseen.error)} {unit} RMS"
+        panels[0].set_title(title, loc="left")
+        for panel in panels:
+            panel.legend(loc="upper right", ncols=2)
         return figure
 
 
@@ -104,52 +101,54 @@ def draw_starts(start: StartComparison, units: tuple[str, str, str]) -> Figure:
     with drawing():
         figure = new_figure(_WIDTH, 4.4)
         panels = figure.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(3, 2))
-        for (above, below), name in zip(panels.T, names, strict=True):
-            measured, model, deviation = ensemble.mean[name], start.modelled[name], ensemble.deviation[name]
-            above.plot(time, measured, color=_UNDER, linewidth=2.6, label=f"mean of {ensemble.count} starts")
-            above.plot(time, model, color=_MODEL, linewidth=1.2, label="model")
-            above.set_ylabel(f"{titles[name]} [{of_channel[name]}]")
-            if ensemble.count > 1:
-                below.fill_between(
-                    time, -deviation, deviation, color=_BAND, linewidth=0, label="between runs (± 1 st. dev.)"
-                )
-            below.plot(time, measured - model, color=_RESIDUAL, linewidth=0.9, label="measured − model")
-            below.axhline(0.0, color="0.3", linewidth=0.6)
-            below.set_ylabel(f"difference [{of_channel[name]}]")
-            below.set_xlabel("time from the start of the motion [s]")
+        for column, name in zip(panels.T, names, strict=True):
+            lines = ensemble.mean[name], start.modelled[name]
+            band = ensemble.deviation[name] if ensemble.count > 1 else None
+            axis = f"{titles[name]} [{of_channel[name]}]"
+            _compare(column, time, lines, axis, (band, "between runs (± 1 st. dev.)"))
+            column[1].set_xlabel("time from the start of the motion [s]")
         panels[0, 0].legend(loc="lower right")
         panels[1, 0].legend(loc="upper right")
         direction = "forward" if ensemble.direction > 0 else "backward"
-        figure.suptitle(
-            f"Starts {direction} to {number(ensemble.nominal_speed)} {speed}, driven by their mean force",
-            fontsize=9,
-            x=0.01,
-            ha="left",
-        )
+        starts, top = counted(ensemble.count, "start"), f"{number(ensemble.nominal_speed)} {speed}"
+        title = f"Mean of {starts} {direction} to {top}, and the model driven by its force"
+        figure.suptitle(title, fontsize=9, x=0.01, ha="left")
         return figure
 
 
 def draw_controller(compared: ControllerComparison, unit: str) -> Figure:
     """Draw the logged command and the identified controller's, and their difference."""
     index = _thinned(np.arange(len(compared.time)))
-    time = compared.time[index]
-    measured, computed = compared.measured[index], compared.computed[index]
-    difference = compared.measured - compared.computed
+    lines = compared.measured[index], compared.computed[index]
     name = "torque reference" if compared.is_command else "force"
     with drawing():
         figure = new_figure(_WIDTH, 4.2)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        above.plot(time, measured, color=_UNDER, linewidth=2.6, label="logged")
-        above.plot(time, computed, color=_MODEL, linewidth=0.9, linestyle=(0, (5, 2)), label="computed")
-        above.set_ylabel(f"{name} [{unit}]")
-        above.legend(loc="upper right", ncols=2)
-        error = number(float(np.sqrt(np.mean(difference**2))))
-        above.set_title(f"{name}, difference {error} {unit} RMS", loc="left")
-        below.plot(time, difference[index], color=_RESIDUAL, linewidth=0.8)
-        below.axhline(0.0, color="0.3", linewidth=0.6)
-        below.set_ylabel(f"difference [{unit}]")
-        below.set_xlabel("time [s]")
+        panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _compare(panels, compared.time[index], lines, f"{name} [{unit}]")
+        error = number(float(np.sqrt(np.mean((compared.measured - compared.computed) ** 2))))
+        panels[0].set_title(f"{name}, difference {error} {unit} RMS", loc="left")
+        panels[0].legend(loc="upper right", ncols=2)
         return figure
+
+
+def _compare(
+    panels: Sequence[Axes],
+    time: FloatArray,
+    lines: tuple[FloatArray, FloatArray],
+    axis: str,
+    band: tuple[FloatArray | None, str] = (None, ""),
+) -> None:
+    """Draw measured and modelled lines (n,) above, and below them their difference over a band of what is usual."""
+    (above, below), (measured, modelled), (usual, name) = panels, lines, band
+    above.plot(time, measured, color=_UNDER, linewidth=2.5, label="measured")
+    above.plot(time, modelled, color=_MODEL, linewidth=1.1, label="model")
+    above.set_ylabel(axis)
+    if usual is not None:
+        below.fill_between(time, -usual, usual, color=_BAND, linewidth=0, label=name)
+    below.plot(time, measured - modelled, color=_RESIDUAL, linewidth=0.9, label="measured − model")
+    below.axhline(0.0, color="0.3", linewidth=0.6)
+    below.set_ylabel(f"difference {axis[axis.index('[') :]}")
+    below.set_xlabel("time [s]")
 
 
 def _thinned(index: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:

@@ -34,11 +34,11 @@ def test_the_residual_is_drawn_with_its_size_and_the_floor() -> None:
     above, below = figure.axes
     assert "25.0 N RMS" in above.get_title(loc="left")
     assert "largest error of 10" in above.get_title(loc="left")
-    residual = lines(below)["residual"].get_ydata()
+    residual = lines(below)["measured − model"].get_ydata()
     assert np.nanmax(np.abs(residual - 25.0)) < 1e-9
     assert np.isnan(residual).any()  # where the axis rests
-    (band,) = below.patches
-    assert band.get_height() == pytest.approx(10.0)
+    (band,) = below.collections
+    assert np.ptp(band.get_paths()[0].vertices[:, 1]) == pytest.approx(10.0)
 
 
 def test_friction_has_bars_of_two_standard_errors_and_the_model_over_the_same_speeds() -> None:
