@@ -23,7 +23,7 @@ from cdtool.commands.identify.words import (
     words_of_robot_plan,
 )
 
-EXCITATION = Excitation((0.25,), 1.0, 0.0, 0.26, 0.08, 0.003, 14.0, 70.0, 10, 0, 0.3)
+EXCITATION = Excitation((0.25,), 1.0, 0.26, 0.08, 0.003, 14.0, 70.0, 10, 0, 0.3)
 RUNS = PlannedMotion(Missing.SECOND_SPEED, ("machine.viscous_friction",), 4, (0.06, 0.1), (0.25,), (1, -1), travel=1.4)
 
 

@@ -356,7 +356,7 @@ class _LagAnswer:
 
 def _torque_lag(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _LagAnswer:
     stated = _LagAnswer(TorqueLag(settings.torque_filter_time or 0.0))
-    if _is_noisy(excitation, settings) or Missing.ACCELERATION in excitation.missing:
+    if _is_noisy(excitation, settings) or not excitation.is_accelerated:
         return stated
     fitted = equations.filtered, equations.rows, _chosen_columns(excitation)
     try:
@@ -491,8 +491,7 @@ def _load_mass(
     solution: _AxisSolution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings
 ) -> Estimate | NotIdentifiable:
     load, error, most = solution.mass - motor_mass, solution.mass_error, settings.largest_mass_error
-    is_accelerated = Missing.ACCELERATION not in excitation.missing
-    if is_accelerated and _is_certain(load, error, most):
+    if excitation.is_accelerated and _is_certain(load, error, most):
         return Estimate("machine", "load_mass", load, error, settings.units[0], solution.method)
     numbers = {
         "total_mass": solution.mass,
@@ -504,7 +503,7 @@ def _load_mass(
     missing = [Missing.ACCELERATION]
     if _is_noisy(excitation, settings):
         missing.append(Missing.FINER_MOTION)
-    if is_accelerated and load < error and _is_certain(solution.mass, error, 0.5 * most):
+    if excitation.is_accelerated and load < error and _is_certain(solution.mass, error, 0.5 * most):
         # The total is known; that the motor alone has as much is a question of the motor's inertia.
         missing = [Missing.MOTOR_INERTIA]
     elif math.isinf(error):

@@ -47,7 +47,6 @@ def test_the_held_speeds_are_found(speeds):
     excitation = excitation_of(*(stroke(speed) for speed in speeds))
     assert excitation.speeds == pytest.approx(speeds, rel=0.01)
     assert excitation.strokes == len(speeds)
-    assert (Missing.SECOND_SPEED in excitation.missing) == (len(speeds) < 3)
 
 
 def test_a_short_ramp_is_not_a_second_speed():
@@ -59,29 +58,27 @@ def test_a_sine_holds_many_speeds():
     excitation = excitation_of(0.3 * np.sin(2.0 * math.pi * 0.4 * time))
     assert len(excitation.speeds) >= 3
     assert excitation.forward_share == pytest.approx(0.5, abs=0.02)
-    assert excitation.missing == ()
+    assert excitation.is_accelerated and not excitation.is_one_way
     assert excitation.reversals == 15
 
 
 def test_one_direction_and_hardly_any_acceleration_are_missing():
     excitation = excitation_of(np.full(5000, -0.2), noise=1e-3)
     assert excitation.is_one_way
-    assert Missing.REVERSALS in excitation.missing
-    assert Missing.ACCELERATION in excitation.missing
+    assert not excitation.is_accelerated
     assert excitation.travel == pytest.approx(2.0, rel=0.02)
 
 
 def test_acceleration_above_its_noise_is_enough():
     excitation = excitation_of(stroke(0.2), stroke(-0.2), noise=1e-4)
-    assert Missing.ACCELERATION not in excitation.missing
-    assert Missing.REVERSALS not in excitation.missing
+    assert excitation.is_accelerated and not excitation.is_one_way
     assert excitation.moving_time == pytest.approx(8.8, rel=0.05)
 
 
 def test_standstill_excites_nothing():
     excitation = excitation_of(np.zeros(2000), noise=1e-4)
     assert excitation.moving_time < 0.1
-    assert Missing.ACCELERATION in excitation.missing
+    assert not excitation.is_accelerated
     assert measure_excitation([]).speeds == ()
 
 
