@@ -13,7 +13,7 @@ import numpy as np
 
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
 from cdtool.base.files.bounded_loading import read_text
-from cdtool.base.files.writing import replaced
+from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.base.tables import read_toml
@@ -168,7 +168,7 @@ def identify(
     """
     target = None if output is None else location(output)
     path = location(machine)
-    if target is not None and target.exists() and not force and not _same(target, path):
+    if target is not None and target.exists() and not force and target.resolve() != path.resolve():
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
     payload, contacts = _for_this_machine(other_logs, machine_file)
@@ -210,9 +210,7 @@ def identify(
     files = identified.files_for(target) if target is not None else ()
     if not files:
         return identified
-    with replaced(*(file for file, _ in files)) as parts:
-        for part, (_, content) in zip(parts, files, strict=True):
-            part.write_bytes(content.encode("utf-8", "replace"))
+    write_texts(dict(files))
     return replace(identified, written=str(target))
 
 
@@ -293,10 +291,6 @@ def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
     missing = [item for joint in joints for item in joint.not_identifiable if item.section != "model.controller"]
     reasons += [f"{item.key} needs {', '.join(kind.value for kind in item.missing)}" for item in missing]
     return list(dict.fromkeys(reasons))[:_MOST_REASONS]
-
-
-def _same(one: Path, other: Path) -> bool:
-    return one.resolve() == other.resolve()
 
 
 def _identify_joint(
