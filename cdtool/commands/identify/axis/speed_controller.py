@@ -737,7 +737,7 @@ def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[
     lag = min(model.values["lag"], _LONGEST_FIRST_LAG * period)
     first = {**filtered, "lag": lag, "anti_windup_rate": model.values["anti_windup_rate"] or _FIRST_ANTI_WINDUP}
     for name, candidates in (("slew_limit", _slew_candidates), ("force_limit", _force_candidates)):
-        if name not in model.free and not fit.explains_all:
+        if name not in model.free:
             for value in candidates(fit, source):
                 yield model.with_values({**first, name: value}, (name, "anti_windup_rate"))
     present, every = model.values["delay_samples"], range(-1 if source.is_command else 0, settings.largest_delay + 1)
