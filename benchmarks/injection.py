@@ -232,7 +232,9 @@ def compare_gate(seed: int, model: AxisModel, kind: Impact, references: bool, pa
     names = [name for name in DETECTORS.usable_names() if name not in LEFT_OUT]
     names = [name for name in names if references or name not in WITH_REFERENCES]
     if model.controller is None:
-        names = [name for name in names if name != "pure_torque"]
+        # Pure inertia sees the soft impact after 390 ms, when neither bound of the controller's reaction holds.
+        unseen = {"pure_torque"} | ({"pure_inertia"} if kind == "soft" else set())
+        names = [name for name in names if name not in unseen]
     learned = [logged(free_recording(GATE, seed, number)) for number in range(LEARNED)]
     obstacle: Obstacle = {"stiff": stiff_obstacle(GATE), "soft": soft_obstacle(GATE)}[kind]
     return compare(ON_LOAD_SIDE, learned, twins, model, obstacle, names)

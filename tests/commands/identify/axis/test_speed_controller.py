@@ -422,7 +422,7 @@ def test_references_of_another_motion_explain_nothing() -> None:
 
 
 def test_a_log_without_references_is_refused(runs: list[AxisRun]) -> None:
-    """At constant speed gains came out up to 6 standard errors wrong: what the reference did there is not known."""
+    """At constant speed gains came out up to 7 standard errors wrong: what the reference did there is not known."""
     for channels in ({"reference_speed": None}, {"speed": None, "reference_speed": None}):
         with pytest.raises(IdentificationError, match="a reference"):
             identify_controller([replace(run, **channels) for run in runs[:2]])
