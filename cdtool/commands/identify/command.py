@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cdtool.base.errors import UsageError, nearest
+from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted, digits
 from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
@@ -20,13 +20,11 @@ from cdtool.commands.console.place import Place, location
 if TYPE_CHECKING:
     from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
     from cdtool.commands.identify.estimate import NotIdentifiable
-    from cdtool.commands.identify.fleet_identification import FleetIdentification
-    from cdtool.commands.identify.identification_outputs import JointEvidence
-    from cdtool.commands.identify.identifying import IdentifiedMachine, JointIdentification
+    from cdtool.commands.identify.identifying import IdentifiedMachine
     from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
+    from cdtool.commands.identify.joint import JointIdentification
     from cdtool.execution.workers import Workers
 
-_DIVISIONS = ("machine", "day")
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
 _MUCH_MORE = 3.0
 _DOUBT = (
@@ -53,10 +51,6 @@ def identify(
             parser=location,
             help="Output, repeatable: .toml (machine file: the same or a new one), .html, .json. Default: none.",
         ),
-    ] = None,
-    by: Annotated[
-        str | None,
-        typer.Option("--by", help="machine or day: one identification for each, and what changes; -o .html, .json."),
     ] = None,
     loaded_logs: Annotated[
         list[str] | None,
@@ -100,19 +94,12 @@ def identify(
     from cdtool.execution.workers import Workers
 
     targets = output or []
-    if by is not None and by not in _DIVISIONS:
-        raise UsageError(f"--by is '{by}'", nearest(by, _DIVISIONS))
-    check_identification_files(targets, machine, force=force, of_fleet=by is not None)
+    check_identification_files(targets, machine, force=force)
     loaded = _loaded_runs(loaded_logs, payload, payload_link, payload_centre)
     struck = _contact_logs(contacts or (), presses or (), lever_arm)
     if loaded is not None and struck is not None:
         raise UsageError("--loaded-logs with --contacts or --presses", "these are for robots, those for axes")
-    if by is not None and (loaded or struck) is not None:
-        raise UsageError("--by with logs of a payload or of contacts", "identify one machine at a time with them")
-    if by is not None:
-        _identify_fleet(logs, machine, by, targets, Workers(jobs), as_json=as_json, quiet=quiet)
-    else:
-        _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
+    _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
 
 
 def _loaded_runs(
@@ -171,85 +158,23 @@ def _identify_machine(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    from cdtool.commands.identify.files import MACHINE, PAGE, write_identification
-    from cdtool.commands.identify.identification_outputs import evidence_of, identification_summary
+    from cdtool.commands.identify.files import MACHINE, write_identification
     from cdtool.commands.identify.identifying import identify as run
     from cdtool.commands.judging.runs import find_logs
 
     with progress("identifying", quiet=quiet) as advance:
         done = run(logs, machine, workers=workers, progress=advance, other_logs=other_logs)
-    # The plan of a robot has numbers that only the samples have.
-    needs_samples = done.robot is not None or any(target.suffix.lower() == PAGE for target in targets)
-    evidence = evidence_of(done, logs, machine, workers) if needs_samples else ()
-    written = write_identification(done, evidence, targets, find_logs(logs, Path(), "LOGS"))
+    written = write_identification(done, targets, find_logs(logs, Path(), "LOGS"))
     done = replace(done, written=", ".join(str(path) for path in written if path.suffix.lower() == MACHINE))
     print_skipped(done.skipped, done.findings)
     if as_json:
-        print_json(identification_summary(done, evidence, written))
+        print_json({**done.summary, "outputs": [str(path) for path in written]})
     else:
-        _show(done, evidence, written, targets, quiet=quiet)
+        _show(done, written, targets, quiet=quiet)
     leave(done.skipped)
 
 
-def _identify_fleet(
-    logs: Sequence[str],
-    machine: Path,
-    by: str,
-    targets: Sequence[Path],
-    workers: Workers,
-    *,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    from cdtool.commands.identify.files import write_fleet
-    from cdtool.commands.identify.fleet_identification import Division, identify_fleet
-    from cdtool.commands.judging.runs import find_logs
-
-    with progress("identifying", quiet=quiet) as advance:
-        fleet = identify_fleet(logs, machine, Division(by), workers=workers, progress=advance)
-    write_fleet(fleet, targets, [machine, *find_logs(logs, Path(), "LOGS")])
-    print_skipped(fleet.skipped, fleet.findings)
-    if as_json:
-        print_json(fleet.summary)
-    else:
-        _show_fleet(fleet, targets, quiet=quiet)
-    leave(fleet.skipped)
-
-
-def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path], *, quiet: bool) -> None:
-    rows = [
-        (
-            item.machine,
-            series.name,
-            number(series.values[0], 4),
-            number(series.values[-1], 4),
-            series.unit,
-            number(series.drift.standard_errors),
-        )
-        for item in fleet.machines
-        for series in item.changed
-    ]
-    if rows and not quiet:
-        columns = [("machine", "left"), ("parameter", "left"), ("first", "right"), ("last", "right"), ("unit", "left")]
-        table([*columns, ("change in\nstandard errors", "right")], rows)
-    changed = sum(bool(item.changed) for item in fleet.machines)
-    assessable = sum(any(len(series.periods) > 1 for series in item.series) for item in fleet.machines)
-    typer.echo(
-        f"{counted(len(fleet.machines), 'machine')} identified, {assessable} assessable over time, {changed} changed "
-        f"beyond 3 standard errors"
-    )
-    for target in targets:
-        typer.echo(f"written: {plain(target)}")
-
-
-def _show(
-    done: IdentifiedMachine,
-    evidence: Sequence[JointEvidence],
-    written: Sequence[Path],
-    targets: Sequence[Path],
-    *,
-    quiet: bool,
-) -> None:
+def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path], *, quiet: bool) -> None:
     for joint in done.joints:
         left = joint.rigid.cross_validation.left_over if joint.rigid and joint.rigid.cross_validation else math.nan
         if left > _MUCH_MORE:
@@ -259,7 +184,7 @@ def _show(
     if done.changes and not quiet:
         _show_changes(done)
     if done.robot is not None:
-        _show_robot(done, done.robot, evidence, quiet=quiet)
+        _show_robot(done, done.robot, quiet=quiet)
     else:
         for joint in done.joints:
             _show_axis(joint, is_named=len(done.joints) > 1)
@@ -267,7 +192,6 @@ def _show(
 
 
 def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
-    from cdtool.commands.identify.identification_outputs import plan_of
     from cdtool.commands.identify.words import words_of_plan
 
     if is_named:
@@ -275,7 +199,7 @@ def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
     _show_quality(joint)
     for item in joint.not_identifiable:
         typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
-    for plan in plan_of(joint):
+    for plan in joint.plan:
         typer.echo(f"plan: {words_of_plan(plan, joint.units[2])}: for {', '.join(plan.keys)}")
     for method, reason in joint.refused.items():
         typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
@@ -297,51 +221,28 @@ def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Seque
         typer.echo("nothing is written: give -o machine.toml")
 
 
-def _show_robot(
-    done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence], *, quiet: bool
-) -> None:
+def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: bool) -> None:
     """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
-    from cdtool.commands.identify.robot.robot_evidence import decision_of
-    from cdtool.commands.identify.words import words_of_decision
+    from cdtool.commands.identify.words import words_of_decision, words_of_joint_plan, words_of_robot
 
     rows = []
-    for place, (joint, shown) in enumerate(zip(done.joints, evidence, strict=True)):
-        decision = decision_of(done, place)
-        if decision is None or shown.robot is None:
-            continue
-        unit = shown.robot.units[0]
-        errors = [number(item) for item in (decision.torque, decision.before, decision.after, decision.floor)]
-        rows.append([joint.joint, unit, *errors, words_of_decision(decision)])
+    for joint, friction, floor in zip(done.joints, robot.joints, robot.repeated.floor.tolist(), strict=True):
+        errors = [number(item) for item in (friction.torque, friction.before, friction.after, floor)]
+        rows.append([joint.joint, joint.units[1], *errors, words_of_decision(friction)])
     headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
     columns = [("joint", "left"), ("unit", "left"), *((heading, "right") for heading in headings), ("used", "left")]
     if not quiet:
         say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
         table(columns, rows)
-    for place, shown in enumerate(evidence):
-        _show_robot_joint(done.joints[place], shown)
-    _show_whole_robot(done, robot, evidence)
-
-
-def _show_robot_joint(joint: JointIdentification, shown: JointEvidence) -> None:
-    from cdtool.commands.identify.words import words_of_joint_plan
-
-    name, robot = plain(joint.joint), shown.robot
-    for item in joint.not_identifiable:
-        typer.echo(f"{name}: not identifiable: {item.section}.{item.key}{_needed(item)}")
-    for plan in shown.plan if robot else ():
-        words = words_of_joint_plan(plan, robot.motion, robot.units[1]) if robot else ""
-        typer.echo(f"{name}: plan: {words}: for {', '.join(plan.keys)}")
-    for reason in joint.refused.values():
-        typer.echo(f"{name}: {plain(reason)}")
-
-
-def _show_whole_robot(done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence]) -> None:
-    from cdtool.commands.identify.identification_outputs import robot_plan_of
-    from cdtool.commands.identify.words import words_of_robot
-
-    travel = [item.robot.units[1] if item.robot else "rad" for item in evidence]
-    names = [joint.joint for joint in done.joints]
-    for line in words_of_robot(robot, robot_plan_of(done, evidence), names, travel, len(done.runs)):
+    for joint in done.joints:
+        name = plain(joint.joint)
+        for item in joint.not_identifiable:
+            typer.echo(f"{name}: not identifiable: {item.section}.{item.key}{_needed(item)}")
+        for plan in joint.plan:
+            typer.echo(f"{name}: plan: {words_of_joint_plan(plan, joint)}: for {', '.join(plan.keys)}")
+        for reason in joint.refused.values():
+            typer.echo(f"{name}: {plain(reason)}")
+    for line in words_of_robot(robot, done.joints, len(done.runs)):
         typer.echo(plain(line))
 
 
@@ -364,10 +265,8 @@ def _numbers(values: Any) -> str:
 def _show_quality(joint: JointIdentification) -> None:
     validation = joint.rigid.cross_validation if joint.rigid else None
     if validation is not None:
-        best = validation.errors[validation.best]
         floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
-        moving = f"while moving {number(best.moving)}{floor} ({validation.best.value})"
-        typer.echo(f"force on unseen runs: {number(best.all)} {joint.units[1]} RMS, {moving}")
+        typer.echo(f"force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")
     for level in joint.rigid.levels if joint.rigid else ():
         way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
         force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from enum import Enum
+from typing import Any
 
 from cdtool.base.errors import CdtoolError
 
@@ -20,7 +21,6 @@ class Method(Enum):
     LEAST_SQUARES = "least squares"
     INSTRUMENTAL_VARIABLES = "instrumental variables"
     OUTPUT_ERROR = "output error"
-    CONTROLLER_DIFFERENCES = "differences of the controller's output"
     CONTACTS = "contacts with a load cell"
     LOADED_RUNS = "runs with and without a known payload"
     FEASIBLE_LEAST_SQUARES = "physically consistent least squares"
@@ -33,7 +33,6 @@ class Missing(Enum):
     REVERSALS = "runs in both directions"
     ACCELERATION = "runs with stronger acceleration"
     START_UP = "recordings that begin at rest and contain the start of the motion"
-    REFERENCE_SPEED = "the speed reference, or the position reference"
     REFERENCE_TORQUE = "the torque reference"
     SATURATION = "a motion during which the limit is reached"
     PAYLOAD = "runs with a known payload"
@@ -42,7 +41,6 @@ class Missing(Enum):
     OTHER_MOTION = "a motion that excites this joint independently of the others"
     MORE_RECORDINGS = "more recordings"
     CONTACTS = "contacts with a load cell"
-    SLOWER_MOTION = "slow motion, below the speed at which the friction falls"
     HIGHER_RATE = "a higher sampling rate"
     GENTLER_START = "starts with less acceleration, which wind the drive up less, or contacts with a load cell"
     POSITION = "the position channel"
@@ -78,6 +76,11 @@ class Estimate:
         """Return standard error / |value|; infinite for a value of 0."""
         return self.standard_error / abs(self.value) if self.value else math.inf
 
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return the estimate as JSON values."""
+        return {**asdict(self), "method": self.method.value}
+
 
 @dataclass(frozen=True)
 class NotIdentifiable:
@@ -92,6 +95,11 @@ class NotIdentifiable:
     numbers: Mapping[str, float] = field(default_factory=dict)
     joint: int = 0
 
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {**asdict(self), "missing": [missing.name.lower() for missing in self.missing]}
+
 
 @dataclass(frozen=True)
 class Identified:
@@ -99,6 +107,14 @@ class Identified:
 
     estimates: tuple[Estimate, ...]
     not_identifiable: tuple[NotIdentifiable, ...] = ()
+
+    @classmethod
+    def of(cls, answers: Sequence[Estimate | NotIdentifiable]) -> Identified:
+        """Return answers in their order, those that are estimates apart from the others."""
+        return cls(
+            tuple(item for item in answers if isinstance(item, Estimate)),
+            tuple(item for item in answers if isinstance(item, NotIdentifiable)),
+        )
 
     def __getitem__(self, key: str) -> Estimate:
         for estimate in self.estimates:

@@ -10,8 +10,6 @@ from cdtool.base.files.foreign import Kind, refuse_inputs, refuse_other_kind
 from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import plain
-from cdtool.commands.identify.fleet_identification import FleetIdentification
-from cdtool.commands.identify.identification_outputs import JointEvidence, identification_summary
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.report.output_names import check_output_names
 
@@ -22,15 +20,13 @@ _KINDS: Mapping[str, Kind] = {
 }
 
 
-def check_identification_files(
-    targets: Sequence[Path], machine: Path, *, force: bool = False, of_fleet: bool = False
-) -> None:
+def check_identification_files(targets: Sequence[Path], machine: Path, *, force: bool = False) -> None:
     """Raise UsageError for a target that cannot be written: an unknown suffix, a name given twice, an existing file.
 
     The machine file itself may be updated. A report or JSON of this command may be rewritten; any other existing file
-    is replaced only with `force`. The results of a fleet are no machine file.
+    is replaced only with `force`.
     """
-    check_output_names(targets, (PAGE, JSON) if of_fleet else (MACHINE, PAGE, JSON))
+    check_output_names(targets, (MACHINE, PAGE, JSON))
     for target in targets:
         suffix = target.suffix.lower()
         if suffix in _KINDS:
@@ -41,18 +37,14 @@ def check_identification_files(
 
 
 def write_identification(
-    done: IdentifiedMachine, evidence: Sequence[JointEvidence], targets: Sequence[Path], inputs: Sequence[Path] = ()
+    done: IdentifiedMachine, targets: Sequence[Path], inputs: Sequence[Path] = ()
 ) -> tuple[Path, ...]:
     """Write what was identified of one machine; return the files, which are replaced together, or none.
 
     With the machine file of a robot belongs its URDF, if its inertias are new; a machine file without any change is not
     written. `inputs`: the logs, which are never overwritten. Raises UsageError, OutputError.
     """
-
-    def page() -> str:
-        from cdtool.commands.identify.page import identification_html
-
-        return identification_html(done, evidence)
+    from cdtool.commands.identify.page import identification_html
 
     texts: dict[Path, str] = {}
     for target in targets:
@@ -60,29 +52,11 @@ def write_identification(
         if suffix == MACHINE:
             texts |= dict(done.files_for(target))
         elif suffix == PAGE:
-            texts[target] = page()
+            texts[target] = identification_html(done)
     written = (*texts, *(target for target in targets if target.suffix.lower() == JSON))
     for target in targets:
         if target.suffix.lower() == JSON:
-            texts[target] = strict_json(identification_summary(done, evidence, written)) + "\n"
-    return _write(texts, inputs)
-
-
-def write_fleet(fleet: FleetIdentification, targets: Sequence[Path], inputs: Sequence[Path] = ()) -> tuple[Path, ...]:
-    """Write the identification of a fleet into each target; see `write_identification`."""
-
-    def page() -> str:
-        from cdtool.commands.identify.page import drift_html
-
-        return drift_html(fleet)
-
-    texts = {
-        target: page() if target.suffix.lower() == PAGE else strict_json(fleet.summary) + "\n" for target in targets
-    }
-    return _write(texts, inputs)
-
-
-def _write(texts: Mapping[Path, str], inputs: Sequence[Path]) -> tuple[Path, ...]:
+            texts[target] = strict_json({**done.summary, "outputs": [str(path) for path in written]}) + "\n"
     refuse_inputs(texts, inputs)
     write_texts(texts)
     return tuple(texts)

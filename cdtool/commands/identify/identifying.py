@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,13 @@ import numpy as np
 
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
 from cdtool.base.files.bounded_loading import read_text, read_toml
-from cdtool.base.files.writing import replaced
+from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
-from cdtool.commands.identify.axis.speed_controller import ControllerFit, ControllerSettings, identify_controller
+from cdtool.commands.identify.axis.speed_controller import ControllerSettings, identify_controller
 from cdtool.commands.identify.axis.torque_constant import TorqueScale
-from cdtool.commands.identify.axis.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
-from cdtool.commands.identify.contact.contact_fit import ContactFit
+from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass
 from cdtool.commands.identify.contact.identifying_contacts import (
     ContactLogs,
     LoadCellLogs,
@@ -30,10 +29,11 @@ from cdtool.commands.identify.contact.identifying_contacts import (
     scaled,
     torque_scale,
 )
-from cdtool.commands.identify.estimate import Estimate, IdentificationError, Method, NotIdentifiable
-from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification, identify_joints, joint_summary
+from cdtool.commands.identify.estimate import IdentificationError
+from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification, identify_joints
+from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.machine_update import MachineChange, changes_of, described_runs, robot_files, updated_text
-from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction
+from cdtool.commands.identify.robot.friction_choice import FrictionForm
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, Runs, find_logs, load_runs, several_logs
 from cdtool.commands.judging.scoring_rules import ScoringRules
@@ -42,7 +42,7 @@ from cdtool.commands.scoring.benchmark_file import GUARD, read_benchmark_file
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
-from cdtool.machines.axis_model.model_table import ModelTable, finite_values
+from cdtool.machines.axis_model.model_table import ModelTable
 from cdtool.machines.axis_model.parameters import Sensors
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.recordings.recording import Contact, Recording
@@ -55,122 +55,6 @@ _MOST_REASONS = 3
 # standard errors by which it must be known.
 _MOST_CONSTANT, _SIGNIFICANT = 0.2, 3.0
 _COULOMB = ("coulomb_friction", "coulomb_forward", "coulomb_backward")
-_CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
-
-
-@dataclass(frozen=True, eq=False)
-class JointIdentification:
-    """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
-
-    `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`:
-    of a joint of a robot or planar arm, which has none of the others. `contacts`: what contacts with a load cell add.
-    `torque_scale`: the factor by which all torques were multiplied before; None without presses.
-    """
-
-    joint: str
-    rigid: RigidAxisFit | None = None
-    two_mass: TwoMassFit | None = None
-    controller: ControllerFit | None = None
-    units: tuple[str, str, str, str] = ("kg", "N", "m", "N s/m")
-    has_torque_filter: bool = False
-    refused: Mapping[str, str] = field(default_factory=dict)
-    robot: JointFriction | None = None
-    contacts: ContactFit | None = None
-    torque_scale: TorqueScale | None = None
-
-    @property
-    def estimates(self) -> tuple[Estimate, ...]:
-        """Return the estimates that the machine file gets.
-
-        The load's mass is that of the contacts, else that of the elastic drive if there is one, else that of the rigid
-        axis. Friction is rather that of several speeds than that of the starts. Friction of the load that the contacts
-        show to act on the motor is among the values known only together.
-        """
-        found: dict[tuple[str, str], Estimate] = {}
-        for fit in (self.two_mass, self.rigid, self.controller, self.robot, self.contacts):
-            for estimate in fit.identified.estimates if fit else ():
-                if fit is not self.rigid or not (self.two_mass and estimate.key == "load_mass"):
-                    found[estimate.section, estimate.key] = estimate
-        if ("model.controller", "speed_gain") not in found:  # a table without it cannot be read
-            found = {key: item for key, item in found.items() if key[0] != "model.controller"}
-        if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
-            # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
-            found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
-        for item in self.contacts.together if self.contacts else ():
-            found.pop((item.section, item.key), None)
-        return tuple(map(self._with_scale_error, found.values()))
-
-    def _with_scale_error(self, estimate: Estimate) -> Estimate:
-        """Return an estimate whose standard error has that of the torque's scale, on which masses and forces depend."""
-        if self.torque_scale is None or not estimate.unit.startswith(("kg", "N")):
-            return estimate
-        relative = self.torque_scale.standard_error / self.torque_scale.factor
-        return replace(estimate, standard_error=math.hypot(estimate.standard_error, relative * estimate.value))
-
-    @property
-    def together(self) -> tuple[Estimate, ...]:
-        """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
-        of_contacts = self.contacts.together if self.contacts else ()
-        known = {(item.section, item.key) for item in (*self.estimates, *of_contacts)}
-        found: list[Estimate] = [*(self.robot.together if self.robot else ()), *self._friction_of_starts()]
-        found += [*self._of_starts(), *self._of_controller()]
-        if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
-            # The difference of the directions contains the constant force: it must not count twice.
-            found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
-        known |= {(item.section, item.key) for item in self.not_identifiable if not self.robot}
-        return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
-
-    def _friction_of_starts(self) -> list[Estimate]:
-        """Return Coulomb and viscous friction where only their sum is known: without both a model has neither."""
-        units = dict.fromkeys(("coulomb_forward", "coulomb_backward"), self.units[1]) | {"viscous": self.units[3]}
-        found = {item.key for item in self.estimates if item.section == "model.friction"}
-        if not self.two_mass or "load_mass" not in self.two_mass.identified or found & units.keys():
-            return []
-        refused = {item.key for item in self.two_mass.identified.not_identifiable} & units.keys()
-        values = vars(self.two_mass.model.friction)
-        return [_exact("model.friction", key, values[key], units[key]) for key in units if key in refused]
-
-    def _of_starts(self) -> list[Estimate]:
-        """Return what the starts show together with the identified values: how far they go."""
-        if not self.two_mass:
-            return []
-        found, identified, drive = [], self.two_mass.identified, self.contacts.drive if self.contacts else None
-        if drive or "stiffness" in identified:
-            wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
-            found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
-        if "static" in identified:
-            values, unit = vars(self.two_mass.model.friction), f"{self.units[2]}/s"
-            found += [_exact("model.friction", key, values[key], unit) for key in ("stribeck_speed", "smoothing_speed")]
-        return found
-
-    def _of_controller(self) -> list[Estimate]:
-        """Return what is needed to simulate the identified controller."""
-        fit = self.controller
-        if fit is None or fit.controller is None:
-            return []
-        found: list[Estimate] = []
-        for key, value in finite_values(fit.controller).items():
-            if value or key == "speed_filter_order":
-                found.append(_exact("model.controller", key, value, _CONTROLLER_UNITS.get(key, "")))
-        slope = {item.key: item.numbers for item in fit.identified.not_identifiable}.get("slew_limit", {})
-        if slope.get("largest_n_per_s", 0.0) > 0.0:
-            found.append(_exact("model.controller", "observed_slope", slope["largest_n_per_s"], f"{self.units[1]}/s"))
-        if math.isfinite(fit.lag) and fit.lag > 0.0 and not self.has_torque_filter:
-            found.append(_exact("model.sensors", "torque_filter_time", fit.lag, "s"))
-        return found
-
-    @property
-    def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
-        """Return the parameters that no method could identify."""
-        known = {(item.section, item.key) for item in self.estimates}
-        together = (*self._friction_of_starts(), *(self.contacts.together if self.contacts else ()))
-        known |= {(item.section, item.key) for item in together}
-        found: dict[tuple[str, str], NotIdentifiable] = {}
-        for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
-            for item in fit.identified.not_identifiable if fit else ():
-                if (item.section, item.key) not in known:
-                    found.setdefault((item.section, item.key), item)
-        return tuple(found.values())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -208,15 +92,18 @@ class IdentifiedMachine:
     @property
     def summary(self) -> dict[str, Any]:
         """Return everything but the samples as JSON values."""
+        plan = self.robot.plan if self.robot else None
         return {
+            "tool": "cdtool identify",
             "machine": self.machine,
             "runs": list(self.runs),
             "changes": [{**asdict(change), "method": change.method.value} for change in self.changes],
-            "joints": [_joint_summary(joint) for joint in self.joints],
+            "joints": [joint.summary for joint in self.joints],
             "skipped": [asdict(item) for item in self.skipped],
             "findings": [asdict(item) for item in self.findings],
             "written": self.written or None,
             "robot": self.robot.summary if self.robot else None,
+            "inertia_plan": plan and asdict(plan),
         }
 
 
@@ -280,7 +167,7 @@ def identify(
     """
     target = None if output is None else location(output)
     path = location(machine)
-    if target is not None and target.exists() and not force and not _same(target, path):
+    if target is not None and target.exists() and not force and target.resolve() != path.resolve():
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
     payload, contacts = _for_this_machine(other_logs, machine_file)
@@ -289,8 +176,7 @@ def identify(
     given = read_toml(path, "a machine file")
     robot = _identify_robot(machine_file, recordings, given, payload, reading)
     if robot is not None:
-        rows = zip(machine_file.machine.joints, robot.joints, robot.refused, strict=True)
-        joints = tuple(JointIdentification(name, refused=refused, robot=item) for name, item, refused in rows)
+        joints = robot.by_joint
     else:
         count = len(machine_file.machine.joints)
         struck = read_contacts(contacts, machine_file) if contacts else LoadCellLogs()
@@ -323,9 +209,7 @@ def identify(
     files = identified.files_for(target) if target is not None else ()
     if not files:
         return identified
-    with replaced(*(file for file, _ in files)) as parts:
-        for part, (_, content) in zip(parts, files, strict=True):
-            part.write_bytes(content.encode("utf-8", "replace"))
+    write_texts(dict(files))
     return replace(identified, written=str(target))
 
 
@@ -408,48 +292,6 @@ def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
     return list(dict.fromkeys(reasons))[:_MOST_REASONS]
 
 
-def _joint_summary(joint: JointIdentification) -> dict[str, Any]:
-    validation = joint.rigid.cross_validation if joint.rigid else None
-    return {
-        "joint": joint.joint,
-        "estimates": [{**asdict(item), "method": item.method.value} for item in joint.estimates],
-        "not_identifiable": [
-            {**asdict(item), "missing": [missing.name.lower() for missing in item.missing]}
-            for item in joint.not_identifiable
-        ],
-        "refused": dict(joint.refused),
-        "force_error_on_unseen_runs": validation
-        and {
-            "floor": validation.floor,
-            "repeats": validation.repeats,
-            "forms": {form.value: asdict(error) for form, error in validation.errors.items()},
-        },
-        "friction_at_speed": [asdict(level) for level in joint.rigid.levels] if joint.rigid else [],
-        "two_mass": joint.two_mass
-        and {
-            "condition_number": joint.two_mass.condition_number,
-            "relative_error": dict(joint.two_mass.relative_error),
-            "largest_wind_up": joint.two_mass.largest_wind_up,
-        },
-        "controller": joint.controller
-        and {"kind": joint.controller.kind.value, "residual_rms": joint.controller.residual_rms},
-        "robot": joint.robot and joint_summary(joint.robot),
-        "contacts": joint.contacts
-        and {
-            "condition_number": joint.contacts.condition_number,
-            "relative_error": dict(joint.contacts.relative_error),
-            "delays_of_load_cell": list(joint.contacts.delays),
-            "largest_wind_up": joint.contacts.wind_up,
-            "largest_drive_force": joint.contacts.drive_force,
-        },
-        "torque_scale": joint.torque_scale and asdict(joint.torque_scale),
-    }
-
-
-def _same(one: Path, other: Path) -> bool:
-    return one.resolve() == other.resolve()
-
-
 def _identify_joint(
     machine_file: MachineFile, joint: int, recordings: Sequence[Recording], struck: LoadCellLogs
 ) -> JointIdentification:
@@ -479,7 +321,7 @@ def _identify_joint(
         "rigid": lambda: identify_rigid_axis(
             runs,
             motor_mass,
-            RigidAxisSettings(rotary=is_rotary, torque_filter_time=stated.get("torque_filter_time")),
+            RigidAxisSettings(units=(mass, force, travel), torque_filter_time=stated.get("torque_filter_time")),
         ),
         "two_mass": lambda: identify_two_mass(
             runs, TwoMassSettings(motor_mass=motor_mass, sensors=sensors, units=(mass, force, travel))
@@ -564,7 +406,3 @@ def _with_contacts(
         return replace(identified, contacts=identify_struck(logs, machine_file, joint, fits, identified.units[:3]))
     except CdtoolError as fault:
         return replace(identified, refused={**refused, "contacts": str(fault)})
-
-
-def _exact(section: str, key: str, value: float, unit: str) -> Estimate:
-    return Estimate(section, key, value, math.nan, unit, Method.OUTPUT_ERROR)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.remote.remote_path import joined
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Identified, Method, NotIdentifiable
+from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
 from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
 from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
@@ -22,12 +23,15 @@ from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFr
 from cdtool.commands.identify.robot.planar_links import planar_links
 from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
 from cdtool.commands.identify.robot.robot_dynamics import (
-    HALF_WIDTH,
     RobotFit,
-    RobotParameters,
-    TorqueError,
     identify_robot,
     joint_estimates,
+)
+from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence, joint_evidence
+from cdtool.commands.identify.robot.robot_excitation import (
+    PlannedRobotMotion,
+    measure_joint_motion,
+    plan_robot_motion,
 )
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
@@ -41,6 +45,8 @@ from cdtool.recordings.recording import Recording
 _EXPLAINED = 0.5
 # More unexplained moments than this share of the motion are no exceptions.
 _MOST_UNEXPLAINED = 0.1
+# Units of inertia, force, travel and viscous friction.
+_REVOLUTE, _PRISMATIC = ("kg m2", "N m", "rad", "N m s/rad"), ("kg", "N", "m", "N s/m")
 # Physical links may raise the residual of least squares by this share, and shift a base parameter by so many errors.
 _MOST_RISE, _MOST_SHIFT = 0.1, 3.0
 
@@ -71,14 +77,13 @@ class LoadedRuns:
 class InertiaIdentification:
     """The inertial parameters of all links: whether the runs determine them, and whether they replace the present ones.
 
-    `base`: the base parameters by least squares, with `condition_number` of the scaled equations and the `errors` of
-    their torques. `not_identifiable`: why they are no complete set; empty if they are. `refused`: why a complete set
-    does not replace the present inertias. `residual_rise`: relative, by links that are physical.
+    `base`: the base parameters by least squares, with `condition_number` of the scaled equations. `not_identifiable`:
+    why they are no complete set; empty if they are. `refused`: why a complete set does not replace the present
+    inertias. `residual_rise`: relative, by links that are physical.
     """
 
     base: BaseParameterSet
     condition_number: float
-    errors: TorqueError
     not_identifiable: tuple[NotIdentifiable, ...]
     refused: str = ""
     is_new: bool = False
@@ -89,64 +94,72 @@ class InertiaIdentification:
 class RobotIdentification:
     """What was identified of a robot; `joints` and `refused` (reason by method) in the order of the machine's joints.
 
-    `inertias` None: they could not be looked at. `gains`: torque constants, None without loaded runs; with them the
-    logged torques are multiplied by `torque_factors` (J,).
-    `unexplained_share`: of the equations left out, because no friction explains their torque. `urdf`: the text of the
-    updated URDF, empty if it stays as it is.
+    `gains`: torque constants, None without loaded runs; with them the
+    logged torques were multiplied. `unexplained_share`: of the equations left out, because no friction explains their
+    torque. `evidence`: what the outputs show of each joint. `urdf`: the text of the updated URDF, empty if it stays as
+    it is.
     """
 
+    machine: CoupledMachine
     joints: tuple[JointFriction, ...]
     refused: tuple[Mapping[str, str], ...]
-    inertias: InertiaIdentification | None
+    inertias: InertiaIdentification
     gains: Identified | None
-    torque_factors: FloatArray
     repeated: RepeatedRuns
     unexplained_share: float
-    urdf: str = ""
+    evidence: tuple[RobotJointEvidence, ...]
+    urdf: str
+
+    @property
+    def by_joint(self) -> tuple[JointIdentification, ...]:
+        """Return the joints of the machine with what was identified of each."""
+        machine = self.machine
+        slides = [False] * len(machine.joints)
+        if isinstance(machine, UrdfRobot):
+            prismatic = {joint.name: joint.prismatic for joint in machine.tree.joints}
+            slides = [prismatic[name] for name in machine.tree.order]
+        rows = zip(machine.joints, slides, self.refused, self.joints, self.evidence, strict=True)
+        return tuple(
+            JointIdentification(
+                name, units=_PRISMATIC if is_slide else _REVOLUTE, refused=refused, robot=friction, evidence=evidence
+            )
+            for name, is_slide, refused, friction, evidence in rows
+        )
+
+    @property
+    def plan(self) -> PlannedRobotMotion | None:
+        """Return the motion that would show the inertias of all links; None if nothing is missing, or nothing moves."""
+        for refused in self.inertias.not_identifiable:
+            count = int(refused.numbers.get("base_parameters", 0.0))
+            return plan_robot_motion([item.motion for item in self.evidence], count)
+        return None
 
     @property
     def summary(self) -> dict[str, Any]:
         """Return what belongs to the whole robot as JSON values."""
         inertias = self.inertias
         return {
-            "base_parameters": inertias
-            and {
+            "base_parameters": {
                 "names": list(inertias.base.names),
                 "values": inertias.base.values.tolist(),
                 "standard_errors": inertias.base.standard_errors.tolist(),
                 "excitation": inertias.base.excitation.tolist(),
                 "identifiable": list(inertias.base.identifiable),
                 "condition_number": inertias.condition_number,
-                "not_identifiable": [missing_as_json(item) for item in inertias.not_identifiable],
-                "torque_error": {key: value.tolist() for key, value in vars(inertias.errors).items()},
+                "not_identifiable": [item.summary for item in inertias.not_identifiable],
                 "refused": inertias.refused or None,
                 "is_new": inertias.is_new,
                 "residual_rise": inertias.residual_rise,
             },
             "torque_constants": self.gains
             and {
-                "estimates": [{**asdict(item), "method": item.method.value} for item in self.gains.estimates],
-                "not_identifiable": [missing_as_json(item) for item in self.gains.not_identifiable],
+                "estimates": [item.summary for item in self.gains.estimates],
+                "not_identifiable": [item.summary for item in self.gains.not_identifiable],
             },
             "run_to_run_torque": self.repeated.floor.tolist(),
             "repeated_pairs": self.repeated.pairs,
             "unexplained_share": self.unexplained_share,
         }
-
-
-def missing_as_json(item: NotIdentifiable) -> dict[str, Any]:
-    """Return a parameter that is not identifiable as JSON values."""
-    return {**asdict(item), "missing": [missing.name.lower() for missing in item.missing]}
-
-
-def joint_summary(friction: JointFriction) -> dict[str, Any]:
-    """Return the friction of a joint as JSON values: RMS of the torque on parts left out of the fit by form."""
-    return {
-        "form": friction.form.name.lower(),
-        "torque_error_on_unseen_parts": {form.name.lower(): error for form, error in friction.errors.items()},
-        "torque": friction.torque,
-        "refitted": [{**asdict(item), "method": item.method.value} for item in friction.refitted],
-    }
 
 
 def identify_joints(
@@ -194,19 +207,25 @@ def identify_joints(
         for item in gains.estimates:
             factors[item.joint] = item.value / present[item.joint]
         runs = [replace(run, torque=run.torque * factors) for run in runs]
-    explained = without_unexplained(runs, machine, HALF_WIDTH)
+    explained = without_unexplained(runs, machine)
     if explained.share > _MOST_UNEXPLAINED:
         raise IdentificationError(
             f"no friction explains the torque during {100.0 * explained.share:.0f} % of the motion",
             "leave out logs with contacts and stops; check the order, signs and units of the channels",
         )
-    joints = choose_friction(explained.runs, machine, HALF_WIDTH)
-    inertias, joints, urdf = _with_inertias(explained.runs, machine, joints, given, folder)
+    joints, fits = choose_friction(explained.runs, machine)
+    whole = identify_robot(explained.runs, machine, frozenset(FrictionForm.WITH_INERTIAS.groups))
+    inertias, joints, urdf = _with_inertias(whole, joints, given, folder)
     refused: tuple[Mapping[str, str], ...] = ({},) * len(joints)
-    if not (inertias and inertias.is_new):
+    if not inertias.is_new:
         joints, refused = _refuse_unexplained(joints, machine)
-    floor = repeated_runs(runs, HALF_WIDTH)
-    return RobotIdentification(joints, refused, inertias, gains, factors, floor, explained.share, urdf)
+    floor = repeated_runs(runs)
+    fits = {**fits, FrictionForm.WITH_INERTIAS: whole}
+    evidence = tuple(
+        joint_evidence(motion, friction.compared, fits, explained.runs)
+        for motion, friction in zip(measure_joint_motion(runs, machine), joints, strict=True)
+    )
+    return RobotIdentification(machine, joints, refused, inertias, gains, floor, explained.share, evidence, urdf)
 
 
 def _runs_of(recordings: Sequence[Recording]) -> tuple[list[RobotRun], str]:
@@ -267,26 +286,21 @@ def _refuse_unexplained(
 
 def _as_before(friction: JointFriction) -> JointFriction:
     nothing = Identified((), friction.identified.not_identifiable)
-    return replace(friction, form=FrictionForm.PREVIOUS, identified=nothing, together=())
+    return replace(friction, form=FrictionForm.PREVIOUS, identified=nothing, together=(), is_explained=False)
 
 
 def _with_inertias(
-    runs: Sequence[RobotRun],
-    machine: CoupledMachine,
-    joints: tuple[JointFriction, ...],
-    given: Mapping[str, Any],
-    folder: Path,
-) -> tuple[InertiaIdentification | None, tuple[JointFriction, ...], str]:
+    fit: RobotFit, joints: tuple[JointFriction, ...], given: Mapping[str, Any], folder: Path
+) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
     """Return the inertias, the joints, and the text of the URDF, new where the runs determine the inertias."""
-    fit = identify_robot(runs, machine, RobotParameters(inertial=True, half_width=HALF_WIDTH))
     missing = tuple(item for item in fit.identified.not_identifiable if item.key == "base_parameters")
-    found = InertiaIdentification(fit.base, fit.condition_number, fit.torque_error, missing)
+    found = InertiaIdentification(fit.base, fit.condition_number, missing)
     if missing:
         return found, joints, ""
     if not _predicts_better(fit, joints):
         return replace(found, refused="the present inertias predict unseen parts as well"), joints, ""
     try:
-        if isinstance(machine, UrdfRobot):
+        if isinstance(fit.machine, UrdfRobot):
             return _new_urdf(fit, found, joints, joined(folder, str(given["machine"]["urdf"])))
         return _new_links(fit, found, joints)
     except CdtoolError as fault:
@@ -302,8 +316,9 @@ def _predicts_better(fit: RobotFit, joints: Sequence[JointFriction]) -> bool:
     previous: dict[int, FloatArray] = {joint: fit.left_out.of_joint(joint, is_previous=True) for joint in moving}
     if any(fit.left_out.is_worse(joint, previous[joint], 1.0) for joint in moving):
         return False
-    new, alone = fit.torque_error.cross_validated, [joints[joint].errors[joints[joint].form] for joint in moving]
-    gain = sum(math.log(max(new[joint], 1e-300) / max(own, 1e-300)) for joint, own in zip(moving, alone, strict=True))
+    new = [fit.left_out.error(joint) for joint in moving]
+    alone = [joints[joint].errors[joints[joint].form] for joint in moving]
+    gain = sum(math.log(max(error, 1e-300) / max(own, 1e-300)) for error, own in zip(new, alone, strict=True))
     return gain < 0.0 and any(fit.left_out.is_better(joint, previous[joint], 1.0) for joint in moving)
 
 
@@ -344,7 +359,7 @@ def _joints_with_inertias(
         own = tuple(estimate for estimate in links if estimate.joint == item.joint)
         refused = fit.identified.not_identifiable
         missing = tuple(entry for entry in refused if entry.joint == item.joint and entry.key != "base_parameters")
-        errors = {**item.errors, FrictionForm.WITH_INERTIAS: float(fit.torque_error.cross_validated[item.joint])}
+        errors = {**item.errors, FrictionForm.WITH_INERTIAS: fit.left_out.error(item.joint)}
         complete.append(
             replace(
                 item,

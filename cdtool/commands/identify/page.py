@@ -1,4 +1,4 @@
-"""The HTML page of an identification, or of a fleet's: one file in the style of the benchmark report, without script.
+"""The HTML page of an identification: one file in the style of the benchmark report, without script.
 
 Text from logs and files is escaped by the template. A content security policy allows only this style and the figures.
 """
@@ -6,48 +6,39 @@ Text from logs and files is escaped by the template. A content security policy a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from cdtool.base.plain_text import counted
+from cdtool.commands.identify.axis.excitation import PlannedMotion
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation
-from cdtool.commands.identify.fleet_identification import FleetIdentification, ParameterSeries
-from cdtool.commands.identify.identification_outputs import JointEvidence
-from cdtool.commands.identify.identifying import IdentifiedMachine, JointIdentification
+from cdtool.commands.identify.identifying import IdentifiedMachine
+from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.machine_update import MachineChange
-from cdtool.commands.identify.plots import draw_controller, draw_drift, draw_friction, draw_starts, draw_unseen_run
+from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
 from cdtool.commands.identify.robot.sections import robot_sections
 from cdtool.commands.identify.words import (
     listed_numbers,
     short_number,
     words_of_joint_plan,
     words_of_needs,
-    words_of_plan,
     words_of_reason,
 )
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
 from cdtool.report.number_text import NOTHING, number, percent
-from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-# The most machines with a figure, those that changed first: each takes 150 KB.
-_MOST_FIGURES = 40
+from cdtool.report.table import Cell, Heading, Table, number_cell, tabulate
 
 
-def identification_html(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -> str:
+def identification_html(done: IdentifiedMachine) -> str:
     """Return the page of one machine: changes, what is not identifiable, plan, errors and misfit."""
     missing = sum(len(joint.not_identifiable) for joint in done.joints)
     known = sum(len(joint.estimates) for joint in done.joints)
     together = sum(len(joint.together) for joint in done.joints)
     sections = [PageSection("Changes", (_changes_table(done.changes),), note=_ORIGIN)]
-    for joint, shown in zip(done.joints, evidence, strict=True):
-        name = f"{joint.joint}: " if len(done.joints) > 1 else ""
-        sections += _joint_sections(joint, shown, name)
-    sections[1:1] = robot_sections(done, evidence)
+    for joint in done.joints:
+        sections += _joint_sections(joint, f"{joint.joint}: " if len(done.joints) > 1 else "")
+    sections[1:1] = robot_sections(done)
     sections += left_out_sections(done.skipped, done.findings)
     return SectionsPage(
         "Identification",
@@ -66,20 +57,17 @@ _ORIGIN = (
 )
 
 
-def _joint_sections(joint: JointIdentification, shown: JointEvidence, name: str) -> list[PageSection]:
-    travel = shown.robot.units[1] if shown.robot else joint.units[2]
+def _joint_sections(joint: JointIdentification, name: str) -> list[PageSection]:
+    plan = joint.plan
     return [
-        PageSection(f"{name}Not identifiable", (_missing_table(joint, shown),) if joint.not_identifiable else ()),
+        PageSection(f"{name}Not identifiable", (_missing_table(joint),) if joint.not_identifiable else ()),
         PageSection(
             f"{name}Excitation plan",
-            (_plan_table(shown, travel),) if shown.plan else (),
-            note="Speeds and accelerations are derived from the highest ones in these logs." if shown.plan else "",
+            (_plan_table(joint, plan),) if plan else (),
+            note="Speeds and accelerations are derived from the highest ones in these logs." if plan else "",
         ),
         PageSection(f"{name}Excitation", (_excitation_table(joint),) if joint.rigid or joint.two_mass else ()),
-        _prediction_section(joint, shown, name),
-        _friction_section(joint, name),
-        _starts_section(joint, shown, name),
-        _controller_section(joint, shown, name),
+        *(_axis_sections(joint, name) if joint.rigid or joint.two_mass or joint.controller else ()),
         PageSection(f"{name}Methods not used", (_refused_table(joint),) if joint.refused else ()),
     ]
 
@@ -108,30 +96,21 @@ def _values(values: Sequence[float], significant: int) -> str:
     return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
-def _missing_table(joint: JointIdentification, shown: JointEvidence) -> Table:
-    excitation, travel = joint.rigid.excitation if joint.rigid else None, joint.units[2]
-    if shown.robot is not None:
-        excitation, travel = shown.robot.motion.excitation, shown.robot.units[1]
+def _missing_table(joint: JointIdentification) -> Table:
     fields = (
         (Heading("parameter"), lambda item: Cell(f"{item.section}.{item.key}")),
-        (Heading("because"), lambda item: Cell(words_of_reason(item, excitation, travel))),
+        (Heading("because"), lambda item: Cell(words_of_reason(item))),
         (Heading("add"), lambda item: Cell(words_of_needs(item.missing) or NOTHING)),
     )
     return tabulate("missing", "Not identifiable from these logs", fields, joint.not_identifiable)
 
 
-def _plan_table(shown: JointEvidence, travel: str) -> Table:
-    motion = shown.robot.motion if shown.robot else None
+def _plan_table(joint: JointIdentification, plan: Sequence[PlannedMotion]) -> Table:
     fields = (
-        (
-            Heading("add"),
-            lambda item: Cell(
-                words_of_joint_plan(item, motion, travel) if motion is not None else words_of_plan(item, travel)
-            ),
-        ),
+        (Heading("add"), lambda item: Cell(words_of_joint_plan(item, joint))),
         (Heading("makes identifiable"), lambda item: Cell(", ".join(item.keys))),
     )
-    return tabulate("plan", "Motion that would make the other parameters identifiable", fields, shown.plan)
+    return tabulate("plan", "Motion that would make the other parameters identifiable", fields, plan)
 
 
 def _excitation_table(joint: JointIdentification) -> Table:
@@ -160,144 +139,52 @@ def _excitation_table(joint: JointIdentification) -> Table:
     return Table("excitation", "What the logged motion excites", (Heading("quantity"), Heading("value")), cells)
 
 
-def _prediction_section(joint: JointIdentification, shown: JointEvidence, name: str) -> PageSection:
-    validation = joint.rigid.cross_validation if joint.rigid else None
-    force, unseen = joint.units[1], shown.unseen
-    figures: list[tuple[Callable[[], Figure], str]] = []
-    if unseen is not None:
-        figures.append(
-            (
-                lambda: draw_unseen_run(unseen, validation, force),
-                "A run that was left out of the fit: a residual beyond the grey band is the model's error.",
-            )
-        )
-    tables = () if validation is None else (_prediction_table(validation, force),)
-    return PageSection(f"{name}Prediction of unseen runs", tables, images_of(figures))
+def _axis_sections(joint: JointIdentification, name: str) -> list[PageSection]:
+    """Return the figures of an axis: how well the model describes its logs."""
+    sections, units = [], (joint.units[1], f"{joint.units[2]}/s", joint.units[2])
+    if joint.rigid is not None and joint.rigid.cross_validation is not None:
+        validation = joint.rigid.cross_validation
+        image = images_of([(partial(draw_unseen_run, validation, units[0]), _UNSEEN)])
+        table = _prediction_table(validation, units[0])
+        sections.append(PageSection(f"{name}Prediction of unseen runs", (table,), image))
+    if joint.rigid is not None:
+        image = images_of([(partial(draw_friction, joint.rigid, units), _FRICTION)])
+        sections.append(PageSection(f"{name}Friction", images=image))
+    if joint.two_mass is not None:
+        image = images_of([(partial(draw_starts, start, units), _STARTS) for start in joint.two_mass.starts])
+        sections.append(PageSection(f"{name}Starts, elastic drive", images=image))
+    if joint.controller is not None and joint.controller.comparison is not None:
+        compared = joint.controller.comparison
+        caption = "The identified controller driven by the logged references and speed, over the longest section."
+        image = images_of([(partial(draw_controller, compared, units[0]), caption)])
+        sections.append(PageSection(f"{name}Controller", images=image))
+    return sections
+
+
+_UNSEEN = "A run that was left out of the fit: a residual beyond the grey band is the model's error."
+_FRICTION = (
+    "Left: force minus that of the inertia, per interval of speed, and the model. Right: what the model leaves over "
+    "along the travel. Bars are two standard errors between strokes."
+)
+_STARTS = (
+    "The force of the model is the measured one with a weak correction towards the measured speed: what they differ by "
+    "is not explained by the model."
+)
 
 
 def _prediction_table(validation: CrossValidation, force: str) -> Table:
     rows = [
+        [Cell("identified model"), number_cell(validation.error)],
         [
-            Cell(form.value, tone="good" if form is validation.best else ""),
-            number_cell(error.all),
-            number_cell(error.moving),
-        ]
-        for form, error in validation.errors.items()
+            Cell(f"between equal strokes ({validation.repeats}): no model can be better"),
+            number_cell(validation.floor if validation.repeats else None),
+        ],
     ]
-    floor = number_cell(validation.floor if validation.repeats else None)
-    rows.append([Cell(f"between equal strokes ({validation.repeats}): no model can be better"), Cell(NOTHING), floor])
-    columns = (Heading("friction"), Heading(f"all [{force}]", numeric=True), Heading(f"moving [{force}]", numeric=True))
+    columns = (Heading("in motion"), Heading(f"RMS [{force}]", numeric=True))
     title = f"RMS error of the force in what was left out of the fit ({counted(validation.folds, 'part')} in turn)"
     return Table("prediction", title, columns, rows)
-
-
-def _friction_section(joint: JointIdentification, name: str) -> PageSection:
-    fit = joint.rigid
-    if fit is None:
-        return PageSection(f"{name}Friction")
-    force, travel = joint.units[1:3]
-    caption = (
-        "Left: force minus that of the inertia, per interval of speed, and the model. Right: what the model leaves "
-        "over along the travel. Bars are two standard errors between strokes."
-    )
-    return PageSection(
-        f"{name}Friction", images=images_of([(lambda: draw_friction(fit, (force, f"{travel}/s", travel)), caption)])
-    )
-
-
-def _starts_section(joint: JointIdentification, shown: JointEvidence, name: str) -> PageSection:
-    force, travel = joint.units[1:3]
-    caption = (
-        "The force of the model is the measured one with a weak correction towards the measured speed: what they "
-        "differ by is not explained by the model."
-    )
-    figures: list[tuple[Callable[[], Figure], str]] = []
-    figures += [(partial(draw_starts, start, (force, f"{travel}/s", travel)), caption) for start in shown.starts]
-    return PageSection(f"{name}Starts, elastic drive", images=images_of(figures))
-
-
-def _controller_section(joint: JointIdentification, shown: JointEvidence, name: str) -> PageSection:
-    compared = shown.controller
-    if compared is None:
-        return PageSection(f"{name}Controller")
-    caption = "The identified controller driven by the logged references and speed."
-    return PageSection(
-        f"{name}Controller", images=images_of([(lambda: draw_controller(compared, joint.units[1]), caption)])
-    )
 
 
 def _refused_table(joint: JointIdentification) -> Table:
     rows = [[Cell(method.replace("_", "-")), Cell(visible(reason))] for method, reason in joint.refused.items()]
     return Table("refused", "Methods that could not be used", (Heading("method"), Heading("reason")), rows)
-
-
-def drift_html(fleet: FleetIdentification) -> str:
-    """Return the page of a fleet: which parameters changed, and the parameters of each machine over time."""
-    changed = [(item.machine, series) for item in fleet.machines for series in item.changed]
-    names = dict.fromkeys(machine for machine, _ in changed)
-    assessable = sum(any(len(series.periods) > 1 for series in item.series) for item in fleet.machines)
-    sections = [
-        PageSection("Changed", (_drift_table(changed),) if changed else (), note=_DRIFT if changed else _NO_DRIFT),
-        PageSection("Machines", (_machines_table(fleet),)),
-    ]
-    for item in sorted(fleet.machines, key=lambda item: not item.changed)[:_MOST_FIGURES]:
-        several = [series for series in item.series if len(series.periods) > 1]
-        several.sort(key=lambda series: not series.drift.is_changed)
-        if several:
-            caption = visible(f"Periods: {', '.join(several[0].periods)}.")
-            image = images_of([(partial(draw_drift, several, item.machine), caption)])
-            sections.append(PageSection(visible(item.machine), images=image))
-    sections += left_out_sections(fleet.skipped, fleet.findings)
-    headline = f"{len(names)} of {counted(assessable, 'machine')} changed" if assessable else "No machine is assessable"
-    return SectionsPage(
-        "Identification",
-        "Model parameters over time",
-        headline,
-        f"A parameter changed if its change is beyond 3 standard errors. Divided by {fleet.by.value}.",
-        "unknown" if changed or not assessable else "good",
-        (counted(len(fleet.machines), "machine"), counted(sum(item.logs for item in fleet.machines), "log")),
-        tuple(section for section in sections if section.tables or section.images or section.note),
-    ).html()
-
-
-_DRIFT = (
-    "The standard errors contain the friction along the track, which is the same in all periods: a change that is not "
-    "listed may still exist. Temperature changes friction too."
-)
-_NO_DRIFT = "No parameter changed beyond 3 standard errors; a smaller change may exist."
-
-
-def _drift_table(changed: Sequence[tuple[str, ParameterSeries]]) -> Table:
-    fields = (
-        (Heading("machine"), lambda item: name_cell(visible(item[0]))),
-        (Heading("parameter"), lambda item: Cell(visible(item[1].name))),
-        (Heading("first period", numeric=True), lambda item: _value_cell(item[1], 0)),
-        (Heading("last period", numeric=True), lambda item: _value_cell(item[1], -1)),
-        (Heading("unit"), lambda item: Cell(item[1].unit)),
-        (Heading("change", numeric=True), lambda item: number_cell(item[1].drift.change)),
-        (Heading("in standard errors", numeric=True), lambda item: number_cell(item[1].drift.standard_errors)),
-        (Heading("kind"), lambda item: Cell(item[1].drift.kind.value)),
-    )
-    return tabulate("drift", "Parameters that changed beyond 3 standard errors", fields, changed)
-
-
-def _value_cell(series: ParameterSeries, period: int) -> Cell:
-    return Cell(f"{short_number(series.values[period], 4)} ± {short_number(series.standard_errors[period], 2)}")
-
-
-def _machines_table(fleet: FleetIdentification) -> Table:
-    """Return a row per machine and a column per parameter: value and standard error from all of its logs."""
-    names = dict.fromkeys((value.name, value.unit) for item in fleet.machines for value in item.parameters)
-    rows = []
-    for item in fleet.machines:
-        known = {(value.name, value.unit): value for value in item.parameters}
-        cells = [
-            Cell(f"{short_number(known[name].value, 5)} ± {short_number(known[name].standard_error, 2)}")
-            if name in known
-            else Cell(NOTHING)
-            for name in names
-        ]
-        rows.append([name_cell(visible(item.machine)), Cell(str(item.logs), key=item.logs), *cells])
-    headings = [f"{visible(name)} [{unit}]" if unit else visible(name) for name, unit in names]
-    columns = [Heading("machine"), Heading("logs", numeric=True), *(Heading(item, numeric=True) for item in headings)]
-    return Table("machines", "Parameters from all logs of a machine, ± standard error", columns, rows)

@@ -1,8 +1,7 @@
-"""Figures of an identification that show the misfit: residuals of unseen runs, friction, starts, controller, drift."""
+"""Figures of an identification that show the misfit: residuals of unseen runs, friction, starts, controller."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +11,8 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation, RigidAxisFit
-from cdtool.commands.identify.fleet_identification import ParameterSeries
-from cdtool.commands.identify.identification_outputs import ControllerComparison, StartComparison, UnseenRun
+from cdtool.commands.identify.axis.speed_controller import ControllerComparison
+from cdtool.commands.identify.axis.two_mass import StartComparison
 from cdtool.detectors.look import BLUE, RED
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure
@@ -28,40 +27,27 @@ _MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RED, "0.85"
 _MOST_POINTS = 4000
 
 
-def draw_unseen_run(unseen: UnseenRun, validation: CrossValidation | None, unit: str) -> Figure:
-    """Draw measured and predicted force of a run that the fit did not see, and below them the residual.
+def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
+    """Draw measured and predicted force of the run that is described worst, and below them the residual, in motion.
 
-    The band is the deviation between equal strokes: what is left over beyond it is the model's. Samples at rest are
-    pale: the model says nothing about them.
+    The band is the deviation between equal strokes: what is left over beyond it is the model's.
     """
-    shown = np.isfinite(unseen.residual)
-    index = _thinned(np.flatnonzero(shown))
-    time, residual = unseen.time[index], unseen.residual[index]
-    moving = unseen.moving[index]
+    unseen = validation.worst
+    index = _thinned(np.arange(len(unseen.time)))
+    time = unseen.time[index]
+    measured, predicted = (_gaps(time, values[index]) for values in (unseen.measured, unseen.predicted))
+    what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "strokes of the only run"
+    floor = np.full(len(time), validation.floor) if validation.repeats else None
     with drawing():
         figure = new_figure(_WIDTH, 4.6)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        above.plot(time, _gaps(time, unseen.measured[index]), color=_UNDER, linewidth=2.4, label="measured")
-        above.plot(time, _gaps(time, unseen.predicted[index]), color=_MODEL, linewidth=1.0, label="model")
-        above.set_ylabel(f"force [{unit}]")
-        above.legend(loc="upper right", ncols=2)
-        what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "last part of the only run"
-        error = number(unseen.moving_error)
-        above.set_title(
-            f"{label(unseen.run)}, left out of the fit ({what}): {error} {unit} RMS while moving", loc="left"
+        panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _compare(
+            panels, time, (measured, predicted), f"force [{unit}]", (floor, "between equal strokes (± 1 st. dev.)")
         )
-        floor = validation.floor if validation is not None and validation.repeats else math.nan
-        if math.isfinite(floor):
-            below.axhspan(
-                -floor, floor, color=_BAND, linewidth=0, label="between equal strokes (± 1 standard deviation)"
-            )
-        below.plot(time, _gaps(time, residual), color="0.75", linewidth=0.8)
-        in_motion = np.where(moving, residual, np.nan)
-        below.plot(time, _gaps(time, in_motion), color=_RESIDUAL, linewidth=0.9, label="residual while moving")
-        below.axhline(0.0, color="0.3", linewidth=0.6)
-        below.set_ylabel(f"residual [{unit}]")
-        below.set_xlabel("time [s]")
-        below.legend(loc="upper right", ncols=2)
+        title = f"{label(unseen.run)}, left out of the fit ({what}): {number(unseen.error)} {unit} RMS"
+        panels[0].set_title(title, loc="left")
+        for panel in panels:
+            panel.legend(loc="upper right", ncols=2)
         return figure
 
 
@@ -73,18 +59,17 @@ def draw_friction(fit: RigidAxisFit, units: tuple[str, str, str]) -> Figure:
     a profile there is friction that depends on the position.
     """
     force, speed, travel = units
-    residuals = fit.residuals
     curve = fit.friction_curve
     with drawing():
         figure = new_figure(_WIDTH, 3.4)
         left, right = figure.subplots(1, 2)
-        every = _thinned(np.arange(len(residuals.speed)))
-        left.plot(residuals.speed[every], residuals.friction[every], ".", color="0.8", markersize=1.5, zorder=1)
+        every = _thinned(np.arange(len(fit.speed)))
+        left.plot(fit.speed[every], fit.friction[every], ".", color="0.8", markersize=1.5, zorder=1)
         _bars(left, curve, _MEASURED, "measured, mean ± 2 standard errors")
         for side in (1.0, -1.0):
-            inside = np.sign(residuals.speed) == side
+            inside = np.sign(fit.speed) == side
             if inside.any():
-                x, y = _model_curve(residuals.speed[inside], (residuals.friction - residuals.residual)[inside])
+                x, y = _model_curve(fit.speed[inside], (fit.friction - fit.residual)[inside])
                 left.plot(x, y, color=_MODEL, linewidth=1.6, zorder=3, label="model")
         left.set_xlabel(f"speed [{speed}]")
         left.set_ylabel(f"friction [{force}]")
@@ -108,91 +93,62 @@ def draw_starts(start: StartComparison, units: tuple[str, str, str]) -> Figure:
     `units` of force, speed and travel. The lowest panel of each channel is the difference.
     """
     force, speed, travel = units
-    names = [name for name in ("speed", "torque", "acceleration") if name in start.measured]
+    ensemble = start.ensemble
+    names = [name for name in ("speed", "torque", "acceleration") if name in start.modelled]
     of_channel = {"speed": speed, "torque": force, "acceleration": f"{travel}/s²"}
     titles = {"speed": "speed", "torque": "force", "acceleration": "acceleration"}
+    time = ensemble.period * (np.arange(len(ensemble), dtype=np.float64) - ensemble.start_index)
     with drawing():
         figure = new_figure(_WIDTH, 4.4)
         panels = figure.subplots(2, len(names), sharex=True, squeeze=False, height_ratios=(3, 2))
-        for (above, below), name in zip(panels.T, names, strict=True):
-            measured, model, deviation = start.measured[name], start.modelled[name], start.deviation[name]
-            above.plot(start.time, measured, color=_UNDER, linewidth=2.6, label=f"mean of {start.count} starts")
-            above.plot(start.time, model, color=_MODEL, linewidth=1.2, label="model")
-            above.set_ylabel(f"{titles[name]} [{of_channel[name]}]")
-            if start.count > 1:
-                below.fill_between(
-                    start.time, -deviation, deviation, color=_BAND, linewidth=0, label="between runs (± 1 st. dev.)"
-                )
-            below.plot(start.time, measured - model, color=_RESIDUAL, linewidth=0.9, label="measured − model")
-            below.axhline(0.0, color="0.3", linewidth=0.6)
-            below.set_ylabel(f"difference [{of_channel[name]}]")
-            below.set_xlabel("time from the start of the motion [s]")
+        for column, name in zip(panels.T, names, strict=True):
+            lines = ensemble.mean[name], start.modelled[name]
+            band = ensemble.deviation[name] if ensemble.count > 1 else None
+            axis = f"{titles[name]} [{of_channel[name]}]"
+            _compare(column, time, lines, axis, (band, "between runs (± 1 st. dev.)"))
+            column[1].set_xlabel("time from the start of the motion [s]")
         panels[0, 0].legend(loc="lower right")
         panels[1, 0].legend(loc="upper right")
-        direction = "forward" if start.direction > 0 else "backward"
-        figure.suptitle(
-            f"Starts {direction} to {number(start.nominal_speed)} {speed}, driven by their mean force",
-            fontsize=9,
-            x=0.01,
-            ha="left",
-        )
+        direction = "forward" if ensemble.direction > 0 else "backward"
+        starts, top = counted(ensemble.count, "start"), f"{number(ensemble.nominal_speed)} {speed}"
+        title = f"Mean of {starts} {direction} to {top}, and the model driven by its force"
+        figure.suptitle(title, fontsize=9, x=0.01, ha="left")
         return figure
 
 
 def draw_controller(compared: ControllerComparison, unit: str) -> Figure:
-    """Draw the logged command and the identified controller's along a run, and their difference."""
+    """Draw the logged command and the identified controller's, and their difference."""
     index = _thinned(np.arange(len(compared.time)))
-    time = compared.time[index]
-    measured, computed = compared.measured[index], compared.computed[index]
-    difference = compared.measured - compared.computed
+    lines = compared.measured[index], compared.computed[index]
     name = "torque reference" if compared.is_command else "force"
     with drawing():
         figure = new_figure(_WIDTH, 4.2)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        above.plot(time, measured, color=_UNDER, linewidth=2.6, label="logged")
-        above.plot(time, computed, color=_MODEL, linewidth=0.9, linestyle=(0, (5, 2)), label="computed")
-        above.set_ylabel(f"{name} [{unit}]")
-        above.legend(loc="upper right", ncols=2)
-        error = number(float(np.sqrt(np.mean(difference**2))))
-        above.set_title(f"{label(compared.run)}: {name}, difference {error} {unit} RMS", loc="left")
-        below.plot(time, difference[index], color=_RESIDUAL, linewidth=0.8)
-        below.axhline(0.0, color="0.3", linewidth=0.6)
-        below.set_ylabel(f"difference [{unit}]")
-        below.set_xlabel("time [s]")
+        panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _compare(panels, compared.time[index], lines, f"{name} [{unit}]")
+        error = number(float(np.sqrt(np.mean((compared.measured - compared.computed) ** 2))))
+        panels[0].set_title(f"{name}, difference {error} {unit} RMS", loc="left")
+        panels[0].legend(loc="upper right", ncols=2)
         return figure
 
 
-def draw_drift(series: Sequence[ParameterSeries], machine: str) -> Figure:
-    """Draw a machine's parameters over its periods with two standard errors; changed ones are in another colour."""
-    columns = min(3, len(series))
-    rows = math.ceil(len(series) / columns)
-    with drawing():
-        figure = new_figure(3.1 * columns, 2.2 * rows + 0.3)
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for panel, item in zip(panels, series, strict=False):
-            _draw_series(panel, item)
-        for panel in panels[len(series) :]:
-            panel.set_visible(False)
-        figure.suptitle(f"{label(machine)}: parameters ± 2 standard errors over time", fontsize=9, x=0.01, ha="left")
-        return figure
-
-
-def _draw_series(axes: Axes, item: ParameterSeries) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    at = np.arange(1.0, len(item.periods) + 1.0)
-    colour = _RESIDUAL if item.drift.is_changed else _MEASURED
-    axes.errorbar(
-        at, item.values, yerr=2.0 * np.array(item.standard_errors), fmt="o", color=colour, markersize=4, capsize=2
-    )
-    if item.drift.is_changed:
-        axes.plot(at[[0, -1]], item.drift.line, color=colour, linewidth=1.0)
-    axes.set_xlim(0.5, len(at) + 0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylabel(f"[{item.unit}]" if item.unit else "")
-    changed = f": {item.drift.standard_errors:.1f} standard errors" if item.drift.is_changed else ""
-    axes.set_title(f"{label(item.name, 34)}{changed}", loc="left", color=colour, fontsize=8)
-    axes.set_xlabel(counted(len(at), "period") if len(at) < 2 else "period")
+def _compare(
+    panels: Sequence[Axes],
+    time: FloatArray,
+    lines: tuple[FloatArray, FloatArray],
+    axis: str,
+    band: tuple[FloatArray | None, str] = (None, ""),
+) -> None:
+    """Draw measured and modelled lines (n,) above, and below them their difference over a band of what is usual."""
+    (above, below), (measured, modelled), (usual, name) = panels, lines, band
+    above.plot(time, measured, color=_UNDER, linewidth=2.5, label="measured")
+    above.plot(time, modelled, color=_MODEL, linewidth=1.1, label="model")
+    above.set_ylabel(axis)
+    if usual is not None:
+        below.fill_between(time, -usual, usual, color=_BAND, linewidth=0, label=name)
+    below.plot(time, measured - modelled, color=_RESIDUAL, linewidth=0.9, label="measured − model")
+    below.axhline(0.0, color="0.3", linewidth=0.6)
+    below.set_ylabel(f"difference {axis[axis.index('[') :]}")
+    below.set_xlabel("time [s]")
 
 
 def _thinned(index: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from cdtool.base.plain_text import counted, digits
-from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion
+from cdtool.commands.identify.axis.excitation import PlannedMotion, relative_error
 from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.commands.identify.identifying_robot import RobotIdentification
+from cdtool.commands.identify.joint import JointIdentification
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, JointFriction
 from cdtool.commands.identify.robot.robot_dynamics import FEWEST_RUNS
-from cdtool.commands.identify.robot.robot_evidence import FrictionAnswer, FrictionDecision
-from cdtool.commands.identify.robot.robot_excitation import JointMotion, PlannedRobotMotion
+from cdtool.commands.identify.robot.robot_excitation import PlannedRobotMotion
 from cdtool.report.number_text import number, percent
 
 _BOTH = 2
@@ -53,21 +54,22 @@ def words_of_plan(plan: PlannedMotion, travel_unit: str) -> str:
     return words
 
 
-def words_of_joint_plan(plan: PlannedMotion, motion: JointMotion, travel_unit: str) -> str:
-    """Return a planned motion of a robot's joint in one line, with the logged one unless it is a series of runs."""
-    words = words_of_plan(plan, travel_unit)
-    if plan.runs or not motion.is_moving:
+def words_of_joint_plan(plan: PlannedMotion, joint: JointIdentification) -> str:
+    """Return a planned motion of a joint in one line; of a robot with the logged one unless it is a series of runs."""
+    travel = joint.units[2]
+    words = words_of_plan(plan, travel)
+    if plan.runs or joint.evidence is None or not joint.evidence.motion.is_moving:
         return words
+    motion = joint.evidence.motion
     speed = short_number(motion.excitation.highest_speed)
-    return f"{words} (logged: {short_number(motion.range)} {travel_unit}, up to {speed} {travel_unit}/s)"
+    return f"{words} (logged: {short_number(motion.range)} {travel}, up to {speed} {travel}/s)"
 
 
-def words_of_decision(decision: FrictionDecision) -> str:
+def words_of_decision(friction: JointFriction) -> str:
     """Return whether the friction of a joint is new, which, and why the old one stays."""
-    if decision.answer is FrictionAnswer.NEW:
-        assert decision.form is not None
-        return f"new: {decision.form.value}"
-    return f"old: {decision.answer.value}"
+    if friction.answer is FrictionAnswer.NEW:
+        return f"new: {friction.form.value}"
+    return f"old: {friction.answer.value}"
 
 
 def words_of_base_set(item: NotIdentifiable) -> str:
@@ -88,36 +90,34 @@ def words_of_base_set(item: NotIdentifiable) -> str:
     )
 
 
-def words_of_robot_plan(plan: PlannedRobotMotion, names: Sequence[str], units: Sequence[str]) -> str:
+def words_of_robot_plan(plan: PlannedRobotMotion, joints: Sequence[JointIdentification]) -> str:
     """Return the motion that would show the inertias of all links: duration, and range and speed of each joint."""
     parts = []
     for demand in plan.joints:
-        unit = units[demand.joint]
+        name, unit = joints[demand.joint].joint, joints[demand.joint].units[2]
         logged = f"{short_number(demand.logged_range, 2)} {unit}, {short_number(demand.logged_speed, 2)} {unit}/s"
         wanted = f"{short_number(demand.range, 2)} {unit} at up to {short_number(demand.speed, 2)} {unit}/s"
-        parts.append(f"{names[demand.joint]} over {wanted} ({f'logged: {logged}' if demand.is_more else 'as logged'})")
+        parts.append(f"{name} over {wanted} ({f'logged: {logged}' if demand.is_more else 'as logged'})")
     return (
         f"{short_number(plan.duration)} s of all joints at once, each at its own frequencies "
         f"(logged: {short_number(plan.logged_duration, 2)} s): {'; '.join(parts)}"
     )
 
 
-def words_of_robot(
-    robot: RobotIdentification, plan: PlannedRobotMotion | None, names: Sequence[str], units: Sequence[str], runs: int
-) -> list[str]:
+def words_of_robot(robot: RobotIdentification, joints: Sequence[JointIdentification], runs: int) -> list[str]:
     """Return what is known of a whole robot from so many runs, a line each: inertias, torque constants, and so on."""
-    lines = [words_of_base_set(item) for item in (robot.inertias.not_identifiable if robot.inertias else ())]
-    if plan is not None:
-        lines.append(f"plan: {words_of_robot_plan(plan, names, units)}")
-    if robot.inertias is not None and robot.inertias.refused:
-        lines.append(f"inertias kept: {robot.inertias.refused}")
-    if robot.inertias is not None and robot.inertias.is_new:
-        count = len(robot.inertias.base)
-        lines.append(
-            f"new inertias: {counted(count, 'base parameter')}, {_conditioned(robot.inertias.condition_number)}"
-        )
+    inertias = robot.inertias
+    lines = [words_of_base_set(item) for item in inertias.not_identifiable]
+    if robot.plan is not None:
+        lines.append(f"plan: {words_of_robot_plan(robot.plan, joints)}")
+    if inertias.refused:
+        lines.append(f"inertias kept: {inertias.refused}")
+    if inertias.is_new:
+        count = len(inertias.base)
+        lines.append(f"new inertias: {counted(count, 'base parameter')}, {_conditioned(inertias.condition_number)}")
     for item in robot.gains.not_identifiable if robot.gains else ():
-        lines.append(f"{names[item.joint]}: not identifiable: torque constant: add {words_of_needs(item.missing)}")
+        name = joints[item.joint].joint
+        lines.append(f"{name}: not identifiable: torque constant: add {words_of_needs(item.missing)}")
     if robot.unexplained_share > 0.0:
         lines.append(
             f"left out: {percent(robot.unexplained_share)} of the motion, of which no friction explains the torque "
@@ -139,73 +139,35 @@ def words_of_needs(missing: Sequence[Missing]) -> str:
     return ", ".join(kind.value for kind in missing)
 
 
-def words_of_reason(item: NotIdentifiable, excitation: Excitation | None, travel_unit: str) -> str:
+def words_of_reason(item: NotIdentifiable) -> str:
     """Return why a parameter is not identifiable, with the numbers that show it."""
-    reasons = [_REASONS[kind](item, excitation, travel_unit) for kind in item.missing if kind in _REASONS]
-    others = [f"not in these logs: {kind.value}" for kind in item.missing if kind not in _REASONS]
-    return "; ".join([*reasons, *others]) or "these logs show only its sum with another parameter"
+    reasons = [_REASONS.get(kind, f"not in these logs: {kind.value}") for kind in item.missing]
+    numbers = [text.format(item.numbers[key]) for key, text in _NUMBERS.items() if key in item.numbers]
+    if math.isfinite(relative := relative_error(item)):
+        numbers.append(f"its standard error is {percent(relative)} of its value")
+    words = "; ".join(reasons) or "these logs show only its sum with another parameter"
+    return f"{words} ({', '.join(numbers)})" if numbers else words
 
 
-def _few_speeds(item: NotIdentifiable, excitation: Excitation | None, travel_unit: str) -> str:
-    if excitation is not None and excitation.speeds:
-        held = f"{counted(len(excitation.speeds), 'speed')} ({listed_numbers(excitation.speeds)} {travel_unit}/s)"
-    else:
-        held = counted(int(item.numbers.get("speeds", 0.0)), "held speed")
-    return f"{held}: viscous friction cannot be told from Coulomb friction"
-
-
-def _one_direction(_: NotIdentifiable, excitation: Excitation | None, __: str) -> str:
-    share = "" if excitation is None else f" ({percent(max(excitation.forward_share, 1.0 - excitation.forward_share))})"
-    return f"one direction{share}: only the sum of friction and constant force is known"
-
-
-def _weak_acceleration(item: NotIdentifiable, excitation: Excitation | None, travel_unit: str) -> str:
-    if excitation is None or "acceleration" not in item.numbers:
-        return "hardly any acceleration"
-    return (
-        f"hardly any acceleration: {number(excitation.acceleration)} {travel_unit}/s² RMS, "
-        f"noise {number(excitation.acceleration_noise)}"
-    )
-
-
-def _too_uncertain(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    numbers = item.numbers
-    value, error = abs(numbers.get("value", 0.0)), numbers.get("standard_error", math.nan)
-    relative = numbers.get("relative_standard_error", error / value if value > 0.0 else math.nan)
-    return f"its standard error is {percent(relative)} of its value" if math.isfinite(relative) else "too few runs"
-
-
-def _no_limit(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    largest = item.numbers.get("largest_n")
-    return "the command never reached a limit" + ("" if largest is None else f" (largest: {number(largest)})")
-
-
-def _unknown_filter(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    lag = item.numbers.get("lag_s", math.nan)
-    size = f" of {number(1e3 * lag)} ms" if math.isfinite(lag) else ""
-    return f"the lag{size} between command and measured torque contains the unknown one of the torque's low-pass"
-
-
-def _other_controller(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
-    left = percent(item.numbers.get("unexplained_share", math.nan))
-    return (
-        f"P and PI control, alone or under a position controller, leave {left} of the controller's output unexplained "
-        "(feed-forward, or references of another log?)"
-    )
-
-
-def _no_position(_: NotIdentifiable, __: Excitation | None, ___: str) -> str:
-    return "no position channel: a delay of the speed channel looks like damping"
-
-
-_Reason = Callable[[NotIdentifiable, Excitation | None, str], str]
-_REASONS: Mapping[Missing, _Reason] = {
-    Missing.SECOND_SPEED: _few_speeds,
-    Missing.REVERSALS: _one_direction,
-    Missing.ACCELERATION: _weak_acceleration,
-    Missing.MORE_RECORDINGS: _too_uncertain,
-    Missing.SATURATION: _no_limit,
-    Missing.TORQUE_FILTER: _unknown_filter,
-    Missing.OTHER_CONTROLLER: _other_controller,
-    Missing.POSITION: _no_position,
+_REASONS: Mapping[Missing, str] = {
+    Missing.SECOND_SPEED: "too few speeds: viscous friction cannot be told from Coulomb friction",
+    Missing.REVERSALS: "one direction: only the sum of friction and constant force is known",
+    Missing.ACCELERATION: "hardly any acceleration",
+    Missing.MORE_RECORDINGS: "too few runs",
+    Missing.SATURATION: "the command never reached a limit",
+    Missing.TORQUE_FILTER: "the lag between command and measured torque contains that of the torque's low-pass",
+    Missing.OTHER_CONTROLLER: (
+        "P and PI control, alone or under a position controller, do not explain the controller's output (feed-forward, "
+        "or references of another log?)"
+    ),
+    Missing.POSITION: "no position channel: a delay of the speed channel looks like damping",
+}
+# Numbers of a parameter that is not identifiable, as they are shown.
+_NUMBERS: Mapping[str, str] = {
+    "speeds": "held: {:.0f}",
+    "acceleration": "RMS {:.3g}",
+    "acceleration_noise": "noise {:.3g}",
+    "largest_n": "largest: {:.3g}",
+    "lag_s": "{:.3g} s",
+    "unexplained_share": "left: {:.0%}",
 }

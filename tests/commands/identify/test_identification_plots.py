@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.axis.rigid_axis import RigidAxisSettings, identify_rigid_axis
-from cdtool.commands.identify.fleet_identification import ParameterSeries, drift_of
-from cdtool.commands.identify.identification_outputs import ControllerComparison, StartComparison, UnseenRun
-from cdtool.commands.identify.plots import draw_controller, draw_drift, draw_friction, draw_starts, draw_unseen_run
+from cdtool.commands.identify.axis.rigid_axis import CrossValidation, UnseenRun, identify_rigid_axis
+from cdtool.commands.identify.axis.speed_controller import ControllerComparison
+from cdtool.commands.identify.axis.start_ensemble import StartEnsemble
+from cdtool.commands.identify.axis.two_mass import StartComparison
+from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
 from cdtool.report.plots.figures import png
 from tests.synthetic.gate_runs import GATE, free_runs
 
@@ -22,27 +22,27 @@ def lines(axes: Any) -> dict[str, Any]:
     return {line.get_label(): line for line in axes.get_lines()}
 
 
-def unseen(wrong_by: float) -> UnseenRun:
-    time = 1e-3 * np.arange(3000)
+def validation(wrong_by: float) -> CrossValidation:
+    time = 1e-3 * np.concatenate((np.arange(1000), np.arange(2000, 3000)))
     measured = 200.0 + 10.0 * np.sin(time)
-    moving = time > 0.5
-    predicted = np.where(time < 0.1, np.nan, measured - wrong_by)
-    return UnseenRun("03.csv", time, measured, predicted, moving, 10)
+    unseen = UnseenRun("03.csv", time, measured, measured - wrong_by, 10)
+    return CrossValidation(wrong_by, 8, 5.0, 4, unseen)
 
 
-def test_the_residual_is_drawn_with_its_size_and_rest_apart_from_motion() -> None:
-    figure = draw_unseen_run(unseen(25.0), None, "N")
+def test_the_residual_is_drawn_with_its_size_and_the_floor() -> None:
+    figure = draw_unseen_run(validation(25.0), "N")
     above, below = figure.axes
-    assert "25.0 N RMS while moving" in above.get_title(loc="left")
+    assert "25.0 N RMS" in above.get_title(loc="left")
     assert "largest error of 10" in above.get_title(loc="left")
-    moving = lines(below)["residual while moving"]
-    values = moving.get_ydata()
-    assert np.nanmax(np.abs(values - 25.0)) < 1e-9
-    assert np.nanmin(moving.get_xdata()[np.isfinite(values)]) > 0.5
+    residual = lines(below)["measured − model"].get_ydata()
+    assert np.nanmax(np.abs(residual - 25.0)) < 1e-9
+    assert np.isnan(residual).any()  # where the axis rests
+    (band,) = below.collections
+    assert np.ptp(band.get_paths()[0].vertices[:, 1]) == pytest.approx(10.0)
 
 
 def test_friction_has_bars_of_two_standard_errors_and_the_model_over_the_same_speeds() -> None:
-    fit = identify_rigid_axis(free_runs(GATE, 404, 3), GATE.motor_mass, RigidAxisSettings(cross_validate=False))
+    fit = identify_rigid_axis(free_runs(GATE, 404, 3), GATE.motor_mass)
     left, right = draw_friction(fit, UNITS).axes
     model = lines(left)["model"]
     # One speed: the model is flat, the measured friction is not.
@@ -56,15 +56,9 @@ def test_friction_has_bars_of_two_standard_errors_and_the_model_over_the_same_sp
 def test_a_start_shows_the_difference_beside_that_between_runs() -> None:
     time = 1e-3 * np.arange(-300.0, 2000.0)
     measured = {"speed": np.clip(time, 0.0, 0.2), "torque": 200.0 * (time > 0.0)}
-    start = StartComparison(
-        time,
-        4,
-        1,
-        0.2,
-        measured,
-        {name: 0.1 * values for name, values in measured.items()},
-        {"speed": measured["speed"] + 0.03, "torque": measured["torque"]},
-    )
+    deviation = {name: 0.1 * values for name, values in measured.items()}
+    ensemble = StartEnsemble(1e-3, 300, 4, measured, deviation, 1, 0.2, ())
+    start = StartComparison(ensemble, {"speed": measured["speed"] + 0.03, "torque": measured["torque"]})
     figure = draw_starts(start, UNITS)
     _, _, speed, torque = figure.axes
     assert lines(speed)["measured − model"].get_ydata() == pytest.approx(-0.03)
@@ -73,29 +67,14 @@ def test_a_start_shows_the_difference_beside_that_between_runs() -> None:
 
 def test_the_controllers_difference_is_stated() -> None:
     time = 1e-3 * np.arange(500)
-    compared = ControllerComparison("03.csv", time, np.ones(500), np.full(500, 3.0), True)
+    compared = ControllerComparison(time, np.ones(500), np.full(500, 3.0), True)
     above, below = draw_controller(compared, "N").axes
     assert "torque reference, difference 2.00 N RMS" in above.get_title(loc="left")
     assert np.all(below.get_lines()[0].get_ydata() == -2.0)
 
 
-def test_a_parameter_that_changed_has_another_colour_and_its_line() -> None:
-    errors = np.full(4, 2.0)
-    series = []
-    for name, values in (("grown", np.array([200.0, 210.0, 221.0, 230.0])), ("same", np.full(4, 5.0))):
-        periods = tuple("abcd")
-        series.append(ParameterSeries(name, "N", periods, tuple(values), tuple(errors), drift_of(values, errors)))
-    grown, same = [axes for axes in draw_drift(series, "gate").axes if axes.get_visible()]
-    assert "standard errors" in grown.get_title(loc="left")
-    assert same.get_title(loc="left") == "same"
-    assert len(grown.get_lines()) == len(same.get_lines()) + 1
-
-
-def test_the_same_content_has_the_same_bytes_and_a_figure_without_prediction_is_drawn() -> None:
-    first, second = (png(draw_unseen_run(unseen(25.0), None, "N")) for _ in range(2))
+def test_the_same_content_has_the_same_bytes() -> None:
+    first, second = (png(draw_unseen_run(validation(25.0), "N")) for _ in range(2))
     assert first == second
     assert first.startswith(b"\x89PNG")
-    assert first != png(draw_unseen_run(unseen(20.0), None, "N"))
-    nothing = unseen(math.nan)
-    assert math.isnan(nothing.moving_error)
-    assert png(draw_unseen_run(nothing, None, "N")).startswith(b"\x89PNG")
+    assert first != png(draw_unseen_run(validation(20.0), "N"))

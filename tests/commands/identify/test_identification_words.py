@@ -8,9 +8,10 @@ from dataclasses import replace
 import pytest
 
 from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion
-from cdtool.commands.identify.estimate import Missing, NotIdentifiable
-from cdtool.commands.identify.robot.friction_choice import FrictionForm
-from cdtool.commands.identify.robot.robot_evidence import FrictionAnswer, FrictionDecision
+from cdtool.commands.identify.estimate import Identified, Missing, NotIdentifiable
+from cdtool.commands.identify.joint import JointIdentification
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction
+from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence
 from cdtool.commands.identify.robot.robot_excitation import JointDemand, JointMotion, PlannedRobotMotion
 from cdtool.commands.identify.words import (
     listed_numbers,
@@ -22,7 +23,7 @@ from cdtool.commands.identify.words import (
     words_of_robot_plan,
 )
 
-EXCITATION = Excitation((0.25,), 1.0, 0.0, 0.26, 0.08, 0.003, 14.0, 70.0, 10, 0, 0.3)
+EXCITATION = Excitation((0.25,), 1.0, 0.26, 0.08, 0.003, 14.0, 70.0, 10, 0, 0.3)
 RUNS = PlannedMotion(Missing.SECOND_SPEED, ("machine.viscous_friction",), 4, (0.06, 0.1), (0.25,), (1, -1), travel=1.4)
 
 
@@ -62,43 +63,24 @@ def test_a_plan_states_its_numbers(plan: PlannedMotion, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("missing", "numbers", "excitation", "words"),
+    ("missing", "numbers", "words"),
     [
-        (
-            (Missing.SECOND_SPEED,),
-            {},
-            EXCITATION,
-            "1 speed (0.25 m/s): viscous friction cannot be told from Coulomb friction",
-        ),
-        ((Missing.SECOND_SPEED,), {"speeds": 1.0}, None, "1 held speed: viscous"),
-        ((Missing.REVERSALS,), {}, EXCITATION, "one direction (100 %)"),
+        ((Missing.SECOND_SPEED,), {"speeds": 1.0}, "too few speeds: viscous friction cannot be told from Coulomb"),
         (
             (Missing.MORE_RECORDINGS,),
             {"value": -2.0, "standard_error": 1.0},
-            None,
-            "its standard error is 50 % of its value",
+            "too few runs (its standard error is 50 %",
         ),
-        ((Missing.MORE_RECORDINGS,), {}, None, "too few runs"),
-        ((Missing.SATURATION,), {"largest_n": 552.0}, None, "the command never reached a limit (largest: 552)"),
-        (
-            (Missing.TORQUE_FILTER,),
-            {"lag_s": 0.0162},
-            None,
-            "the lag of 16.2 ms between command and measured torque contains the unknown one of the torque's low-pass",
-        ),
-        (
-            (Missing.OTHER_CONTROLLER,),
-            {"unexplained_share": 0.81},
-            None,
-            "P and PI control, alone or under a position controller, leave 81 % of the controller's output unexplained",
-        ),
-        ((Missing.POSITION,), {}, None, "no position channel: a delay of the speed channel looks like damping"),
-        ((Missing.PAYLOAD,), {}, None, "not in these logs: runs with a known payload"),
-        ((), {}, None, "these logs show only its sum with another parameter"),
+        ((Missing.MORE_RECORDINGS,), {}, "too few runs"),
+        ((Missing.SATURATION,), {"largest_n": 552.0}, "the command never reached a limit (largest: 552)"),
+        ((Missing.OTHER_CONTROLLER,), {"unexplained_share": 0.81}, "P and PI control, alone or under a position"),
+        ((Missing.POSITION,), {}, "no position channel: a delay of the speed channel looks like damping"),
+        ((Missing.PAYLOAD,), {}, "not in these logs: runs with a known payload"),
+        ((), {}, "these logs show only its sum with another parameter"),
     ],
 )
-def test_a_reason_states_the_numbers_that_show_it(missing, numbers, excitation, words) -> None:
-    assert words_of_reason(NotIdentifiable("machine", "x", missing, numbers), excitation, "m").startswith(words)
+def test_a_reason_states_the_numbers_that_show_it(missing, numbers, words) -> None:
+    assert words_of_reason(NotIdentifiable("machine", "x", missing, numbers)).startswith(words)
 
 
 def test_numbers_are_listed_as_in_a_sentence() -> None:
@@ -126,16 +108,22 @@ def test_the_answer_about_the_base_parameters_has_its_numbers() -> None:
     ],
 )
 def test_a_decision_states_why_the_old_friction_stays(answer: FrictionAnswer, words: str) -> None:
-    decision = FrictionDecision(answer, FrictionForm.FRICTION_ALONE, 4.0, 3.0, 30.0, math.nan)
-    assert words_of_decision(decision) == words
+    before = math.nan if answer is FrictionAnswer.NOT_MOVED else 4.0
+    form = FrictionForm.FRICTION_ALONE if answer is FrictionAnswer.NEW else FrictionForm.PREVIOUS
+    errors = {FrictionForm.FRICTION_ALONE: 3.0, FrictionForm.PREVIOUS: before}
+    friction = JointFriction(0, form, Identified(()), (), errors, 30.0)
+    assert friction.answer is answer
+    assert words_of_decision(friction) == words
 
 
 def test_the_plan_of_a_robot_has_its_numbers() -> None:
     plan = PlannedRobotMotion((JointDemand(0, 2.0, 0.56, 0.32, 0.56), JointDemand(1, 3.0, 1.0, 3.0, 1.0)), 23.0, 4.9)
-    assert words_of_robot_plan(plan, ["elbow", "lift"], ["rad", "m"]) == (
+    units = {"elbow": ("kg m2", "N m", "rad", "N m s/rad"), "lift": ("kg", "N", "m", "N s/m")}
+    motion = RobotJointEvidence(JointMotion(0, EXCITATION, 0.5, 1.25))
+    joints = [JointIdentification(name, units=unit, evidence=motion) for name, unit in units.items()]
+    assert words_of_robot_plan(plan, joints) == (
         "23 s of all joints at once, each at its own frequencies (logged: 4.9 s): "
         "elbow over 2 rad at up to 0.56 rad/s (logged: 0.32 rad, 0.56 rad/s); lift over 3 m at up to 1 m/s (as logged)"
     )
-    motion = JointMotion(0, EXCITATION, 0.5, 1.25)
     other = PlannedMotion(Missing.OTHER_MOTION, ("machine.constant_force",))
-    assert words_of_joint_plan(other, motion, "rad").endswith("(logged: 0.75 rad, up to 0.26 rad/s)")
+    assert words_of_joint_plan(other, joints[0]).endswith("(logged: 0.75 rad, up to 0.26 rad/s)")

@@ -23,16 +23,12 @@ SPEEDS_NEEDED = 3
 _DIRECTION_SHARE = 0.05
 # The root mean square of the acceleration, noise included, must be this many times that of the noise.
 _ABOVE_NOISE = 1.1
-# Slow motion: below this share of the highest speed, for this share of the moving time.
-_SLOW_SPEED, _SLOW_SHARE = 0.1, 0.01
 # Runs of a plan per speed and direction: with fewer than 3 strokes a direction has no spread between strokes.
 _RUNS = 4
 # Speeds of a plan are between these shares of the highest logged speed: below them the friction may rise (Stribeck).
 _LOWEST_SPEED, _SPEED_STEPS = 0.3, 15
 # Logged speeds count for a plan if they differ by this factor.
 _APART = 1.5
-# Slow motion of a plan, as shares of the highest logged speed.
-_SLOW_SPEEDS = (0.02, 0.05)
 # A plan asks for so many times the acceleration of the logs, and of its noise.
 _MORE_ACCELERATION, _TIMES_NOISE = 2.0, 5.0
 # The relative standard error that more runs have to reach, and the most runs that a plan asks for.
@@ -46,7 +42,7 @@ class Excitation:
     """What the motion of the runs excites; linear axes in m, rotary ones in rad.
 
     `speeds`: distinct speeds at which at least 5 % of the moving time is spent, in ascending order, without sign
-    [m/s]. `forward_share`, `slow_share`: of the moving time [-]. `highest_speed` [m/s]: the 99 % quantile of |speed|.
+    [m/s]. `forward_share`: of the moving time [-]. `highest_speed` [m/s]: the 99 % quantile of |speed|.
     `acceleration` [m/s2]: the root mean square while moving, and `acceleration_noise` that of the noise in it;
     `highest_acceleration` [m/s2]: the 99 % quantile of its magnitude.
     `travel` [m], `moving_time` [s]: of all runs. `strokes`: motions between rests and reversals; `reversals`: changes
@@ -55,7 +51,6 @@ class Excitation:
 
     speeds: tuple[float, ...]
     forward_share: float
-    slow_share: float
     highest_speed: float
     acceleration: float
     acceleration_noise: float
@@ -71,18 +66,9 @@ class Excitation:
         return min(self.forward_share, 1.0 - self.forward_share) < _DIRECTION_SHARE
 
     @property
-    def missing(self) -> tuple[Missing, ...]:
-        """Return what the runs would need so that all parameters of a rigid axis could be identified."""
-        missing: list[Missing] = []
-        if len(self.speeds) < SPEEDS_NEEDED:
-            missing.append(Missing.SECOND_SPEED)
-        if self.is_one_way:
-            missing.append(Missing.REVERSALS)
-        if not self.acceleration > _ABOVE_NOISE * self.acceleration_noise:
-            missing.append(Missing.ACCELERATION)
-        if self.slow_share < _SLOW_SHARE:
-            missing.append(Missing.SLOWER_MOTION)
-        return tuple(missing)
+    def is_accelerated(self) -> bool:
+        """Whether the acceleration is more than its noise."""
+        return self.acceleration > _ABOVE_NOISE * self.acceleration_noise
 
 
 def measure_excitation(runs: Sequence[FilteredRun]) -> Excitation:
@@ -114,13 +100,12 @@ def excitation_of(
     """Return what samples of motion excite (n,): speed, acceleration, time that each lasts [s], its noise or NaN."""
     total = float(np.sum(duration))
     if total <= 0.0:
-        return Excitation((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0)
+        return Excitation((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0)
     size, share = np.abs(speed), duration / total
     highest = float(np.quantile(size, 0.99))
     return Excitation(
         distinct_speeds(size, share),
         float(np.sum(share[speed > 0.0])),
-        float(np.sum(share[size < _SLOW_SPEED * highest])),
         highest,
         math.sqrt(float(share @ acceleration**2)),
         math.sqrt(float(share @ noise**2)),
@@ -275,10 +260,6 @@ def _other_direction(plan: PlannedMotion, excitation: Excitation, _: Sequence[No
     return replace(plan, directions=(missing,), speeds=plan.logged_speeds)
 
 
-def _slow_motion(plan: PlannedMotion, excitation: Excitation, _: Sequence[NotIdentifiable]) -> PlannedMotion:
-    return replace(plan, speeds=tuple(float(f"{share * excitation.highest_speed:.2g}") for share in _SLOW_SPEEDS))
-
-
 def _more_acceleration(plan: PlannedMotion, excitation: Excitation, _: Sequence[NotIdentifiable]) -> PlannedMotion:
     wanted = max(
         _MORE_ACCELERATION * excitation.highest_acceleration, _TIMES_NOISE * excitation.acceleration_noise, 0.0
@@ -299,14 +280,15 @@ def _from_rest(plan: PlannedMotion, _: Excitation, __: Sequence[NotIdentifiable]
 
 def _more_runs(plan: PlannedMotion, excitation: Excitation, items: Sequence[NotIdentifiable]) -> PlannedMotion:
     """Return the plan with as many runs as bring the largest relative standard error down to what is wanted."""
-    relative = max((_relative_error(item) for item in items), default=math.nan)
+    relative = max((relative_error(item) for item in items), default=math.nan)
     strokes = max(excitation.strokes, 1)
     factor = (relative / _WANTED_ERROR) ** 2 - 1.0 if math.isfinite(relative) else 1.0
     runs = max(math.ceil(strokes * factor / len(plan.directions)), _RUNS)
     return replace(plan, speeds=plan.logged_speeds, runs=min(runs, _MOST_RUNS))
 
 
-def _relative_error(item: NotIdentifiable) -> float:
+def relative_error(item: NotIdentifiable) -> float:
+    """Return the relative standard error of a parameter that is too uncertain; NaN where it is not known."""
     numbers = item.numbers
     if "relative_standard_error" in numbers:
         return numbers["relative_standard_error"]
@@ -320,7 +302,6 @@ _MOTIONS: Mapping[Missing, _Planner] = {
     Missing.REVERSALS: _other_direction,
     Missing.ACCELERATION: _more_acceleration,
     Missing.SATURATION: _more_acceleration,
-    Missing.SLOWER_MOTION: _slow_motion,
     Missing.START_UP: _from_rest,
     Missing.MORE_RECORDINGS: _more_runs,
 }

@@ -56,16 +56,6 @@ _DEPENDENT = 1e7
 _LEAST_REMAINING = 1e-6
 # A coefficient takes part in a combination that is lost if its share is above this [-].
 _INVOLVED = 1e-3
-# Iterations of the robust weights, and the change relative to the force at which they stop.
-_ITERATIONS, _SAME = 30, 1e-6
-
-
-class ResidualLoss(Enum):
-    """The loss of a residual r in units of the scatter: how much an outlier counts."""
-
-    SQUARES = "squares"
-    HUBER = "Huber"
-    SOFT_L1 = "soft L1"
 
 
 class LagForm(Enum):
@@ -204,9 +194,9 @@ class FilteredRun:
     """A run's channels through one low-pass; all arrays (n,) on the run's clock, NaN where they are unknown.
 
     `inner_speed` is the speed from a low-pass of half the length: friction is a function of it, before the low-pass.
-    `reference_speed` and `reference_acceleration` are filtered like the measured ones; None without a reference.
-    `inner_reference_speed` likewise. `unknown_speed` [m/s, rad/s]: below it the sign of the speed is unknown.
-    `position` is the measured one, or the integral of the speed. `force_slope`: the derivative of `force` [N/s, N m/s].
+    `unknown_speed` [m/s, rad/s]: below it the sign of the speed is unknown. `position` is the measured one, or the
+    integral of the speed. `force_slope`: the derivative of `force` [N/s, N m/s]. `instruments` (n, 4): the `columns` of
+    the reference; None without one.
     """
 
     run: AxisRun
@@ -217,18 +207,14 @@ class FilteredRun:
     speed: FloatArray
     position: FloatArray
     inner_speed: FloatArray
-    reference_acceleration: FloatArray | None
-    reference_speed: FloatArray | None
-    inner_reference_speed: FloatArray | None
+    instruments: FloatArray | None
     acceleration_noise: float
-    unknown_speed: float = 0.0
+    unknown_speed: float
 
     @cached_property
-    def sign(self) -> FloatArray:
-        """Return the sign of the inner speed (n,), straight through the speeds at which it is unknown."""
-        if self.unknown_speed <= 0.0:
-            return np.sign(self.inner_speed)
-        return np.clip(self.inner_speed / self.unknown_speed, -1.0, 1.0)
+    def columns(self) -> FloatArray:
+        """Return what multiplies mass, viscous, Coulomb and constant friction (n, 4)."""
+        return _columns(self.low_pass, self.acceleration, self.speed, self.inner_speed, self.unknown_speed)
 
     @property
     def is_hidden(self) -> bool:
@@ -238,13 +224,6 @@ class FilteredRun:
         seen_as_rest = self.unknown_speed * self.low_pass.reach * self.run.period
         is_moving = travel > _TRAVEL_SEEN * seen_as_rest
         return is_moving and self.unknown_speed >= _HIDDEN_SHARE * _usual_highest(self.inner_speed)
-
-    @cached_property
-    def reference_sign(self) -> FloatArray | None:
-        """Return the sign of the reference speed (n,), as `sign`; None without a reference."""
-        if self.inner_reference_speed is None:
-            return None
-        return np.clip(self.inner_reference_speed / max(self.unknown_speed, 1e-12), -1.0, 1.0)
 
     @cached_property
     def complete(self) -> npt.NDArray[np.bool_]:
@@ -326,15 +305,13 @@ def _usual_highest(speed: FloatArray) -> float:
     return float(np.quantile(known, 0.95)) if len(known) else 0.0
 
 
-def filter_run(
-    run: AxisRun, corner: float, unknown_speed: float | None = None, torque_lag: TorqueLag = NO_LAG
-) -> FilteredRun:
+def filter_run(run: AxisRun, corner: float, torque_lag: TorqueLag = NO_LAG) -> FilteredRun:
     """Return a run's channels through a low-pass of `corner` [Hz].
 
     Speed and acceleration come from the measured position, or from the speed if the position is missing or is
-    its integral. `unknown_speed` [m/s, rad/s]: below it the sign is unknown; by default 0.5 % of the usual highest
-    speed, or 4 standard deviations of the speed's noise. `torque_lag` is undone: F + lag F' for a low-pass, a shift
-    for a delay. Raises RecordingError without position and speed.
+    its integral. The sign of the speed is unknown below 0.5 % of the usual highest speed, and below 4 standard
+    deviations of the speed's noise. `torque_lag` is undone: F + lag F' for a low-pass, a shift for a delay. Raises
+    IdentificationError without position and speed.
     """
     low_pass, inner = LowPass(corner, run.period), LowPass(2.0 * corner, run.period)
     by_position = run.position is not None and ("position" not in run.derived or run.speed is None)
@@ -350,11 +327,9 @@ def filter_run(
         speed_noise, acceleration_noise = noise / math.sqrt(inner.steps), low_pass.slope_noise(noise)
     else:
         raise IdentificationError(f"{run.name}: no speed or position", "map one of them in [channels]")
-    if unknown_speed is None:
-        rounding = _ROUNDING * float(np.max(np.abs(source[np.isfinite(source)]), initial=0.0))
-        speed_noise += inner.slope_noise(rounding) if by_position else rounding
-        unknown_speed = max(_UNKNOWN_SHARE * _usual_highest(inner_speed), _UNKNOWN_DEVIATIONS * speed_noise)
-    reference = _filtered_reference(run, low_pass, inner)
+    rounding = _ROUNDING * float(np.max(np.abs(source[np.isfinite(source)]), initial=0.0))
+    speed_noise += inner.slope_noise(rounding) if by_position else rounding
+    unknown_speed = max(_UNKNOWN_SHARE * _usual_highest(inner_speed), _UNKNOWN_DEVIATIONS * speed_noise)
     position = run.position
     if position is None:
         position = np.cumsum(np.nan_to_num(source)) * run.period
@@ -372,22 +347,33 @@ def filter_run(
         speed,
         low_pass.value(position),
         inner_speed,
-        *reference,
+        _instruments(run, low_pass, inner, unknown_speed),
         acceleration_noise,
         unknown_speed,
     )
 
 
-def _filtered_reference(
-    run: AxisRun, low_pass: LowPass, inner: LowPass
-) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
-    """Return acceleration, speed and inner speed of the reference; the position reference, if logged, comes first."""
+def _instruments(run: AxisRun, low_pass: LowPass, inner: LowPass, unknown_speed: float) -> FloatArray | None:
+    """Return the columns (n, 4) of the reference; the position reference, if logged, comes first."""
     position, speed = run.reference_position, run.reference_speed
     if position is not None and "reference_position" not in run.derived and _is_mostly_known(position):
-        return low_pass.curvature(position), low_pass.slope(position), inner.slope(position)
-    if speed is not None and "reference_speed" not in run.derived and _is_mostly_known(speed):
-        return low_pass.slope(speed), low_pass.value(speed), inner.value(speed)
-    return None, None, None
+        motion = low_pass.curvature(position), low_pass.slope(position), inner.slope(position)
+    elif speed is not None and "reference_speed" not in run.derived and _is_mostly_known(speed):
+        motion = low_pass.slope(speed), low_pass.value(speed), inner.value(speed)
+    else:
+        return None
+    return _columns(low_pass, *motion, unknown_speed)
+
+
+def _columns(
+    low_pass: LowPass, acceleration: FloatArray, speed: FloatArray, inner_speed: FloatArray, unknown_speed: float
+) -> FloatArray:
+    """Return acceleration, speed, low-passed sign of the speed, and 1 (n, 4).
+
+    The sign is straight through the speeds at which it is unknown.
+    """
+    sign = np.clip(inner_speed / max(unknown_speed, 1e-12), -1.0, 1.0)
+    return np.column_stack((acceleration, speed, low_pass.value(sign), np.ones(len(speed))))
 
 
 def _is_mostly_known(reference: FloatArray) -> bool:
@@ -396,14 +382,13 @@ def _is_mostly_known(reference: FloatArray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Coefficients (p,) of a linear regression, with the weights and residuals (m,) of its equations.
+    """Coefficients (p,) of a linear regression, and the residuals (m,) of its equations.
 
     `condition_number`: of the regressors (m, p) scaled to unit length (least squares), or of the equally scaled product
     of instruments (m, p) and regressors.
     """
 
     coefficients: FloatArray
-    weights: FloatArray
     residuals: FloatArray
     condition_number: float
     regressors: FloatArray = field(repr=False)
@@ -411,19 +396,14 @@ class LinearFit:
 
     @cached_property
     def influence(self) -> FloatArray:
-        """Return (p, m) of coefficients = influence @ force, for the weights as they are."""
+        """Return (p, m) of coefficients = influence @ force."""
         scale = _lengths(self.regressors)
-        weighted = (self.instruments * self.weights[:, None]).T
-        influence: FloatArray = np.linalg.solve(weighted @ (self.regressors / scale), weighted) / scale[:, None]
+        product = self.instruments.T @ (self.regressors / scale)
+        influence: FloatArray = np.linalg.solve(product, self.instruments.T) / scale[:, None]
         return influence
 
 
-def fit_linear(
-    regressors: FloatArray,
-    force: FloatArray,
-    instruments: FloatArray | None = None,
-    loss: ResidualLoss = ResidualLoss.SQUARES,
-) -> LinearFit:
+def fit_linear(regressors: FloatArray, force: FloatArray, instruments: FloatArray | None = None) -> LinearFit:
     """Fit force = regressors @ coefficients by least squares, or by instrumental variables.
 
     Parameters
@@ -435,8 +415,6 @@ def fit_linear(
     instruments : ndarray, shape (m, p), optional
         Correlated with the regressors, not with the noise. A controller feeds the noise back into the motion, so that
         regressors from measurements are correlated with it, and those from references are not.
-    loss : ResidualLoss
-        Anything but SQUARES gives outliers less weight (iterated; the scale is 1.4826 times the median of |residual|).
 
     Returns
     -------
@@ -449,8 +427,8 @@ def fit_linear(
 
     Notes
     -----
-    Soderstrom and Stoica, "System Identification", 1989, chapter 8: Z' W (F - X c) = 0 with the instruments Z, for
-    least squares Z = X. W are the weights of iteratively re-weighted least squares (Holland and Welsch, 1977).
+    Soderstrom and Stoica, "System Identification", 1989, chapter 8: Z' (F - X c) = 0 with the instruments Z, for
+    least squares Z = X.
 
     Examples
     --------
@@ -467,22 +445,14 @@ def fit_linear(
     scale = _lengths(regressors)
     scaled = regressors / scale
     given = scaled if instruments is None else instruments / _lengths(instruments)
-    weights = np.ones(count)
     condition = _condition(given.T @ scaled, instruments is None)
     if not condition < _DEPENDENT:
         raise IdentificationError(
             f"the regressors depend on each other (condition number {condition:.3g})",
             "the recordings need more varied motion",
         )
-    coefficients = _solved(scaled, force, given, weights)
-    for _ in range(_ITERATIONS if loss is not ResidualLoss.SQUARES else 0):
-        weights = _robust_weights(force - scaled @ coefficients, force, loss)
-        before = coefficients
-        coefficients = _solved(scaled, force, given, weights)
-        if np.max(np.abs(coefficients - before)) <= _SAME * np.max(np.abs(coefficients)):
-            break
-    residuals = force - scaled @ coefficients
-    return LinearFit(coefficients / scale, weights, residuals, condition, regressors, given)
+    coefficients = np.asarray(np.linalg.solve(given.T @ scaled, given.T @ force), dtype=np.float64)
+    return LinearFit(coefficients / scale, force - scaled @ coefficients, condition, regressors, given)
 
 
 def _condition(product: FloatArray, is_square_of_regressors: bool) -> float:
@@ -496,22 +466,6 @@ def _lengths(columns: FloatArray) -> FloatArray:
     lengths = np.asarray(np.sqrt(np.einsum("ij,ij->j", columns, columns)), dtype=np.float64)
     lengths[lengths == 0.0] = 1.0
     return lengths
-
-
-def _solved(regressors: FloatArray, force: FloatArray, instruments: FloatArray, weights: FloatArray) -> FloatArray:
-    weighted = (instruments * weights[:, None]).T
-    return np.asarray(np.linalg.solve(weighted @ regressors, weighted @ force), dtype=np.float64)
-
-
-def _robust_weights(residuals: FloatArray, force: FloatArray, loss: ResidualLoss) -> FloatArray:
-    """Return rho'(u) / u of each residual, u in units of 1.345 times the scatter (Huber's 95 % efficiency)."""
-    # No sensor resolves 1e-9 of its range: less scatter is rounding, which must not choose weights.
-    scatter = max(1.4826 * float(np.median(np.abs(residuals))), 1e-9 * float(np.max(np.abs(force)))) or 1.0
-    ratio = np.abs(residuals) / (1.345 * scatter)
-    if loss is ResidualLoss.HUBER:
-        return 1.0 / np.maximum(ratio, 1.0)
-    weights: FloatArray = 1.0 / np.sqrt(1.0 + ratio**2)
-    return weights
 
 
 def block_covariance(fit: LinearFit, block: IntArray) -> FloatArray:

@@ -1,64 +1,20 @@
-"""Friction over speed and over position: as columns of a regression, as a curve, and as a source of standard errors."""
+"""Friction over speed and over position: as a curve, and as a source of standard errors."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.identify.axis.filtered_regression import FilteredRun, IntArray
+from cdtool.commands.identify.axis.filtered_regression import IntArray
 
-# Knots of the friction spline: shares of the highest speed, closer together where the friction changes fast.
-_KNOTS = (0.0, 0.025, 0.0625, 0.16, 0.32, 0.64, 1.0)
 # The wave numbers of a profile that the fitted coefficients absorb: their magnitude comes from those above.
 _ABSORBED = 2
 # The most points of a profile over the travel, and the fewest equations per point.
 _MOST_POINTS, _FEWEST_PER_POINT = 256, 4
-
-
-class FrictionForm(Enum):
-    """The description of the friction over speed."""
-
-    COULOMB_VISCOUS = "Coulomb per direction and viscous"
-    STRIBECK = "Coulomb, Stribeck rise and viscous, each per direction"
-    SPLINE = "piecewise linear over speed, per direction"
-
-
-@dataclass(frozen=True)
-class FrictionShape:
-    """A form with the numbers that its columns need: Stribeck speed and highest speed [m/s, rad/s]."""
-
-    form: FrictionForm
-    highest_speed: float
-    stribeck_speed: float = math.nan
-    directions: tuple[int, ...] = (1, -1)
-
-    def columns(self, run: FilteredRun) -> FloatArray:
-        """Return the low-passed columns (n, c) that multiply the friction's coefficients, on the run's clock.
-
-        They are functions of the inner speed before the low-pass. A force of 1 in the direction of travel opposes it.
-        """
-        speed, sign = run.inner_speed, run.sign
-        columns: list[FloatArray] = []
-        for direction in self.directions:
-            share = np.maximum(direction * sign, 0.0)
-            for shape in self._shapes(np.abs(speed)):
-                columns.append(run.low_pass.value(direction * share * shape))
-        return np.column_stack(columns)
-
-    def _shapes(self, speed: FloatArray) -> list[FloatArray]:
-        """Return the functions of |speed| (n,) of one direction."""
-        constant = np.where(np.isnan(speed), np.nan, 1.0)
-        if self.form is FrictionForm.COULOMB_VISCOUS:
-            return [constant, speed]
-        if self.form is FrictionForm.STRIBECK:
-            return [constant, speed, np.exp(-((speed / self.stribeck_speed) ** 2))]
-        knots = self.highest_speed * np.array(_KNOTS)
-        return [np.interp(speed, knots, row) for row in np.eye(len(knots))]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,11 +15,9 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.excitation import SAME_SPEED, SPEEDS_NEEDED, Excitation, measure_excitation
 from cdtool.commands.identify.axis.filtered_regression import (
-    NO_LAG,
     FilteredRun,
     IntArray,
     LinearFit,
-    ResidualLoss,
     TorqueLag,
     block_covariance,
     filter_run,
@@ -27,13 +25,11 @@ from cdtool.commands.identify.axis.filtered_regression import (
 )
 from cdtool.commands.identify.axis.friction_curve import (
     FrictionCurve,
-    FrictionForm,
-    FrictionShape,
     friction_curve,
     profile_covariance,
     speed_edges,
 )
-from cdtool.commands.identify.axis.torque_lag import MotionColumns, apparent_lag, best_lag
+from cdtool.commands.identify.axis.torque_lag import apparent_lag, best_lag
 from cdtool.commands.identify.estimate import (
     Estimate,
     IdentificationError,
@@ -44,107 +40,84 @@ from cdtool.commands.identify.estimate import (
 )
 from cdtool.machines.axis_model.axis_run import AxisRun
 
-# Fewer equations than this identify nothing.
-_FEWEST_EQUATIONS = 50
-# With this relative standard error or more a parameter is not identifiable [-].
-_MASS_ERROR, _VISCOUS_ERROR, _COULOMB_ERROR = 0.5, 0.3, 0.5
-# Strokes are the blocks of the standard errors; with fewer per direction they are cut into this many pieces.
-_ENOUGH_STROKES, _PIECES = 3, 6
-# Acceleration with this share of noise [-] is not fitted by least squares, which would lower the mass by its square.
-_NOISY = 0.2
-# Stribeck speeds that are tried, as shares of the highest speed.
-_STRIBECK_SHARES = (0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
-# The weight of the difference of two neighbouring knots per equation: it only matters where no equation is.
-_KNOT_WEIGHT = 1e-4
-# The form of an identified lag of the torque is a guess: this share of what it changes in the mass [-] is an error, and
-# this share of what a lag that is not certain would change.
-_LAG_FORM, _LAG_LEFT = 0.25, 0.5
-# The most folds of a cross-validation.
-_MOST_FOLDS = 8
-# A sample moves for the cross-validation above this share of the usual highest speed.
-_MOVING_SHARE = 0.05
-# A direction that was not learned may have this share of the weight of a prediction.
-_UNLEARNED_WEIGHT = 0.05
-# Strokes repeat each other within this relative difference of duration and travel [-]; they are shifted by at least
-# this many samples to align them.
-_SAME_STROKE, _ALIGNED_WITHIN = 0.02, 10
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RigidAxisSettings:
     """How a rigid axis is identified.
 
-    `low_pass_hz`: corner of the low-pass of every term. `unknown_speed` [m/s, rad/s]: see `filter_run`. `method`:
-    LEAST_SQUARES or INSTRUMENTAL_VARIABLES; None is the latter if every run has a reference, or if the acceleration is
-    noisy. Without references the instruments are the measured signals, delayed. `prediction`: the friction of
-    `predict_force`; None is the one with the smallest error in cross-validation, or COULOMB_VISCOUS without it.
-    `rotary`: the units of the estimates. `seed`: of the random friction profiles of the standard errors.
-    `torque_filter_time` [s]: of the low-pass through which the torque was logged, 0 for none; None if it is not known:
-    a lag that the runs show is then undone.
+    `low_pass_hz`: corner of the low-pass of every term. `method`: LEAST_SQUARES or INSTRUMENTAL_VARIABLES; None is the
+    latter if every run has a reference, or if the acceleration is noisy. Without references the instruments are the
+    measured signals, delayed. `units`: of inertia, force and travel. `torque_filter_time` [s]: of the low-pass through
+    which the torque was logged, 0 for none; None if it is not known: a lag that the runs show is then undone.
     """
 
     low_pass_hz: float = 20.0
-    unknown_speed: float | None = None
     method: Method | None = None
-    loss: ResidualLoss = ResidualLoss.SQUARES
-    prediction: FrictionForm | None = None
-    cross_validate: bool = True
-    rotary: bool = False
-    joint: int = 0
-    seed: int = 0
+    units: tuple[str, str, str] = ("kg", "N", "m")
     torque_filter_time: float | None = None
+    #: Fewer equations identify nothing.
+    fewest_equations: int = 50
+    #: With this relative standard error or more a parameter is not identifiable: of the mass ...
+    largest_mass_error: float = 0.5
+    #: ... of viscous friction, which a small range of speeds makes up from anything ...
+    largest_viscous_error: float = 0.3
+    #: ... and of Coulomb friction.
+    largest_coulomb_error: float = 0.5
+    #: Acceleration with this share of noise is not fitted by least squares: it would lower the mass by its square.
+    noisy: float = 0.2
+    #: The form of an identified lag of the torque is a guess: this share of what it changes in the mass is an error ...
+    lag_form: float = 0.25
+    #: ... and this share of what a lag that is not certain would change.
+    lag_left: float = 0.5
+    #: The most folds of a cross-validation.
+    folds: int = 8
+
+
+# Strokes are the blocks of the standard errors; with fewer per direction they are cut into this many pieces.
+_ENOUGH_STROKES, _PIECES = 3, 6
+# Strokes repeat each other within this share of duration and travel; their forces are compared at so many times within
+# this share of them, as their ends do not agree to a sample.
+_SAME_STROKE, _TIMES, _INNER = 0.02, 400, 0.98
 
 
 @dataclass(frozen=True, eq=False)
-class Residuals:
-    """The equations of the fit: all arrays (m,), moving samples only.
+class UnseenRun:
+    """The force on a run whose parts were left out of the fit in turn: (n,) [N, N m] at `time` [s] while moving.
 
-    `run`: index of the run. `force`: low-passed [N, N m]; `residual`: force minus the model; `friction`: force minus
-    the inertia's.
+    `of_runs`: the number of runs it is the worst of.
     """
 
-    run: IntArray
+    run: str
     time: FloatArray
-    position: FloatArray
-    speed: FloatArray
-    acceleration: FloatArray
-    force: FloatArray
-    friction: FloatArray
-    residual: FloatArray
+    measured: FloatArray
+    predicted: FloatArray
+    of_runs: int
+
+    @property
+    def error(self) -> float:
+        """Return the root mean square of what the prediction leaves over [N, N m]."""
+        return float(np.sqrt(np.mean((self.measured - self.predicted) ** 2)))
 
 
-@dataclass(frozen=True)
-class ForceError:
-    """Root mean square error of a predicted force [N, N m]: of all samples, and of the `moving_count` moving ones."""
-
-    all: float
-    moving: float
-    count: int
-    moving_count: int
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """The error of the predicted force in runs, or strokes of a single run, that were left out of the fit.
+    """How well the force is predicted while moving, in runs, or strokes of a single run, left out of the fit.
 
-    `errors`: per form of the friction. `folds`: how often something was left out. `floor` [N, N m]: standard deviation
-    of the force between strokes that repeat each other, over `repeats` strokes; NaN without repeats.
+    `error` [N, N m]: root mean square. `folds`: how often something was left out. `floor` [N, N m]: standard deviation
+    of the force between strokes that repeat each other, over `repeats` strokes; NaN without repeats. `worst`: the run
+    that is described worst.
     """
 
-    errors: dict[FrictionForm, ForceError]
+    error: float
     folds: int
     floor: float
     repeats: int
-
-    @property
-    def best(self) -> FrictionForm:
-        """Return the form with the smallest error while moving."""
-        return min(self.errors, key=lambda form: (math.isnan(self.errors[form].moving), self.errors[form].moving))
+    worst: UnseenRun
 
     @property
     def left_over(self) -> float:
-        """Return the smallest error while moving over the floor; NaN without a floor."""
-        return self.errors[self.best].moving / self.floor if self.floor > 0.0 else math.nan
+        """Return the error over the floor; NaN without a floor."""
+        return self.error / self.floor if self.floor > 0.0 else math.nan
 
 
 @dataclass(frozen=True)
@@ -162,32 +135,14 @@ class FrictionLevel:
 
 
 @dataclass(frozen=True, eq=False)
-class PredictionModel:
-    """Mass [kg, kg m2] and friction coefficients (c,) for the columns of `shape`."""
-
-    shape: FrictionShape
-    mass: float
-    coefficients: FloatArray
-
-    def force(self, run: FilteredRun) -> FloatArray:
-        """Return the low-passed force (n,); NaN where the run is incomplete or moves in a direction not learned."""
-        force: FloatArray = self.mass * run.acceleration + self.shape.columns(run) @ self.coefficients
-        force[~run.complete] = np.nan
-        for direction in {1, -1} - set(self.shape.directions):
-            weight = run.low_pass.value(np.maximum(direction * run.sign, 0.0))
-            force[np.nan_to_num(weight) > _UNLEARNED_WEIGHT] = np.nan
-        return force
-
-
-@dataclass(frozen=True, eq=False)
 class RigidAxisFit:
     """An identified rigid axis.
 
     `identified`: per parameter an estimate or what is missing. `total_mass` [kg, kg m2] with its standard error: motor
-    and load. `levels`: per direction. `friction_curve`: the whole friction over signed speed; `position_curves`: the
-    residual over position, per direction (1, -1). `cross_validation` is None with a single stroke, or if not wanted.
-    `torque_lag`: behind the motion, stated or found; the force of residuals and predictions is
-    without it.
+    and load. `levels`: per direction. `speed`, `friction`, `residual` (m,): of each equation, the force without that of
+    the inertia, and what the model leaves over. `friction_curve`: the friction over signed speed; `position_curves`:
+    the residual over position, per direction (1, -1). `cross_validation` is None with a single stroke. `torque_lag`:
+    behind the motion, stated or found; all forces are without it.
     """
 
     identified: Identified
@@ -196,13 +151,13 @@ class RigidAxisFit:
     levels: tuple[FrictionLevel, ...]
     condition_number: float
     excitation: Excitation
-    residuals: Residuals = field(repr=False)
+    speed: FloatArray = field(repr=False)
+    friction: FloatArray = field(repr=False)
+    residual: FloatArray = field(repr=False)
     friction_curve: FrictionCurve = field(repr=False)
     position_curves: dict[int, FrictionCurve] = field(repr=False)
     cross_validation: CrossValidation | None
-    prediction: PredictionModel = field(repr=False)
-    settings: RigidAxisSettings
-    torque_lag: TorqueLag = NO_LAG
+    torque_lag: TorqueLag
 
 
 def identify_rigid_axis(
@@ -250,98 +205,60 @@ def identify_rigid_axis(
     """
     if not runs:
         raise IdentificationError("no runs", "give at least one impact-free recording")
-    filtered = _filtered(runs, settings, TorqueLag(settings.torque_filter_time or 0.0))
+    filtered = [filter_run(run, settings.low_pass_hz, TorqueLag(settings.torque_filter_time or 0.0)) for run in runs]
     excitation = measure_excitation(filtered)
     equations = _equations(filtered, excitation, settings)
-    if len(equations.force) < _FEWEST_EQUATIONS:
-        hidden = [run for run in filtered if run.is_hidden]
-        if len(hidden) == len(filtered):
-            raise IdentificationError(
-                f"{runs[0].name}: noise or steps of speed or position hide speeds below {hidden[0].unknown_speed:.3g} "
-                f"{_units(settings).speed}, and the axis is never faster",
-                "map a finer channel, or log faster motion",
-            )
-        raise IdentificationError(
-            f"{runs[0].name}: hardly any motion ({len(equations.force)} usable equations, "
-            f"{excitation.moving_time:.3g} s in {counted(len(runs), 'recording')})",
-            f"identification needs at least {_FEWEST_EQUATIONS}: recordings in which the axis moves",
-        )
+    if len(equations.force) < settings.fewest_equations:
+        raise _too_few(filtered, excitation, len(equations.force), settings)
     lag = _torque_lag(equations, excitation, settings)
     if lag.is_found:
-        filtered = _filtered(runs, settings, lag.lag)
+        filtered = [filter_run(run, settings.low_pass_hz, lag.lag) for run in runs]
         equations = _equations(filtered, excitation, settings)
-    solution = _with_noise_error(_solve(equations, excitation, settings), excitation)
-    levels = _levels(equations, solution.mass, excitation, settings)
+    solution = _with_noise_error(_solve(equations, excitation), excitation)
+    levels = _levels(equations, solution.mass, excitation)
     solution = replace(solution, mass_error=math.hypot(solution.mass_error, lag.mass_error), levels=levels)
-    validation, prediction = _predict(filtered, excitation, settings)
-    residuals = _residuals(equations, solution)
+    speed, friction = equations.regressors[:, 1], equations.force - solution.mass * equations.regressors[:, 0]
     return RigidAxisFit(
-        Identified(*_answers(solution, excitation, motor_mass, settings, lag)),
+        Identified.of(_answers(solution, excitation, motor_mass, settings, lag)),
         solution.mass,
         solution.mass_error,
         solution.levels,
         solution.fit.condition_number,
         excitation,
-        residuals,
-        friction_curve(residuals.speed, residuals.friction, equations.stroke, speed_edges(residuals.speed)),
-        _position_curves(residuals, equations.stroke),
-        validation,
-        prediction,
-        settings,
+        speed,
+        friction,
+        solution.fit.residuals,
+        friction_curve(speed, friction, equations.stroke, speed_edges(speed)),
+        _position_curves(equations, solution.fit.residuals),
+        _cross_validate(equations, settings.folds),
         lag.lag,
     )
 
 
-def predict_force(fit: RigidAxisFit, run: AxisRun) -> FloatArray:
-    """Return the force (n,) [N, N m] that the fit predicts for a run, through the fit's low-pass.
-
-    NaN at both ends and within reach of missing samples, and in a direction that the fit did not see. Compare it with
-    `low_passed_force`. Raises RecordingError without speed and position.
-    """
-    return fit.prediction.force(_as_fitted(fit, run))
-
-
-def low_passed_force(fit: RigidAxisFit, run: AxisRun) -> FloatArray:
-    """Return a run's measured force (n,) [N, N m] through the fit's low-pass; NaN as in `predict_force`."""
-    return _as_fitted(fit, run).force
-
-
-def _as_fitted(fit: RigidAxisFit, run: AxisRun) -> FilteredRun:
-    (filtered,) = _filtered([run], fit.settings, fit.torque_lag)
-    return filtered
-
-
-def _filtered(runs: Sequence[AxisRun], settings: RigidAxisSettings, torque_lag: TorqueLag) -> list[FilteredRun]:
-    return [filter_run(run, settings.low_pass_hz, settings.unknown_speed, torque_lag) for run in runs]
-
-
-def _is_fast(run: FilteredRun) -> BoolArray:
-    speed = np.abs(run.speed)
-    known = speed[np.isfinite(speed)]
-    fast: BoolArray = speed >= _MOVING_SHARE * float(np.quantile(known, 0.95)) if len(known) else speed > 0.0
-    return fast
-
-
-def _force_error(error: FloatArray, is_fast: BoolArray) -> ForceError:
-    known = np.isfinite(error)
-    moving = known & is_fast
-    return ForceError(
-        _root_mean_square(error[known]),
-        _root_mean_square(error[moving]),
-        int(np.count_nonzero(known)),
-        int(np.count_nonzero(moving)),
+def _too_few(
+    filtered: Sequence[FilteredRun], excitation: Excitation, count: int, settings: RigidAxisSettings
+) -> IdentificationError:
+    hidden = [run for run in filtered if run.is_hidden]
+    name = filtered[0].run.name
+    if len(hidden) == len(filtered):
+        return IdentificationError(
+            f"{name}: noise or steps of speed or position hide speeds below {hidden[0].unknown_speed:.3g} "
+            f"{settings.units[2]}/s, and the axis is never faster",
+            "map a finer channel, or log faster motion",
+        )
+    return IdentificationError(
+        f"{name}: hardly any motion ({count} usable equations, "
+        f"{excitation.moving_time:.3g} s in {counted(len(filtered), 'recording')})",
+        f"identification needs at least {settings.fewest_equations}: recordings in which the axis moves",
     )
-
-
-def _root_mean_square(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class _Equations:
     """The equations of all runs, one per average of the low-pass; arrays (m,), columns (m, 4).
 
-    Columns: acceleration, speed, low-passed sign, 1. `instruments` has the same of the reference, or is None.
+    `regressors` are the `columns` of the runs; `instruments` has the same of the reference, or is None. `rows`: of
+    each run.
     """
 
     regressors: FloatArray
@@ -354,7 +271,7 @@ class _Equations:
     direction: FloatArray
     filtered: Sequence[FilteredRun]
     rows: Sequence[IntArray]
-    is_delayed: bool
+    is_forced: bool
 
     @property
     def block(self) -> IntArray:
@@ -371,51 +288,39 @@ class _Equations:
         return block
 
 
-def _delay(run: FilteredRun) -> int:
-    """Return the delay [samples] after which two outputs of the low-pass share no sample."""
-    return 2 * run.low_pass.reach + 1
+def _is_noisy(excitation: Excitation, settings: RigidAxisSettings) -> bool:
+    return excitation.acceleration_noise > settings.noisy * excitation.acceleration
 
 
-def _columns(acceleration: FloatArray, speed: FloatArray, sign: FloatArray) -> FloatArray:
-    return np.column_stack((acceleration, speed, sign, np.ones(len(speed))))
-
-
-def _instruments(run: FilteredRun, columns: FloatArray, method: Method | None) -> FloatArray | None:
-    """Return the instruments (n, 4): from the reference, or from the delayed columns (n, 4); None for least squares."""
-    if method is Method.LEAST_SQUARES:
+def _instruments(
+    filtered: Sequence[FilteredRun], excitation: Excitation, settings: RigidAxisSettings
+) -> list[FloatArray] | None:
+    """Return the instruments of each run (n, 4): of the reference, or the delayed columns; None for least squares."""
+    given = [run.instruments for run in filtered if run.instruments is not None]
+    if settings.method is Method.LEAST_SQUARES:
         return None
-    if run.reference_speed is not None and run.reference_acceleration is not None and run.reference_sign is not None:
-        return _columns(run.reference_acceleration, run.reference_speed, run.low_pass.value(run.reference_sign))
-    if method is Method.INSTRUMENTAL_VARIABLES:
-        delayed = np.full_like(columns, np.nan)
-        delay = _delay(run)
-        if delay < len(columns):
-            usable = np.where(run.usable[:, None], columns, np.nan)
-            delayed[delay:] = usable[:-delay]
-        return delayed
-    return None
+    if len(given) == len(filtered):
+        return given
+    is_wanted = settings.method is Method.INSTRUMENTAL_VARIABLES or _is_noisy(excitation, settings)
+    return [_delayed(run) for run in filtered] if is_wanted else None
 
 
-def _is_noisy(excitation: Excitation) -> bool:
-    return excitation.acceleration_noise > _NOISY * excitation.acceleration
+def _delayed(run: FilteredRun) -> FloatArray:
+    """Return the columns of a run (n, 4) so much later that they share no sample with those in time."""
+    delay = 2 * run.low_pass.reach + 1
+    delayed = np.full_like(run.columns, np.nan)
+    delayed[delay:] = np.where(run.usable[:, None], run.columns, np.nan)[:-delay]
+    return delayed
 
 
 def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings: RigidAxisSettings) -> _Equations:
-    columns = [_columns(run.acceleration, run.speed, run.low_pass.value(run.sign)) for run in filtered]
-    have_reference = all(run.reference_speed is not None for run in filtered)
-    preferred = Method.LEAST_SQUARES
-    if have_reference or _is_noisy(excitation):
-        preferred = Method.INSTRUMENTAL_VARIABLES
-    method = settings.method or preferred
-    if method is Method.INSTRUMENTAL_VARIABLES and not have_reference:
-        filtered = [replace(run, reference_speed=None, inner_reference_speed=None) for run in filtered]
-    instruments = [_instruments(run, column, method) for run, column in zip(filtered, columns, strict=True)]
+    instruments = _instruments(filtered, excitation, settings)
     main = 1.0 if excitation.forward_share >= 0.5 else -1.0
     rows = []
-    for run, given in zip(filtered, instruments, strict=True):
+    for number, run in enumerate(filtered):
         usable = run.usable.copy()
-        if given is not None:
-            usable &= np.isfinite(given).all(axis=1)
+        if instruments is not None:
+            usable &= np.isfinite(instruments[number]).all(axis=1)
         if excitation.is_one_way:
             usable &= np.sign(run.inner_speed) == main
         usable[np.arange(len(usable)) % run.low_pass.steps != 0] = False
@@ -425,10 +330,9 @@ def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings
     def gather(values: Sequence[FloatArray]) -> FloatArray:
         return np.concatenate([item[chosen] for item, chosen in zip(values, rows, strict=True)])
 
-    given_rows = [item for item in instruments if item is not None]
     return _Equations(
-        gather(columns),
-        gather(given_rows) if len(given_rows) == len(filtered) else None,
+        gather([run.columns for run in filtered]),
+        None if instruments is None else gather(instruments),
         gather([run.force for run in filtered]),
         gather([run.position for run in filtered]),
         np.repeat(np.arange(len(rows)), [len(item) for item in rows]),
@@ -437,7 +341,7 @@ def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings
         np.sign(gather([run.inner_speed for run in filtered])),
         filtered,
         rows,
-        method is Method.INSTRUMENTAL_VARIABLES and not have_reference,
+        settings.method is Method.INSTRUMENTAL_VARIABLES,
     )
 
 
@@ -452,28 +356,24 @@ class _LagAnswer:
 
 def _torque_lag(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _LagAnswer:
     stated = _LagAnswer(TorqueLag(settings.torque_filter_time or 0.0))
-    if _is_noisy(excitation) or Missing.ACCELERATION in excitation.missing:
+    if _is_noisy(excitation, settings) or not excitation.is_accelerated:
         return stated
-    chosen = _chosen_columns(excitation)
-    motions = [
-        MotionColumns(run, _columns(run.acceleration, run.speed, run.low_pass.value(run.sign))[:, chosen], rows)
-        for run, rows in zip(equations.filtered, equations.rows, strict=True)
-    ]
+    fitted = equations.filtered, equations.rows, _chosen_columns(excitation)
     try:
-        apparent = apparent_lag(motions, equations.block)
+        apparent = apparent_lag(*fitted, equations.block)
         if settings.torque_filter_time is not None or not apparent.is_certain:
-            return replace(stated, mass_error=_LAG_LEFT * abs(apparent.mass_change))
-        lag = best_lag(motions)
+            return replace(stated, mass_error=settings.lag_left * abs(apparent.mass_change))
+        lag = best_lag(*fitted, apparent.time)
     except IdentificationError:
         return stated
     # The mass is changed by the lag that was found, in proportion to the part of it that the least squares see.
     change = apparent.mass_change * max(lag.time / apparent.time, 1.0)
-    return _LagAnswer(lag, _LAG_FORM * abs(change), is_found=True)
+    return _LagAnswer(lag, settings.lag_form * abs(change), is_found=True)
 
 
 @dataclass(frozen=True, eq=False)
 class _AxisSolution:
-    """The fit whose coefficients are reported: mass, viscous if `has_viscous`, Coulomb, and constant if two-way."""
+    """The fit whose coefficients are reported: mass, viscous if there are speeds, Coulomb, and constant if two-way."""
 
     fit: LinearFit
     covariance: FloatArray
@@ -500,20 +400,20 @@ def _chosen_columns(excitation: Excitation) -> list[int]:
     return chosen if excitation.is_one_way else [*chosen, 3]
 
 
-def _solve(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _AxisSolution:
-    base = (0, 1, 2) if excitation.is_one_way else (0, 1, 2, 3)
-    if len(excitation.speeds) >= SPEEDS_NEEDED:
-        return _solution(equations, base, settings)
-    without = _solution(equations, _chosen_columns(excitation), settings)
+def _solve(equations: _Equations, excitation: Excitation) -> _AxisSolution:
+    chosen = _chosen_columns(excitation)
+    without = _solution(equations, chosen)
+    if 1 in chosen:
+        return without
     try:
-        whole = _solution(equations, base, settings)
+        whole = _solution(equations, sorted([*chosen, 1]))
     except IdentificationError:
         return without
     viscous, _ = whole.value(viscous=1.0)
     if viscous <= 0.0:
         return without
     # The viscous share of the friction lies between nothing and all of it.
-    levels = _levels(equations, without.mass, excitation, settings)
+    levels = _levels(equations, without.mass, excitation)
     most = min((level.force / level.speed for level in levels), default=0.0)
     half = 0.5 * (whole.mass - without.mass) * float(np.clip(most / viscous, 0.0, 1.0))
     return replace(without, mass=without.mass + half, mass_error=math.hypot(without.mass_error, half))
@@ -528,40 +428,32 @@ def _with_noise_error(solution: _AxisSolution, excitation: Excitation) -> _AxisS
     return replace(solution, mass_error=math.hypot(solution.mass_error, lost))
 
 
-def _regress(
-    equations: _Equations, regressors: FloatArray, instruments: FloatArray | None, settings: RigidAxisSettings
-) -> tuple[LinearFit, Method]:
+def _solution(equations: _Equations, chosen: Sequence[int]) -> _AxisSolution:
     """Fit by instrumental variables; if the references do not move as the axis does, by least squares."""
-    if instruments is not None:
+    columns, fit = list(chosen), None
+    if equations.instruments is not None:
         try:
-            fit = fit_linear(regressors, equations.force, instruments, settings.loss)
-            return fit, Method.INSTRUMENTAL_VARIABLES
+            fit = fit_linear(equations.regressors[:, columns], equations.force, equations.instruments[:, columns])
         except IdentificationError:
-            if settings.method is Method.INSTRUMENTAL_VARIABLES:
+            if equations.is_forced:
                 raise
-    return fit_linear(regressors, equations.force, None, settings.loss), Method.LEAST_SQUARES
-
-
-def _covariance(equations: _Equations, fit: LinearFit, settings: RigidAxisSettings) -> FloatArray:
-    along = profile_covariance(
-        fit.influence, fit.residuals, equations.position, equations.direction, seed=settings.seed
-    )
-    return block_covariance(fit, equations.block) + along
-
-
-def _solution(equations: _Equations, chosen: Sequence[int], settings: RigidAxisSettings) -> _AxisSolution:
-    columns = list(chosen)
-    instruments = None if equations.instruments is None else equations.instruments[:, columns]
-    fit, method = _regress(equations, equations.regressors[:, columns], instruments, settings)
-    covariance = _covariance(equations, fit, settings)
+    method = Method.LEAST_SQUARES if fit is None else Method.INSTRUMENTAL_VARIABLES
+    fit = fit or fit_linear(equations.regressors[:, columns], equations.force)
+    everything = np.ones(len(equations.force), dtype=np.bool_)
+    covariance = _covariance(fit, equations, everything)
     plain = _AxisSolution(fit, covariance, math.nan, math.nan, tuple(_NAMES[item] for item in columns), method)
     mass, mass_error = plain.value(mass=1.0)
     return replace(plain, mass=mass, mass_error=mass_error)
 
 
-def _levels(
-    equations: _Equations, mass: float, excitation: Excitation, settings: RigidAxisSettings
-) -> tuple[FrictionLevel, ...]:
+def _covariance(fit: LinearFit, equations: _Equations, chosen: BoolArray) -> FloatArray:
+    """Return the covariance (p, p) of a fit to the chosen equations: between strokes, and along the travel."""
+    position, direction = equations.position[chosen], equations.direction[chosen]
+    along = profile_covariance(fit.influence, fit.residuals, position, direction)
+    return block_covariance(fit, equations.block[chosen]) + along
+
+
+def _levels(equations: _Equations, mass: float, excitation: Excitation) -> tuple[FrictionLevel, ...]:
     speed, friction = np.abs(equations.regressors[:, 1]), equations.force - mass * equations.regressors[:, 0]
     nominal = excitation.speeds[-1] if excitation.speeds else excitation.highest_speed
     levels = []
@@ -570,10 +462,8 @@ def _levels(
         if not np.any(inside):
             continue
         fit = fit_linear(np.full((np.count_nonzero(inside), 1), float(direction)), friction[inside])
-        along = equations.position[inside], equations.direction[inside]
-        variance = block_covariance(fit, equations.block[inside])
-        variance += profile_covariance(fit.influence, fit.residuals, *along, seed=settings.seed)
-        error = math.sqrt(variance[0, 0]) if variance[0, 0] >= 0.0 else math.nan
+        variance = _covariance(fit, equations, inside)[0, 0]
+        error = math.sqrt(variance) if variance >= 0.0 else math.nan
         levels.append(FrictionLevel(direction, float(np.mean(speed[inside])), float(fit.coefficients[0]), error))
     return tuple(levels)
 
@@ -583,48 +473,26 @@ def _is_certain(value: float, error: float, most: float) -> bool:
     return value > 0.0 and error <= most * value
 
 
-@dataclass(frozen=True)
-class _Units:
-    mass: str
-    viscous: str
-    force: str
-    speed: str
-
-
-_LINEAR = _Units("kg", "N s/m", "N", "m/s")
-_ROTARY = _Units("kg m2", "N m s/rad", "N m", "rad/s")
-
-
-def _units(settings: RigidAxisSettings) -> _Units:
-    return _ROTARY if settings.rotary else _LINEAR
-
-
 def _answers(
     solution: _AxisSolution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings, lag: _LagAnswer
-) -> tuple[tuple[Estimate, ...], tuple[NotIdentifiable, ...]]:
-    units = _units(settings)
+) -> list[Estimate | NotIdentifiable]:
     answers = [
-        _load_mass(solution, excitation, motor_mass, units),
-        _viscous(solution, excitation, units),
-        *_coulomb(solution, excitation, units),
-        *((_torque_filter(lag, solution.method),) if lag.is_found else ()),
+        _load_mass(solution, excitation, motor_mass, settings),
+        _viscous(solution, excitation, settings),
+        *_coulomb(solution, excitation, settings),
     ]
-    estimates = tuple(replace(item, joint=settings.joint) for item in answers if isinstance(item, Estimate))
-    others = tuple(replace(item, joint=settings.joint) for item in answers if isinstance(item, NotIdentifiable))
-    return estimates, others
-
-
-def _torque_filter(lag: _LagAnswer, method: Method) -> Estimate:
-    return Estimate("model.sensors", "torque_filter_time", lag.lag.time, _LAG_FORM * lag.lag.time, "s", method)
+    if lag.is_found:
+        time, error = lag.lag.time, settings.lag_form * lag.lag.time
+        answers.append(Estimate("model.sensors", "torque_filter_time", time, error, "s", solution.method))
+    return answers
 
 
 def _load_mass(
-    solution: _AxisSolution, excitation: Excitation, motor_mass: float, units: _Units
+    solution: _AxisSolution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings
 ) -> Estimate | NotIdentifiable:
-    load, error = solution.mass - motor_mass, solution.mass_error
-    is_accelerated = Missing.ACCELERATION not in excitation.missing
-    if is_accelerated and _is_certain(load, error, _MASS_ERROR):
-        return Estimate("machine", "load_mass", load, error, units.mass, solution.method)
+    load, error, most = solution.mass - motor_mass, solution.mass_error, settings.largest_mass_error
+    if excitation.is_accelerated and _is_certain(load, error, most):
+        return Estimate("machine", "load_mass", load, error, settings.units[0], solution.method)
     numbers = {
         "total_mass": solution.mass,
         "standard_error": error,
@@ -633,9 +501,9 @@ def _load_mass(
         "acceleration_noise": excitation.acceleration_noise,
     }
     missing = [Missing.ACCELERATION]
-    if _is_noisy(excitation):
+    if _is_noisy(excitation, settings):
         missing.append(Missing.FINER_MOTION)
-    if is_accelerated and load < error and _is_certain(solution.mass, error, 0.5 * _MASS_ERROR):
+    if excitation.is_accelerated and load < error and _is_certain(solution.mass, error, 0.5 * most):
         # The total is known; that the motor alone has as much is a question of the motor's inertia.
         missing = [Missing.MOTOR_INERTIA]
     elif math.isinf(error):
@@ -655,15 +523,18 @@ def _speed_numbers(solution: _AxisSolution, excitation: Excitation) -> dict[str,
     return numbers
 
 
-def _viscous(solution: _AxisSolution, excitation: Excitation, units: _Units) -> Estimate | NotIdentifiable:
+def _viscous(
+    solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
+) -> Estimate | NotIdentifiable:
     numbers = _speed_numbers(solution, excitation)
-    if "viscous" in solution.names:
-        value, error = solution.value(viscous=1.0)
-        if _is_certain(value, error, _VISCOUS_ERROR):
-            return Estimate("machine", "viscous_friction", value, error, units.viscous, solution.method)
-        numbers |= {"value": value, "standard_error": error}
-        return NotIdentifiable("machine", "viscous_friction", (Missing.MORE_RECORDINGS,), numbers)
-    return NotIdentifiable("machine", "viscous_friction", (Missing.SECOND_SPEED,), numbers)
+    if "viscous" not in solution.names:
+        return NotIdentifiable("machine", "viscous_friction", (Missing.SECOND_SPEED,), numbers)
+    value, error = solution.value(viscous=1.0)
+    _, force, travel = settings.units
+    if _is_certain(value, error, settings.largest_viscous_error):
+        return Estimate("machine", "viscous_friction", value, error, f"{force} s/{travel}", solution.method)
+    numbers |= {"value": value, "standard_error": error}
+    return NotIdentifiable("machine", "viscous_friction", (Missing.MORE_RECORDINGS,), numbers)
 
 
 _COULOMB_KEYS = (
@@ -673,15 +544,18 @@ _COULOMB_KEYS = (
 )
 
 
-def _coulomb(solution: _AxisSolution, excitation: Excitation, units: _Units) -> list[Estimate | NotIdentifiable]:
+def _coulomb(
+    solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
+) -> list[Estimate | NotIdentifiable]:
     missing = [Missing.SECOND_SPEED] if "viscous" not in solution.names else []
     missing += [Missing.REVERSALS] if excitation.is_one_way else []
     numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
+    force = settings.units[1]
     answers: list[Estimate | NotIdentifiable] = []
     for section, key, shares in _COULOMB_KEYS:
         value, error = solution.value(**shares)
-        if not missing and _is_certain(value, error, _COULOMB_ERROR):
-            answers.append(Estimate(section, key, value, error, units.force, solution.method))
+        if not missing and _is_certain(value, error, settings.largest_coulomb_error):
+            answers.append(Estimate(section, key, value, error, force, solution.method))
             continue
         uncertain = {} if missing else {"value": value, "standard_error": error}
         needed = tuple(missing) or (Missing.MORE_RECORDINGS,)
@@ -691,204 +565,75 @@ def _coulomb(solution: _AxisSolution, excitation: Excitation, units: _Units) -> 
         needed = (Missing.REVERSALS,) if excitation.is_one_way else (Missing.MORE_RECORDINGS,)
         answers.append(NotIdentifiable("machine", "constant_force", needed, numbers))
     else:
-        answers.append(Estimate("machine", "constant_force", value, error, units.force, solution.method))
+        answers.append(Estimate("machine", "constant_force", value, error, force, solution.method))
     return answers
 
 
-def _residuals(equations: _Equations, solution: _AxisSolution) -> Residuals:
-    acceleration = equations.regressors[:, 0]
-    return Residuals(
-        equations.run,
-        equations.time,
-        equations.position,
-        equations.regressors[:, 1],
-        acceleration,
-        equations.force,
-        equations.force - solution.mass * acceleration,
-        solution.fit.residuals,
-    )
-
-
-def _position_curves(residuals: Residuals, stroke: IntArray) -> dict[int, FrictionCurve]:
-    edges = np.linspace(residuals.position.min(), residuals.position.max(), 51)
-    curves = {}
+def _position_curves(equations: _Equations, residual: FloatArray) -> dict[int, FrictionCurve]:
+    position, curves = equations.position, {}
+    edges = np.linspace(position.min(), position.max(), 51)
     for direction in (1, -1):
-        inside = np.sign(residuals.speed) == direction
+        inside = equations.direction == direction
         if np.any(inside) and edges[-1] > edges[0]:
-            curves[direction] = friction_curve(
-                residuals.position[inside], residuals.residual[inside], stroke[inside], edges
-            )
+            curves[direction] = friction_curve(position[inside], residual[inside], equations.stroke[inside], edges)
     return curves
 
 
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """What a prediction is fitted to and checked on: rows (m,) of all runs, near zero speed included."""
-
-    force: FloatArray
-    acceleration: FloatArray
-    is_moving: BoolArray
-    is_fast: BoolArray
-    fold: IntArray
-    columns: dict[FrictionShape, FloatArray]
-
-    def fitted(self, form: FrictionForm, chosen: BoolArray, loss: ResidualLoss) -> PredictionModel | None:
-        """Return the model of a form with the smallest residual in the chosen rows; None with too few of them."""
-        best, smallest = None, math.inf
-        rows = chosen & self.is_moving
-        for shape, columns in self.columns.items():
-            if shape.form is not form:
-                continue
-            regressors = np.column_stack((self.acceleration, columns))[rows]
-            try:
-                fit = fit_linear(*_with_knot_weights(regressors, self.force[rows], shape), loss=loss)
-            except IdentificationError:
-                continue
-            cost = float(np.sum(fit.weights * fit.residuals**2))
-            if cost < smallest:
-                smallest = cost
-                best = PredictionModel(shape, float(fit.coefficients[0]), fit.coefficients[1:])
-        return best
-
-    def error(self, model: PredictionModel) -> FloatArray:
-        """Return the error of the predicted force (m,)."""
-        error: FloatArray = model.mass * self.acceleration + self.columns[model.shape] @ model.coefficients - self.force
-        return error
-
-
-def _with_knot_weights(
-    regressors: FloatArray, force: FloatArray, shape: FrictionShape
-) -> tuple[FloatArray, FloatArray]:
-    """Add an equation per pair of neighbouring knots, so that knots without data follow the others."""
-    if shape.form is not FrictionForm.SPLINE:
-        return regressors, force
-    knots = (regressors.shape[1] - 1) // len(shape.directions)
-    weight = math.sqrt(_KNOT_WEIGHT * max(len(force), 1))
-    pairs = np.kron(np.eye(len(shape.directions)), weight * np.diff(np.eye(knots), axis=0))
-    pairs = np.column_stack((np.zeros(len(pairs)), pairs))
-    return np.vstack((regressors, pairs)), np.concatenate((force, np.zeros(len(pairs))))
-
-
-def _predict(
-    filtered: Sequence[FilteredRun], excitation: Excitation, settings: RigidAxisSettings
-) -> tuple[CrossValidation | None, PredictionModel]:
-    samples = _samples(filtered, excitation)
-    validation = _cross_validate(samples, filtered, settings) if settings.cross_validate else None
-    form = settings.prediction or (validation.best if validation else FrictionForm.COULOMB_VISCOUS)
-    # One speed and no reversal leave a viscous share that is not defined: the spline is constant there.
-    everything = np.ones(len(samples.force), dtype=np.bool_)
-    model = samples.fitted(form, everything, settings.loss)
-    model = model or samples.fitted(FrictionForm.SPLINE, everything, settings.loss)
-    if model is None:
-        raise IdentificationError(
-            f"{filtered[0].run.name}: the force cannot be described by the motion",
-            "the recordings need more varied motion",
-        )
-    return validation, model
-
-
-def _cross_validate(
-    samples: _Samples, filtered: Sequence[FilteredRun], settings: RigidAxisSettings
-) -> CrossValidation | None:
-    """Return the errors of the forms that every fold can be predicted with; None with a single fold."""
-    folds = np.unique(samples.fold)
-    errors: dict[FrictionForm, ForceError] = {}
-    for form in FrictionForm if len(folds) > 1 else ():
-        error = np.full(len(samples.force), np.nan)
-        for fold in folds:
-            model = samples.fitted(form, samples.fold != fold, settings.loss)
-            if model is None:
-                break
-            error[samples.fold == fold] = samples.error(model)[samples.fold == fold]
-        else:
-            errors[form] = _force_error(error, samples.is_fast)
-    return CrossValidation(errors, len(folds), *_repeat_floor(filtered)) if errors else None
-
-
-def _samples(filtered: Sequence[FilteredRun], excitation: Excitation) -> _Samples:
-    main = 1 if excitation.forward_share >= 0.5 else -1
-    directions = (main,) if excitation.is_one_way else (1, -1)
-    highest = excitation.highest_speed
-    shapes = [FrictionShape(form, highest, directions=directions) for form in FrictionForm]
-    shapes = [item for item in shapes if item.form is not FrictionForm.STRIBECK]
-    shapes += [FrictionShape(FrictionForm.STRIBECK, highest, share * highest, directions) for share in _STRIBECK_SHARES]
-    rows = []
-    for run in filtered:
-        chosen = run.complete.copy()
-        if excitation.is_one_way:
-            weight = run.low_pass.value(np.maximum(-main * run.sign, 0.0))
-            chosen &= np.nan_to_num(weight) <= _UNLEARNED_WEIGHT
-        chosen[np.arange(len(chosen)) % run.low_pass.steps != 0] = False
-        rows.append(np.flatnonzero(chosen))
-
-    def gather(values: Sequence[FloatArray]) -> FloatArray:
-        return np.concatenate([item[chosen] for item, chosen in zip(values, rows, strict=True)])
-
-    if len(filtered) > 1:
-        folds = np.concatenate([np.full(len(item), run % _MOST_FOLDS) for run, item in enumerate(rows)])
-    else:
-        stroke = np.maximum.accumulate(filtered[0].stroke)[rows[0]]
-        folds = np.maximum(stroke, 0) % _MOST_FOLDS
-    return _Samples(
-        gather([run.force for run in filtered]),
-        gather([run.acceleration for run in filtered]),
-        gather([run.moving.astype(np.float64) for run in filtered]) > 0.0,
-        gather([_is_fast(run).astype(np.float64) for run in filtered]) > 0.0,
-        folds,
-        {shape: gather([shape.columns(run) for run in filtered]) for shape in shapes},
+def _cross_validate(equations: _Equations, most: int) -> CrossValidation | None:
+    """Return how well runs, or strokes of a single one, are predicted by the others; None with a single stroke."""
+    several = len(equations.filtered) > 1
+    fold = (equations.run if several else equations.stroke) % most
+    folds = np.unique(fold)
+    if len(folds) < 2:
+        return None
+    predicted = np.empty(len(fold))
+    for number in folds:
+        left_out = fold == number
+        # Columns that depend on each other predict as well together.
+        regressors, force = equations.regressors[~left_out], equations.force[~left_out]
+        coefficients = np.linalg.lstsq(regressors, force, rcond=None)[0]
+        predicted[left_out] = equations.regressors[left_out] @ coefficients
+    squares = (equations.force - predicted) ** 2
+    counts = np.bincount(equations.run)
+    worst = int(np.argmax(np.bincount(equations.run, weights=squares) / np.maximum(counts, 1)))
+    own, run = equations.run == worst, equations.filtered[worst].run
+    shown = UnseenRun(
+        run.name, equations.time[own] - run.start, equations.force[own], predicted[own], len(equations.filtered)
     )
+    floor = _repeat_floor(equations.filtered)
+    return CrossValidation(float(np.sqrt(np.mean(squares))), len(folds), *floor, shown)
 
 
 def _repeat_floor(filtered: Sequence[FilteredRun]) -> tuple[float, int]:
     """Return the standard deviation of the force between strokes that repeat each other, and their number.
 
-    Strokes repeat each other if direction, duration and travel agree; they are aligned by their speeds.
+    Strokes repeat each other if travel and duration agree; they are compared by the time from the middle of the samples
+    above half of their highest speed, which a start or an end that is missing does not shift.
     """
-    groups: list[list[tuple[float, FloatArray, FloatArray]]] = []
+    groups: list[list[tuple[FloatArray, FloatArray, FloatArray]]] = []
     for run in filtered:
         for number in range(int(run.stroke.max(initial=-1)) + 1):
             inside = np.flatnonzero((run.stroke == number) & np.isfinite(run.force + run.speed))
-            if not len(inside):
+            if len(inside) <= 8 * run.low_pass.reach or inside[-1] - inside[0] >= len(inside):
                 continue
-            span = slice(inside[0], inside[-1] + 1)
-            force, speed = run.force[span], run.speed[span]
-            if np.isfinite(force + speed).all() and len(force) > 8 * run.low_pass.reach:
-                _join(groups, (run.run.period, force, speed))
+            period, index = run.run.period, np.arange(len(inside), dtype=np.float64)
+            speed = run.speed[inside]
+            fast = np.flatnonzero(np.abs(speed) > 0.5 * np.max(np.abs(speed)))
+            kind = np.array([np.sum(speed) * period, period * len(inside)])
+            stroke = kind, period * (index - 0.5 * (fast[0] + fast[-1])), run.force[inside]
+            for group in groups:
+                if (np.abs(kind - group[0][0]) <= _SAME_STROKE * np.abs(group[0][0])).all():
+                    group.append(stroke)
+                    break
+            else:
+                groups.append([stroke])
     squares, degrees, members = 0.0, 0, 0
     for group in groups:
-        if len(group) < 2:
-            continue
-        aligned = _aligned(group)
-        squares += float(np.sum((aligned - aligned.mean(axis=0)) ** 2))
-        degrees += (len(aligned) - 1) * aligned.shape[1]
-        members += len(aligned)
+        if len(group) > 1:
+            first, last = max(time[0] for _, time, _ in group), min(time[-1] for _, time, _ in group)
+            at = np.linspace(_INNER * first, _INNER * last, _TIMES)
+            forces = np.array([np.interp(at, time, force) for _, time, force in group])
+            squares += float(np.sum((forces - forces.mean(axis=0)) ** 2))
+            degrees += (len(group) - 1) * _TIMES
+            members += len(group)
     return (math.sqrt(squares / degrees), members) if degrees else (math.nan, 0)
-
-
-def _join(
-    groups: list[list[tuple[float, FloatArray, FloatArray]]], stroke: tuple[float, FloatArray, FloatArray]
-) -> None:
-    """Add a stroke to the first group that it repeats, or to a new one."""
-    period, _, speed = stroke
-    for group in groups:
-        other_period, _, other = group[0]
-        same_length = abs(len(speed) - len(other)) <= _SAME_STROKE * len(other)
-        travel, other_travel = float(np.sum(speed)), float(np.sum(other))
-        if period == other_period and same_length and abs(travel - other_travel) <= _SAME_STROKE * abs(other_travel):
-            group.append(stroke)
-            return
-    groups.append([stroke])
-
-
-def _aligned(group: Sequence[tuple[float, FloatArray, FloatArray]]) -> FloatArray:
-    """Return the forces (strokes, n) of a group, shifted so that the speeds fit those of the first."""
-    lengths = [len(speed) for _, _, speed in group]
-    margin = max(lengths) - min(lengths) + _ALIGNED_WITHIN
-    first = group[0][2][margin : min(lengths) - margin]
-    rows = []
-    for _, force, speed in group:
-        shifts = range(2 * margin + 1 + len(speed) - min(lengths))
-        shifts = range(min(len(shifts), len(speed) - len(first) + 1))
-        best = min(shifts, key=lambda shift: float(np.sum((speed[shift : shift + len(first)] - first) ** 2)))
-        rows.append(force[best : best + len(first)])
-    return np.vstack(rows)

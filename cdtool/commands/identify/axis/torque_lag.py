@@ -31,19 +31,12 @@ from cdtool.commands.identify.axis.filtered_regression import (
 
 # A lag is there if it is this many times its standard error, and explains this share of the residual's variance.
 _SIGNIFICANT, _LEAST_EXPLAINED = 3.0, 0.05
-# Lags that are tried [s].
-_LAGS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2)
+# The shortest lag from which the search begins, and the longest that is looked for [s].
+_SHORTEST, _LONGEST = 2e-3, 0.2
+# Step of the derivative by the lag [-]: a delay is interpolated between samples, and has bends.
+_STEP = 0.05
 # Outputs of the lag are compared this many lags after a gap.
 _SETTLING = 4.0
-
-
-@dataclass(frozen=True, eq=False)
-class MotionColumns:
-    """The columns (n, p) of one run's equation of motion, that of the mass first, and the rows (m,) that are fitted."""
-
-    run: FilteredRun
-    columns: FloatArray
-    rows: IntArray
 
 
 @dataclass(frozen=True)
@@ -65,14 +58,17 @@ class ApparentLag:
         return self.time > _SIGNIFICANT * self.standard_error and self.explained >= _LEAST_EXPLAINED
 
 
-def apparent_lag(motions: Sequence[MotionColumns], block: IntArray) -> ApparentLag:
+def apparent_lag(
+    motions: Sequence[FilteredRun], rows: Sequence[IntArray], chosen: list[int], block: IntArray
+) -> ApparentLag:
     """Return the lag as one more coefficient of the least squares.
 
-    `block` (m,): the stroke of each row of all runs. Raises IdentificationError if the columns depend on each other.
+    `rows` (m,) of each run that are fitted, the `chosen` columns of its motion, that of the mass first; `block` (m,):
+    the stroke of each row of all runs. Raises IdentificationError if the columns depend on each other.
     """
-    regressors = np.concatenate([item.columns[item.rows] for item in motions])
-    force = np.concatenate([item.run.force[item.rows] for item in motions])
-    slope = np.concatenate([item.run.force_slope[item.rows] for item in motions])
+    regressors = np.concatenate([run.columns[own][:, chosen] for run, own in zip(motions, rows, strict=True)])
+    force = np.concatenate([run.force[own] for run, own in zip(motions, rows, strict=True)])
+    slope = np.concatenate([run.force_slope[own] for run, own in zip(motions, rows, strict=True)])
     without = fit_linear(regressors, force)
     lagged = fit_linear(np.column_stack((regressors, -slope)), force)
     variance = block_covariance(lagged, block)[-1, -1]
@@ -85,51 +81,49 @@ def apparent_lag(motions: Sequence[MotionColumns], block: IntArray) -> ApparentL
     )
 
 
-def best_lag(motions: Sequence[MotionColumns]) -> TorqueLag:
-    """Return the lag, at most 0.2 s, through which the model fits the logged force best.
+def best_lag(motions: Sequence[FilteredRun], rows: Sequence[IntArray], chosen: list[int], apparent: float) -> TorqueLag:
+    """Return the lag, at most 0.2 s, through which the model fits the logged force best, from the `apparent` one [s].
 
     Raises IdentificationError if the columns depend on each other.
     """
-    from scipy.optimize import minimize_scalar
+    from scipy.optimize import least_squares
 
-    longest = max(len(item.rows) * item.run.low_pass.steps * item.run.run.period for item in motions) / _SETTLING
-    lags = [lag for lag in _LAGS if lag <= max(longest, _LAGS[1])]
+    force = np.concatenate([run.force[own] for run, own in zip(motions, rows, strict=True)])
+    longest = max(len(own) * run.low_pass.steps * run.run.period for run, own in zip(motions, rows, strict=True))
+    highest = min(longest / _SETTLING, _LONGEST)
     found = []
     for form in LagForm:
 
-        def cost(time: float, form: LagForm = form) -> float:
-            return _cost(motions, TorqueLag(time, form))
+        def left_over(time: FloatArray, form: LagForm = form) -> FloatArray:
+            lag = TorqueLag(float(time[0]), form)
+            columns = np.concatenate([_lagged(run, chosen, lag)[own] for run, own in zip(motions, rows, strict=True)])
+            known = np.isfinite(columns).all(axis=1)
+            residual = np.zeros(len(force))
+            # The longer a lag, the fewer samples have settled: the mean square counts.
+            residual[known] = fit_linear(columns[known], force[known]).residuals / math.sqrt(np.count_nonzero(known))
+            return residual
 
-        best = min(range(len(lags)), key=lambda index: cost(lags[index]))
-        around = lags[best - 1] if best else 0.0, lags[min(best + 1, len(lags) - 1)]
-        refined = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": 1e-4})
-        found.append((float(refined.fun), TorqueLag(float(refined.x), form)))
+        start = [min(max(apparent, _SHORTEST), 0.9 * highest)]
+        best = least_squares(left_over, start, bounds=(0.0, highest), diff_step=[_STEP], x_scale=start)
+        found.append((float(best.cost), TorqueLag(float(best.x[0]), form)))
     return min(found, key=lambda item: item[0])[1]
 
 
-def _cost(motions: Sequence[MotionColumns], lag: TorqueLag) -> float:
-    """Return the mean square of what the model through the lag leaves over of the force."""
-    columns = np.concatenate([_lagged(item, lag)[item.rows] for item in motions])
-    force = np.concatenate([item.run.force[item.rows] for item in motions])
-    known = np.isfinite(columns).all(axis=1)
-    return float(np.mean(fit_linear(columns[known], force[known]).residuals ** 2))
-
-
-def _lagged(motion: MotionColumns, lag: TorqueLag) -> FloatArray:
+def _lagged(motion: FilteredRun, chosen: list[int], lag: TorqueLag) -> FloatArray:
     """Return a run's columns (n, p) through a lag, NaN at gaps and until a low-pass has settled after them."""
-    period = motion.run.run.period
+    period, columns = motion.run.period, motion.columns[:, chosen]
     if lag.form is LagForm.DELAY:
-        return np.column_stack([shifted(column, -lag.time / period) for column in motion.columns.T])
+        return np.column_stack([shifted(column, -lag.time / period) for column in columns.T])
     from scipy.signal import lfilter
 
     keep = math.exp(-period / lag.time) if lag.time > 0.0 else 0.0
     settling = round(_SETTLING * lag.time / period)
-    known = np.isfinite(motion.columns).all(axis=1)
+    known = np.isfinite(columns).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
-    result = np.full_like(motion.columns, np.nan)
+    result = np.full_like(columns, np.nan)
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         if end - first > settling:
-            piece = motion.columns[first:end]
+            piece = columns[first:end]
             passed, _ = lfilter([1.0 - keep], [1.0, -keep], piece, axis=0, zi=keep * piece[:1])
             result[first + settling : end] = passed[settling:]
     return result

@@ -22,7 +22,6 @@ from cdtool.base.errors import ConfigurationError
 from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.filtered_regression import IntArray
 from cdtool.commands.identify.axis.friction_profile import (
-    FrictionProfile,
     friction_profile,
     friction_shares,
     random_phases,
@@ -51,31 +50,6 @@ _ONE_STIFFNESS, _NEVER = len(_ALWAYS), math.log(1e9)
 # error: each is guessed within a factor (one standard deviation), by which the fit moves it at most. Friction that sets
 # in only where its rise has gone again had 5 times the static friction, and a long rise took the place of the load.
 _GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("static"), _ONE_STIFFNESS), np.log([3.0, 2.0, 3.0, 2.0])
-# A parameter with a larger relative standard error is not identifiable.
-LARGEST_RELATIVE_ERROR = 0.5
-# The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
-_STIFFNESS_STARTS = 12
-# A correction of the measured-force drive towards the measured speed: total mass times this [1/s].
-_CORRECTION_RATE = 10.0
-# A channel's error counts in its run-to-run deviation, at least in this share of its largest value.
-_LEAST_SHARE = 0.01
-_MOST_CHANGE, _AT_BOUND = 50.0, 1.02
-# The search for a second stiffness begins at each of these: the first one as a share of that of a drive with one
-# stiffness, the share of the largest wind-up at which the second begins, and its multiple of the first. The take-up may
-# change by a factor of 2: far below, it would stand for the friction near rest. A second stiffness exists if the cost
-# falls below a share: noise and unknown friction lower it by a few percent.
-_SECOND_STARTS = ((0.95, 0.8, 1.2), (0.8, 0.7, 3.0), (0.6, 0.8, 9.0))
-_SECOND_STIFFNESS = 0.9
-# A drive is as good as rigid if its oscillation lasts so many periods of the log, and its stiffness does not show above
-# this share of that.
-_PERIODS_OF_RIGID, _MOST_OF_RIGID = 10.0, 0.3
-# The cost of the rigid drive over that of the elastic one below which the elasticity does not show. That of the elastic
-# one over what its starts differ by, above which it does not describe them: nothing of the fit can be trusted.
-_CLEARLY_WORSE = 1.5
-# The total that a start shows roughly, in masses of the motor: less is an error of the machine file.
-_LEAST_TOTAL = 0.7
-# A channel of one start counts as so many independent samples: its errors are coloured.
-_INDEPENDENT = 20.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,24 +64,77 @@ class TwoMassSettings:
     surrogates: int = 96
     seed: int = 0
     units: tuple[str, str, str] = ("kg", "N", "m")
+    #: A parameter with a larger relative standard error is not identifiable.
+    largest_relative_error: float = 0.5
+    #: The fit's stiffness starts at so many multiples of the smallest plausible one: there are local minima between.
+    stiffness_starts: int = 12
+    #: The measured-force drive is corrected towards the measured speed, or it drifts: total mass times this [1/s].
+    correction_rate: float = 10.0
+    #: A channel's error counts in its run-to-run deviation, at least in this share of its largest value.
+    least_share: float = 0.01
+    #: A channel of one start counts as so many independent samples: its errors are coloured.
+    independent: float = 20.0
+    #: The search ends at this multiple of a rough value ...
+    most_change: float = 50.0
+    #: ... and within this factor of the bound a value is at it.
+    at_bound: float = 1.02
+    #: The search for a second stiffness begins at each of these: the first one as a share of that of a drive with one
+    #: stiffness, the share of the largest wind-up at which the second begins, and its multiple of the first.
+    second_starts: tuple[tuple[float, float, float], ...] = ((0.95, 0.8, 1.2), (0.8, 0.7, 3.0), (0.6, 0.8, 9.0))
+    #: The take-up may change by this factor: far below, it would stand for the friction near rest.
+    take_up_change: float = 2.0
+    #: A second stiffness exists if the cost falls below this share: noise and friction lower it by a few percent.
+    second_stiffness: float = 0.9
+    #: A drive is as good as rigid if its oscillation lasts so many periods of the log ...
+    periods_of_rigid: float = 10.0
+    #: ... and its stiffness does not show above this share of that.
+    most_of_rigid: float = 0.3
+    #: Below this cost of the rigid drive over that of the elastic one the elasticity does not show; above this cost of
+    #: the elastic one over what its starts differ by it does not describe them.
+    clearly_worse: float = 1.5
+    #: The total that a start shows roughly, in masses of the motor: less is an error of the machine file.
+    least_total: float = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class StartComparison:
+    """Aligned starts and the model's channels (n,) that are compared with their means, driven by their mean force.
+
+    The model includes the friction along the travel where it is known, and is corrected weakly towards the measured
+    speed: what `torque` differs by from the measured one is the force that the model does not explain.
+    """
+
+    ensemble: StartEnsemble
+    modelled: Mapping[str, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
 class TwoMassFit:
     """The identified model and how well it follows the log.
 
-    `relative_error`: RMS error by channel over its RMS. `condition_number` of the scaled Jacobian. `largest_wind_up`
-    [m, rad] of the drive in the starts, or its take-up travel: beyond it nothing is known of its stiffness. `profiles`:
-    of the friction along the travel, by ensemble.
+    `starts`: by ensemble. `condition_number` of the scaled Jacobian. `largest_wind_up` [m, rad] of the drive in the
+    starts, or its take-up travel: beyond it nothing is known of its stiffness.
     """
 
     identified: Identified
     model: AxisModel
-    ensembles: tuple[StartEnsemble, ...]
-    relative_error: Mapping[str, float]
+    starts: tuple[StartComparison, ...]
     condition_number: float
     largest_wind_up: float
-    profiles: tuple[FrictionProfile, ...]
+
+    @property
+    def relative_error(self) -> dict[str, float]:
+        """Return the RMS error by channel over its RMS."""
+        totals: dict[str, list[tuple[float, float]]] = {}
+        for start in self.starts:
+            for name, values in start.modelled.items():
+                measured = start.ensemble.mean[name]
+                squares = float(np.mean((values - measured) ** 2)), float(np.mean(measured**2))
+                totals.setdefault(name, []).append(squares)
+        return {
+            name: math.sqrt(sum(a for a, _ in pairs) / max(sum(b for _, b in pairs), 1e-300))
+            for name, pairs in totals.items()
+        }
 
 
 def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> TwoMassFit:
@@ -146,8 +173,8 @@ class _Problem:
             mean = {key: values if key == "torque" else lag(values) for key, values in item.mean.items()}
             self.ensembles += (replace(item, mean=mean),)
         self.settings = settings
-        self.start = _rough_values(self.ensembles[0], settings.motor_mass)
-        self.scales = [_scales(item) for item in self.ensembles]
+        self.start = _rough_values(self.ensembles[0], settings)
+        self.scales = [_scales(item, settings.least_share) for item in self.ensembles]
         self.travelled = [_travelled(item) for item in self.ensembles]
         self.profiles = [friction_profile(runs, item, settings.motor_mass) for item in self.ensembles]
         self.known = [profile.at(way) for profile, way in zip(self.profiles, self.travelled, strict=True)]
@@ -188,7 +215,7 @@ class _Problem:
             smoothing_speed=onset * rise_speed,
         )
         period = self.ensembles[0].period
-        gain = _CORRECTION_RATE * drive.total_mass
+        gain = self.settings.correction_rate * drive.total_mass
         controller = Controller(period=period, speed_gain=gain, speed_filter_order=0)
         return AxisModel(drive=drive, friction=friction, controller=controller, sensors=settings.sensors)
 
@@ -256,7 +283,7 @@ class _Problem:
     def scaled_errors(self, number: int, model: AxisModel, friction: FloatArray) -> FloatArray:
         """Return the errors of the channels of an ensemble, each in its scale and as if its samples were few."""
         ensemble, scales = self.ensembles[number], self.scales[number]
-        weight = math.sqrt(_INDEPENDENT * ensemble.count / len(ensemble))
+        weight = math.sqrt(self.settings.independent * ensemble.count / len(ensemble))
         channels = self.channels(self.simulated(model, number, friction), ensemble)
         measured = self.measured(number)
         return np.concatenate([(channels[name] - measured[name]) / scales[name] * weight for name in measured])
@@ -265,7 +292,7 @@ class _Problem:
         """Return the logarithms of the parameters, from the best of a grid of stiffnesses; refuse a rigid drive."""
         lowest = math.log(self.start["stiffness"])
         candidates = []
-        for stiffness in lowest + np.linspace(0.0, math.log(1e3), _STIFFNESS_STARTS):
+        for stiffness in lowest + np.linspace(0.0, math.log(1e3), self.settings.stiffness_starts):
             vector = self.first.copy()
             vector[1] = stiffness
             candidates.append((float(np.sum(np.abs(self.errors(vector)))), vector))
@@ -275,13 +302,13 @@ class _Problem:
         )
         self._weigh(_shares(rough))
         vector, cost = self._fitted(rough, self.one_stiffness, 1e-5, 30)
-        if abs(vector[0] - self.first[0]) > math.log(_MOST_CHANGE / _AT_BOUND):
+        if abs(vector[0] - self.first[0]) > math.log(self.settings.most_change / self.settings.at_bound):
             raise IdentificationError(
                 f"the load ends at {math.exp(vector[0]):.3g} {self.settings.units[0]}, the bound of the search",
                 "check machine.motor_inertia, the torque's scale, and that the logs are of this machine",
             )
         largest, others = self.largest_wind_up(rough), []
-        for softer, take_up, ratio in _SECOND_STARTS:
+        for softer, take_up, ratio in self.settings.second_starts:
             first = rough.copy()
             first[1] += math.log(softer)
             first[_ONE_STIFFNESS : len(PARAMETERS)] = math.log(take_up * largest), first[1] + math.log(ratio)
@@ -290,17 +317,19 @@ class _Problem:
         self._refuse_rigid(vector, min(cost, lower))
         if lower < cost:
             self.load_change = float(np.exp(other[0]) - np.exp(vector[0]))
-        independent = sum(_INDEPENDENT * item.count * len(self.measured(n)) for n, item in enumerate(self.ensembles))
-        self.is_described = min(cost, lower) < _CLEARLY_WORSE * independent
-        return other if lower < _SECOND_STIFFNESS * cost else vector
+        independent = sum(
+            self.settings.independent * item.count * len(self.measured(n)) for n, item in enumerate(self.ensembles)
+        )
+        self.is_described = min(cost, lower) < self.settings.clearly_worse * independent
+        return other if lower < self.settings.second_stiffness * cost else vector
 
     def _fitted(self, first: FloatArray, free: IntArray, tolerance: float, calls: int) -> tuple[FloatArray, float]:
         """Return the vector whose `free` values fit best, and its cost."""
         from scipy.optimize import least_squares
 
         count, knots = len(PARAMETERS), len(first) - len(PARAMETERS)
-        reach = np.concatenate((np.full(count, math.log(_MOST_CHANGE)), np.full(knots, np.inf)))
-        reach[_ONE_STIFFNESS], reach[_GUESSED] = math.log(2.0), _GUESSED_WITHIN
+        reach = np.concatenate((np.full(count, math.log(self.settings.most_change)), np.full(knots, np.inf)))
+        reach[_ONE_STIFFNESS], reach[_GUESSED] = math.log(self.settings.take_up_change), _GUESSED_WITHIN
         centre = np.array([*first[: _GUESSED.start], *self.first[_GUESSED], *first[_GUESSED.stop :]])
         bounds = (centre - reach)[free], (centre + reach)[free]
         scale = np.concatenate((np.full(count, 0.3), np.full(knots, 0.03 * self.start["coulomb"])))[free]
@@ -337,11 +366,11 @@ class _Problem:
         """
         load, stiffness = np.exp(vector[:2])
         motor, period = self.settings.motor_mass, self.ensembles[0].period
-        stiff = motor * load / (motor + load) * (2.0 * math.pi / (_PERIODS_OF_RIGID * period)) ** 2
+        stiff = motor * load / (motor + load) * (2.0 * math.pi / (self.settings.periods_of_rigid * period)) ** 2
         first = vector.copy()
         first[0], first[1] = self.first[0], math.log(max(stiff, 3.0 * stiffness))
         _, rigid = self._fitted(first, np.delete(self.one_stiffness, 1), 1e-3, 8)
-        if stiffness > _MOST_OF_RIGID * stiff or rigid < _CLEARLY_WORSE * cost:
+        if stiffness > self.settings.most_of_rigid * stiff or rigid < self.settings.clearly_worse * cost:
             raise IdentificationError(
                 "a rigid drive describes the starts as well as an elastic one: its stiffness does not show",
                 "if the drive is rigid, state [model.drive] rigid = true; else log stronger starts at a higher rate",
@@ -377,11 +406,12 @@ class _Problem:
         return TwoMassFit(
             identified=self._identified(vector, relative, condition),
             model=replace(model, controller=None),
-            ensembles=self.ensembles,
-            relative_error=self._relative_error(model, frictions),
+            starts=tuple(
+                StartComparison(ensemble, self.channels(self.simulated(model, number, frictions[number]), ensemble))
+                for number, ensemble in enumerate(self.ensembles)
+            ),
             condition_number=condition,
             largest_wind_up=min(self.largest_wind_up(vector), model.drive.take_up_travel),
-            profiles=tuple(replace(profile, shares=_shares(vector)) for profile in self.profiles),
         )
 
     def _relative_deviation(self, inverse: FloatArray, vector: FloatArray) -> FloatArray:
@@ -416,7 +446,7 @@ class _Problem:
         static_error = math.hypot(coulomb * relative[2], rise * relative[4]) / static
         load_error = math.hypot(relative[0], self.load_change / load)
         # What is taken from one of the two is in the other; one that has vanished has no error of its own.
-        vanished = np.min((vector - self.first)[[2, 3]]) < -math.log(_MOST_CHANGE / _AT_BOUND)
+        vanished = np.min((vector - self.first)[[2, 3]]) < -math.log(self.settings.most_change / self.settings.at_bound)
         dry = math.inf if vanished else max(relative[2], relative[3])
         has_second = vector[_ONE_STIFFNESS] < _NEVER or not self.is_described
         gentler = (Missing.GENTLER_START,) if has_second else ()
@@ -440,7 +470,7 @@ class _Problem:
         ]
         estimates, missing = [], []
         for section, key, value, error, judged, unit, needed in rows:
-            if judged <= LARGEST_RELATIVE_ERROR:
+            if judged <= self.settings.largest_relative_error:
                 estimates.append(Estimate(section, key, float(value), float(error * value), unit, Method.OUTPUT_ERROR))
             else:
                 numbers = {"relative_standard_error": float(error), "condition_number": condition}
@@ -452,23 +482,10 @@ class _Problem:
         keys = {1: "coulomb_forward", -1: "coulomb_backward"}
         return [keys[direction] for direction in (1, -1) if any(item.direction == direction for item in self.ensembles)]
 
-    def _relative_error(self, model: AxisModel, frictions: Sequence[FloatArray]) -> dict[str, float]:
-        totals: dict[str, list[tuple[float, float]]] = {}
-        for number, ensemble in enumerate(self.ensembles):
-            motion = self.simulated(model, number, frictions[number])
-            for name, values in self.channels(motion, ensemble).items():
-                measured = ensemble.mean[name]
-                totals.setdefault(name, []).append(
-                    (float(np.mean((values - measured) ** 2)), float(np.mean(measured**2)))
-                )
-        return {
-            name: math.sqrt(sum(a for a, _ in pairs) / max(sum(b for _, b in pairs), 1e-300))
-            for name, pairs in totals.items()
-        }
 
-
-def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float]:
+def _rough_values(ensemble: StartEnsemble, settings: TwoMassSettings) -> dict[str, float]:
     """Return start values from the accelerated and from the settled part of a start."""
+    motor_mass = settings.motor_mass
     sign = float(ensemble.direction)
     speed, force = sign * ensemble.mean["speed"], sign * ensemble.mean["torque"]
     width = max(round(0.05 / ensemble.period), 1)
@@ -480,7 +497,7 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
     speeding = (acceleration > 0.5 * float(np.max(acceleration))) & (speed < 0.9 * top)
     ratio = (force[speeding] - friction) / acceleration[speeding]
     total = float(np.median(ratio)) if speeding.any() else 2.0 * motor_mass
-    if total < _LEAST_TOTAL * motor_mass:
+    if total < settings.least_total * motor_mass:
         raise IdentificationError(
             f"the starts show a total of {total:.3g}, the motor alone is stated to have {motor_mass:.3g}",
             "check machine.motor_inertia, transmission_ratio, and the scale and sign of the torque",
@@ -513,10 +530,10 @@ def _travelled(ensemble: StartEnsemble) -> FloatArray:
     return ensemble.direction * np.cumsum(ensemble.mean["speed"]) * ensemble.period
 
 
-def _scales(ensemble: StartEnsemble) -> dict[str, float]:
+def _scales(ensemble: StartEnsemble, least_share: float) -> dict[str, float]:
     """Return in what each channel's error counts: its run-to-run deviation, at least 1 % of its largest value."""
     scales = {}
     for name, mean in ensemble.mean.items():
         spread = float(np.sqrt(np.mean(ensemble.deviation[name] ** 2)))
-        scales[name] = max(spread, _LEAST_SHARE * float(np.max(np.abs(mean))), 1e-300)
+        scales[name] = max(spread, least_share * float(np.max(np.abs(mean))), 1e-300)
     return scales

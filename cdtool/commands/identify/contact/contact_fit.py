@@ -33,47 +33,9 @@ from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Frict
 from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.machines.axis_model.simulation import wind_up_at
 
-# A parameter with a larger relative standard error is not identifiable.
-LARGEST_RELATIVE_ERROR = 0.3
-# The drive force of the contacts must exceed that of the impact-free runs by this factor [-].
-_BEYOND = 1.1
-# A model that is further off than this share of the torque (RMS) does not describe the contacts.
-_LARGEST_TORQUE_ERROR = 0.25
-# So many standard errors between the stiffnesses, or the drive has only one.
-_DISTINCT = 2.0
-# Grid of start values: share of the largest wind-up at which the take-up ends, and end stiffness over stiffness.
-_TRAVELS, _RATIOS = (0.3, 0.45, 0.6, 0.75, 0.9), (3.0, 10.0, 30.0)
-# Start values that are followed to their end.
-_FOLLOWED = 2
-# A channel's error counts in its noise and in this share of its largest value.
-_LEAST_SHARE = 0.01
-# Errors closer together than this are not independent [s].
-_CORRELATED = 0.02
-# The load's friction counts as at least this share of the largest drive force.
-_LEAST_LEVEL = 0.05
-# Correlation of the residuals is taken into account up to this lag [s].
-_LAGS = 0.06
 # Integration steps: the classical Runge-Kutta method is accurate well below 1 [-]; the damping's change at the take-up
 # travel must not be passed in one [s].
 _LARGEST_STEP, _MOST_SUBSTEPS, _LONGEST_STEP = 0.5, 400, 3e-4
-# Steps of the derivatives, in the units of the vector; that by the take-up travel passes a bend of the drive's force.
-_STEP, _TRAVEL_STEP = 1e-3, 5e-3
-# The end stiffness shows only in an oscillation of which a sample is at most this angle [rad].
-_LARGEST_ANGLE = 0.3
-
-# Deviations of what is known before the fit. Damping ratios of the drive in its two stages:
-_DAMPING_RATIO, _END_DAMPING_RATIO = 0.05, 0.1
-# static and viscous friction against the model's, in shares of the friction before the contact:
-_STATIC_ERROR, _VISCOUS_ERROR = 0.15, 0.15
-# friction and drive force at the beginning in the same shares, speed of the load in shares of the approach speed:
-_FRICTION_ERROR, _FORCE_ERROR, _SPEED_ERROR = 0.05, 0.1, 0.02
-# share of the friction that acts on the motor instead of the load:
-_MOTOR_SHARE = 0.1
-# share of the front mass in the load, usual and deviation:
-_FRONT_SHARE, _FRONT_ERROR = 0.1, 0.1
-
-# A front that is not rigid, although its stiffness is not given, moves the values by about this share.
-_FRONT_UNKNOWN = 0.02
 
 _SECOND_STAGE = ("take_up_travel", "end_stiffness", "end_damping")
 _AS_LOGARITHM = ("load_mass", "take_up_travel", "end_stiffness")
@@ -118,6 +80,56 @@ class ContactSettings:
     stiffness_error: float = 0.03
     clock_error: float = 2e-3
     units: tuple[str, str, str] = ("kg", "N", "m")
+    #: A parameter with a larger relative standard error is not identifiable.
+    largest_relative_error: float = 0.3
+    #: The drive force of the contacts must exceed that of the impact-free runs by this factor.
+    beyond: float = 1.1
+    #: A model that is further off than this share of the torque (RMS) does not describe the contacts.
+    largest_torque_error: float = 0.25
+    #: So many standard errors between the stiffnesses, or the drive has only one.
+    distinct: float = 2.0
+    #: Start values of the take-up travel, as shares of the largest wind-up ...
+    travels: tuple[float, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)
+    #: ... and of the end stiffness over the first one; the cost has local minima between.
+    ratios: tuple[float, ...] = (3.0, 10.0, 30.0)
+    #: Start values that are followed to their end.
+    followed: int = 2
+    #: A channel's error counts in its noise and in this share of its largest value.
+    least_share: float = 0.01
+    #: Errors closer together than this are not independent [s].
+    correlated: float = 0.02
+    #: The load's friction counts as at least this share of the largest drive force.
+    least_level: float = 0.05
+    #: Correlation of the residuals is taken into account up to this lag [s].
+    lags: float = 0.06
+    #: Step of the derivatives, in the units of the vector.
+    step: float = 1e-3
+    #: Step by the take-up travel, which passes a bend of the drive's force.
+    travel_step: float = 5e-3
+    #: The end stiffness shows only in an oscillation of which a sample is at most this angle [rad].
+    largest_angle: float = 0.3
+    #: Deviations of what is known before the fit: damping ratio of the drive in its first stage ...
+    damping_ratio: float = 0.05
+    #: ... and in its second one.
+    end_damping_ratio: float = 0.1
+    #: Static friction against the model's, in shares of the friction before the contact ...
+    static_error: float = 0.15
+    #: ... viscous friction in the same shares ...
+    viscous_error: float = 0.15
+    #: ... friction at the beginning ...
+    friction_error: float = 0.05
+    #: ... and drive force at the beginning.
+    force_error: float = 0.1
+    #: Speed of the load at the beginning, in shares of the approach speed.
+    speed_error: float = 0.02
+    #: Share of the friction that acts on the motor instead of the load.
+    motor_share: float = 0.1
+    #: Usual share of the front mass in the load ...
+    front_share: float = 0.1
+    #: ... and its deviation.
+    front_error: float = 0.1
+    #: A front that is not rigid, although its stiffness is not given, moves the values by about this share.
+    front_unknown: float = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,19 +181,19 @@ def identify_contacts(
     settings = settings or ContactSettings()
     peak = _largest_drive_force(contacts, model.drive)
     known = (settings.largest_wind_up or model.drive.observed_wind_up) * model.drive.stiffness
-    if peak <= _BEYOND * known:
+    if peak <= settings.beyond * known:
         one_stage = _ContactProblem(contacts, model, settings, two_stage=False).fit()
         numbers = {"drive_force": peak, "drive_force_of_impact_free_runs": known}
         refused = [NotIdentifiable("model.drive", key, (Missing.CONTACTS,), numbers) for key in _SECOND_STAGE[:2]]
-        return _checked(_refusing(one_stage, refused))
+        return _checked(_refusing(one_stage, refused), settings)
     fit = _ContactProblem(contacts, model, settings, two_stage=True).fit()
     if not math.isinf(fit.drive.take_up_travel):
-        return _checked(fit)
+        return _checked(fit, settings)
     refused = [item for item in fit.identified.not_identifiable if item.key in _SECOND_STAGE[:2]]
     one_stage = _ContactProblem(contacts, model, settings, two_stage=False).fit()
     # A second stage that is not known well may still be needed to know the load.
     is_needed = fit.relative_error["torque"] < 0.9 * one_stage.relative_error["torque"]
-    return _checked(fit if is_needed else _refusing(one_stage, refused))
+    return _checked(fit if is_needed else _refusing(one_stage, refused), settings)
 
 
 def _refusing(fit: ContactFit, refused: Sequence[NotIdentifiable]) -> ContactFit:
@@ -190,10 +202,10 @@ def _refusing(fit: ContactFit, refused: Sequence[NotIdentifiable]) -> ContactFit
     )
 
 
-def _checked(fit: ContactFit) -> ContactFit:
+def _checked(fit: ContactFit, settings: ContactSettings) -> ContactFit:
     """Raise IdentificationError where the model does not follow the contacts."""
     error = fit.relative_error["torque"]
-    if error > _LARGEST_TORQUE_ERROR:
+    if error > settings.largest_torque_error:
         raise IdentificationError(
             f"the model's torque is {100.0 * error:.0f} % off in the contacts",
             "check motor_inertia, the scales of torque and load cell, torque_filter_time and the position's resolution",
@@ -218,8 +230,8 @@ class _ContactProblem:
         left_out |= {"motor_friction"} if model.drive.motor_friction > 0.0 else set()
         self.shared = tuple(name for name in _SHARED if name not in left_out)
         self.frictions = [_friction_towards(model.friction, item.direction) for item in contacts]
-        self.scales = [_scales(item) for item in contacts]
-        least = _LEAST_LEVEL * _largest_drive_force(contacts, model.drive)
+        self.scales = [_scales(item, settings.least_share) for item in contacts]
+        least = self.settings.least_level * _largest_drive_force(contacts, model.drive)
         self.levels = [max(abs(item.level), least) for item in contacts]
         self.size = len(self.shared) + len(_OF_CONTACT) * len(self.contacts)
 
@@ -238,11 +250,15 @@ class _ContactProblem:
         base = self.model.drive
         load = base.load_mass
         units = {
-            "damping": 2.0 * _DAMPING_RATIO * math.sqrt(base.stiffness * load),
-            "end_damping": 2.0 * _END_DAMPING_RATIO * math.sqrt(_RATIOS[1] * base.stiffness * load),
-            "front_damping": 2.0 * _DAMPING_RATIO * math.sqrt(base.front_stiffness * _FRONT_SHARE * load),
-            "front_mass": _FRONT_ERROR * load,
-            "motor_friction": _MOTOR_SHARE * float(np.mean(self.levels)),
+            "damping": 2.0 * self.settings.damping_ratio * math.sqrt(base.stiffness * load),
+            "end_damping": 2.0
+            * self.settings.end_damping_ratio
+            * math.sqrt(self.settings.ratios[1] * base.stiffness * load),
+            "front_damping": 2.0
+            * self.settings.damping_ratio
+            * math.sqrt(base.front_stiffness * self.settings.front_share * load),
+            "front_mass": self.settings.front_error * load,
+            "motor_friction": self.settings.motor_share * float(np.mean(self.levels)),
             "stiffness": self.settings.stiffness_error * base.stiffness,
         }
         return units[name]
@@ -254,7 +270,9 @@ class _ContactProblem:
         first = base.stiffness * math.exp(values["stiffness"] * self.settings.stiffness_error)
         damping = values["damping"] * self.unit("damping")
         front = (
-            _FRONT_SHARE * base.load_mass + values["front_mass"] * self.unit("front_mass") if self.has_front else 0.0
+            self.settings.front_share * base.load_mass + values["front_mass"] * self.unit("front_mass")
+            if self.has_front
+            else 0.0
         )
         front_damping = values["front_damping"] * self.unit("front_damping") if self.has_front else 0.0
         motor = base.motor_friction
@@ -287,9 +305,9 @@ class _ContactProblem:
         share = vector[self.slots(number)][0]
         unit = self.levels[number]
         speed = max(contact.approach_speed, 1e-9)
-        viscous = base.viscous + values["viscous"] * _VISCOUS_ERROR * unit / speed
-        rise = max(base.static - base.coulomb_forward, 0.0) + values["static"] * _STATIC_ERROR * unit
-        coulomb = level + share * _FRICTION_ERROR * unit - base.offset - max(viscous, 0.0) * speed
+        viscous = base.viscous + values["viscous"] * self.settings.viscous_error * unit / speed
+        rise = max(base.static - base.coulomb_forward, 0.0) + values["static"] * self.settings.static_error * unit
+        coulomb = level + share * self.settings.friction_error * unit - base.offset - max(viscous, 0.0) * speed
         coulomb = max(coulomb, 0.0)
         # The other direction shows only where the load recoils: as much as the model says for it in proportion.
         back = base.coulomb_backward / base.coulomb_forward if base.coulomb_forward > 0.0 else 1.0
@@ -307,9 +325,9 @@ class _ContactProblem:
         level = contact.level - drive.motor_friction
         friction = self.friction(vector, number, level)
         _, force_share, speed_share, delay = vector[self.slots(number)]
-        force = level + force_share * _FORCE_ERROR * self.levels[number]
+        force = level + force_share * self.settings.force_error * self.levels[number]
         position = float(contact.motor[0, 0]) - wind_up_at(drive, force)
-        speed = float(contact.motor[1, 0]) + speed_share * _SPEED_ERROR * contact.approach_speed
+        speed = float(contact.motor[1, 0]) + speed_share * self.settings.speed_error * contact.approach_speed
         contact_force = contact.force_at(delay * self.settings.clock_error)
         output = np.zeros((len(contact_kernel.ROWS), len(contact_force)))
         contact_kernel.simulate_contact(
@@ -339,7 +357,7 @@ class _ContactProblem:
         """Return the scaled errors of each channel of one contact."""
         contact = self.contacts[number]
         rows = self.simulated(vector, number)
-        weight = math.sqrt(min(contact.period / _CORRELATED, 1.0))
+        weight = math.sqrt(min(contact.period / self.settings.correlated, 1.0))
         pairs = [(rows["torque"] - contact.torque, self.scales[number][0])]
         if contact.acceleration is not None:
             pairs.append((rows["acceleration"] - contact.acceleration, self.scales[number][1]))
@@ -366,13 +384,15 @@ class _ContactProblem:
             for index in (*range(len(self.shared)), *own):
                 moved = vector.copy()
                 if self.two_stage and index == self.shared.index("take_up_travel"):
-                    moved[index] -= 0.5 * _TRAVEL_STEP
+                    moved[index] -= 0.5 * self.settings.travel_step
                     lower = np.concatenate(self.contact_errors(moved, number))
-                    moved[index] += _TRAVEL_STEP
-                    block[:, index] = (np.concatenate(self.contact_errors(moved, number)) - lower) / _TRAVEL_STEP
+                    moved[index] += self.settings.travel_step
+                    block[:, index] = (
+                        np.concatenate(self.contact_errors(moved, number)) - lower
+                    ) / self.settings.travel_step
                 else:
-                    moved[index] += _STEP
-                    block[:, index] = (np.concatenate(self.contact_errors(moved, number)) - before) / _STEP
+                    moved[index] += self.settings.step
+                    block[:, index] = (np.concatenate(self.contact_errors(moved, number)) - before) / self.settings.step
             blocks.append(block)
         return np.concatenate((*blocks, np.eye(self.size)[self.known]))
 
@@ -389,13 +409,13 @@ class _ContactProblem:
         reach = max(float(np.max(_rough_wind_up(item, base))) for item in self.contacts)
         reach = max(reach, 1e-3 * _largest_drive_force(self.contacts, base) / base.stiffness)
         candidates = []
-        for travel in _TRAVELS:
-            for ratio in _RATIOS:
+        for travel in self.settings.travels:
+            for ratio in self.settings.ratios:
                 vector = first.copy()
                 vector[1], vector[2] = math.log(travel * reach), math.log(ratio * base.stiffness)
                 candidates.append((float(np.sum(np.abs(self.errors(vector)))), vector))
         candidates.sort(key=lambda item: item[0])
-        return [vector for _, vector in candidates[:_FOLLOWED]]
+        return [vector for _, vector in candidates[: self.settings.followed]]
 
     def solve(self) -> FloatArray:
         """Return the vector of least cost."""
@@ -409,7 +429,10 @@ class _ContactProblem:
             if name in _POSITIVE:
                 low[index] = 0.0
             if name == "front_mass":
-                low[index], high[index] = -0.99 * _FRONT_SHARE / _FRONT_ERROR, 0.4 / _FRONT_ERROR
+                low[index], high[index] = (
+                    -0.99 * self.settings.front_share / self.settings.front_error,
+                    0.4 / self.settings.front_error,
+                )
         scale = np.where(self.known, 1.0, 0.1)
         solutions = [
             least_squares(
@@ -429,9 +452,11 @@ class _ContactProblem:
 
     def covariance(self, vector: FloatArray, jacobian: FloatArray) -> FloatArray:
         """Return the covariance of the vector: of correlated residuals, and of what is known before the fit."""
+        from scipy.linalg import matmul_toeplitz
+
         inverse = np.linalg.pinv(jacobian)
         parts = [self.contact_errors(vector, number) for number in range(len(self.contacts))]
-        longest = max(math.ceil(_LAGS / item.period) for item in self.contacts)
+        longest = max(math.ceil(self.settings.lags / item.period) for item in self.contacts)
         covariances = [
             _autocovariance([item[channel] for item in parts if len(item) > channel], longest) for channel in (0, 1)
         ]
@@ -440,11 +465,16 @@ class _ContactProblem:
         for item in parts:
             for channel, errors in enumerate(item):
                 part = inverse[:, row : row + len(errors)]
-                total += part @ _toeplitz(covariances[channel], len(errors)) @ part.T
+                column = np.zeros(len(errors))
+                lags = min(len(errors), longest + 1)
+                column[:lags] = covariances[channel][:lags]
+                total += part @ matmul_toeplitz(column, part.T)
                 row += len(errors)
         # The residuals are smaller than the errors by what the parameters explain of them.
         pairs = zip(parts, self.contacts, strict=True)
-        samples = sum(len(item) * len(item[0]) * min(contact.period / _CORRELATED, 1.0) for item, contact in pairs)
+        samples = sum(
+            len(item) * len(item[0]) * min(contact.period / self.settings.correlated, 1.0) for item, contact in pairs
+        )
         explained = float(np.trace(jacobian[:row] @ inverse[:, :row]))
         total *= samples / max(samples - explained, 0.2 * samples)
         prior = inverse[:, row:]
@@ -499,7 +529,7 @@ class _ContactProblem:
             if name in self.shared:
                 value = float(getattr(drive, name))
                 error = float(errors[self.shared.index(name)]) * (value if name in _AS_LOGARITHM else self.unit(name))
-                error = error if self.has_front else math.hypot(error, _FRONT_UNKNOWN * value)
+                error = error if self.has_front else math.hypot(error, self.settings.front_unknown * value)
                 section = "machine" if name == "load_mass" else "model.drive"
                 unit = units.get(name, f"{force} s/{travel}")
                 estimates.append(Estimate(section, name, value, error, unit, Method.CONTACTS))
@@ -511,7 +541,7 @@ class _ContactProblem:
         """Return what is needed for each parameter that these contacts do not determine."""
         doubts = {}
         for item in estimates:
-            if not item.relative_error <= LARGEST_RELATIVE_ERROR:
+            if not item.relative_error <= self.settings.largest_relative_error:
                 doubts[item.key] = Missing.CONTACTS if item.key in _SECOND_STAGE else Missing.MORE_RECORDINGS
         if any(not item.is_motion_exact for item in self.contacts):
             # A delay of the speed channel looks like damping.
@@ -519,11 +549,11 @@ class _ContactProblem:
         if not self.two_stage:
             return doubts
         both = math.hypot(errors[self.shared.index("end_stiffness")], self.settings.stiffness_error)
-        is_distinct = math.log(drive.end_stiffness / drive.stiffness) > _DISTINCT * both
+        is_distinct = math.log(drive.end_stiffness / drive.stiffness) > self.settings.distinct * both
         if not is_distinct or wind_up <= drive.take_up_travel:
             doubts |= dict.fromkeys(_SECOND_STAGE, Missing.CONTACTS)
         rate = math.sqrt(drive.end_stiffness * (1.0 / drive.motor_mass + 1.0 / drive.load_mass))
-        if rate * max(item.period for item in self.contacts) > _LARGEST_ANGLE:
+        if rate * max(item.period for item in self.contacts) > self.settings.largest_angle:
             doubts |= dict.fromkeys(_SECOND_STAGE, Missing.HIGHER_RATE)
         return doubts
 
@@ -601,12 +631,12 @@ def _rough_wind_up(contact: LoadCellContact, drive: ElasticDrive) -> FloatArray:
     return wind_up
 
 
-def _scales(contact: LoadCellContact) -> tuple[float, float]:
+def _scales(contact: LoadCellContact, least_share: float) -> tuple[float, float]:
     """Return in what the errors of torque and acceleration count."""
-    torque = math.hypot(contact.noise[0], _LEAST_SHARE * float(np.max(np.abs(contact.torque))))
+    torque = math.hypot(contact.noise[0], least_share * float(np.max(np.abs(contact.torque))))
     if contact.acceleration is None:
         return torque, math.nan
-    return torque, math.hypot(contact.noise[1], _LEAST_SHARE * float(np.max(np.abs(contact.acceleration))))
+    return torque, math.hypot(contact.noise[1], least_share * float(np.max(np.abs(contact.acceleration))))
 
 
 def _autocovariance(parts: Sequence[FloatArray], lags: int) -> FloatArray:
@@ -619,13 +649,6 @@ def _autocovariance(parts: Sequence[FloatArray], lags: int) -> FloatArray:
         found[lag] = sum(float(np.dot(item[lag:], item[: len(item) - lag])) for item in parts if len(item) > lag)
     tapered: FloatArray = found / total * (1.0 - np.arange(lags + 1) / (lags + 1))
     return tapered
-
-
-def _toeplitz(covariance: FloatArray, count: int) -> FloatArray:
-    distance = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-    within = distance < len(covariance)
-    matrix: FloatArray = np.where(within, covariance[np.minimum(distance, len(covariance) - 1)], 0.0)
-    return matrix
 
 
 def _relative_errors(contacts: Sequence[LoadCellContact], rows: Sequence[Mapping[str, FloatArray]]) -> dict[str, float]:

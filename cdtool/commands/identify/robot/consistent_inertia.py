@@ -92,7 +92,7 @@ def consistent_fit(fit: RobotFit) -> ConsistentFit:
     if not isinstance(fit.machine, UrdfRobot):
         raise UsageError(f"machine '{fit.machine.name}': has no URDF", "consistent_fit is for type = 'urdf_robot'")
     if not any(fit.columns[i].group is ColumnGroup.INERTIAL for i in fit.grouping.columns):
-        raise UsageError("the inertial parameters were not free", "identify with RobotParameters(inertial=True)")
+        raise UsageError("the inertial parameters were not free", "identify with free INERTIAL columns")
     solver = _solver()
     problem = _InertiaProblem(fit, solver)
     values = problem.nearest_without_rise()

@@ -204,10 +204,6 @@ def _basis(rows: FloatArray) -> FloatArray:
     return np.asarray(left[:, values > _UNSEEN * values[0]])
 
 
-def _refused(joint: int, missing: Missing, numbers: dict[str, float]) -> NotIdentifiable:
-    return NotIdentifiable("channels.torque", "scale", (missing,), numbers, joint)
-
-
 def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Payload) -> _PayloadColumns:
     """Return what a payload adds to the regressor: its mass, first moments and inertias are columns of its link."""
     unit = np.eye(len(regressor.columns))

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.identify.robot.robot_dynamics import Window
+from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, Window
 from cdtool.commands.identify.robot.robot_run import RobotRun
 
 # Runs are the same motion if their lengths differ by at most this share, and their positions (RMS) by this share of
@@ -25,10 +25,10 @@ class RepeatedRuns:
     pairs: int
 
 
-def repeated_runs(runs: Sequence[RobotRun], half_width: float) -> RepeatedRuns:
+def repeated_runs(runs: Sequence[RobotRun]) -> RepeatedRuns:
     """Return the floor of the prediction error, from pairs of neighbouring runs that repeat the same motion.
 
-    The torques of a pair pass the window of `half_width` [s] (see robot_dynamics.py) and are subtracted; the RMS of the
+    The torques of a pair pass the window of robot_dynamics.py and are subtracted; the RMS of the
     difference is divided by sqrt(2), because both runs contribute. Equal motions that begin at different times after
     the start of their log are not recognised.
     """
@@ -37,7 +37,7 @@ def repeated_runs(runs: Sequence[RobotRun], half_width: float) -> RepeatedRuns:
     for one, other in pairwise(runs):
         if not _is_same_motion(one, other):
             continue
-        count, window = min(len(one), len(other)), Window.of(half_width, one.period)
+        count, window = min(len(one), len(other)), Window.of(HALF_WIDTH, one.period)
         difference = window.average(one.torque[:count] - other.torque[:count])
         squares.append(0.5 * difference**2)
         pairs += 1

@@ -88,50 +88,8 @@ _UNITS = {
 _NOT_NEGATIVE = (ColumnGroup.DRIVE_INERTIA, ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobotParameters:
-    """Which groups are identified; those that are not keep the machine's values.
-
-    `friction`: viscous and Coulomb; `offsets`: constant force; `inertial`: base inertial parameters. `half_width` [s]:
-    of the window, a zero-phase low-pass of about 0.5 / half_width Hz; at least ten samples. Raises UsageError.
-    """
-
-    friction: bool = True
-    offsets: bool = True
-    drive_inertia: bool = False
-    inertial: bool = False
-    half_width: float = HALF_WIDTH
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.half_width < math.inf:
-            raise UsageError(f"half_width is {self.half_width} s", "give a time above 0, as 0.1")
-        if not self.groups:
-            raise UsageError("no parameter is free", "free friction, offsets, drive_inertia or inertial")
-
-    @property
-    def groups(self) -> frozenset[ColumnGroup]:
-        """Return the groups of columns that are free."""
-        free = {
-            ColumnGroup.VISCOUS: self.friction,
-            ColumnGroup.COULOMB: self.friction,
-            ColumnGroup.CONSTANT: self.offsets,
-            ColumnGroup.DRIVE_INERTIA: self.drive_inertia,
-            ColumnGroup.INERTIAL: self.inertial,
-        }
-        return frozenset(group for group, is_free in free.items() if is_free)
-
-
-@dataclass(frozen=True, eq=False)
-class TorqueError:
-    """RMS of the torque that the model does not explain, per joint (J,) [N m, N], through the window's low-pass.
-
-    `train`: on the runs it was identified from; `cross_validated`: on runs, or fifths of the only one, left out of the
-    identification; `previous`: with the machine's own parameters; NaN for a joint without motion.
-    """
-
-    train: FloatArray
-    cross_validated: FloatArray
-    previous: FloatArray
+# The groups of columns that are free unless stated otherwise.
+FRICTION = frozenset((ColumnGroup.VISCOUS, ColumnGroup.COULOMB, ColumnGroup.CONSTANT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +110,11 @@ class LeftOutTorque:
         """Return the residuals of a joint."""
         chosen = self.previous if is_previous else self.residual
         return np.asarray(chosen[self.joints == joint])
+
+    def error(self, joint: int, is_previous: bool = False) -> float:
+        """Return the RMS of the residuals of a joint [N m, N]; NaN for one without motion."""
+        own = self.of_joint(joint, is_previous)
+        return _rms(own) if len(own) else math.nan
 
     def is_better(self, joint: int, than: FloatArray, errors: float) -> bool:
         """Return whether a joint's squared residual is below another model's by more than so many standard errors."""
@@ -207,30 +170,36 @@ class RobotFit:
     grouping: Grouping
     base: BaseParameterSet
     identified: Identified
-    torque_error: TorqueError
     left_out: LeftOutTorque
     condition_number: float
     equations: Equations
 
 
-def identify_robot(runs: Sequence[RobotRun], machine: CoupledMachine, what: RobotParameters | None = None) -> RobotFit:
+def identify_robot(
+    runs: Sequence[RobotRun],
+    machine: CoupledMachine,
+    free_groups: frozenset[ColumnGroup] = FRICTION,
+    half_width: float = HALF_WIDTH,
+) -> RobotFit:
     """Return the free parameters of a robot from contact-free runs.
 
-    `machine`: the robot with its own parameters, of which those that are not free are taken as known. Coulomb friction
+    `machine`: the robot with its own parameters, of which those that are not free are taken as known. `half_width` [s]:
+    of the window, a zero-phase low-pass of about 0.5 / half_width Hz; at least ten samples. Coulomb friction
     has the machine's shape: tanh with its coulomb_slope, else a sign above its stick_speed. A parameter that these runs
     do not determine is a NotIdentifiable: its column is not independent of the others in this motion, or its standard
     error makes more than a tenth (of friction and drive: half) of a joint's torque in random motion. The full set of
     base parameters must also have a condition number of at most 100. Raises IdentificationError without any motion,
     UsageError for another machine.
     """
-    what = what or RobotParameters()
     regressor = regressor_of(machine)
-    free = tuple(i for i, column in enumerate(regressor.columns) if column.group in what.groups)
+    free = tuple(i for i, column in enumerate(regressor.columns) if column.group in free_groups)
     grouping = group_columns(regressor, free)
     known = regressor.values
     start = grouping.combination @ known[list(free)]
     bounded = _bounds(regressor.columns, grouping)
-    solution = _Solution.of(_windows_of(runs, regressor, grouping, what), start, bounded, len(machine.joints))
+    solution = _Solution.of(
+        _windows_of(runs, regressor, grouping, free_groups, half_width), start, bounded, len(machine.joints)
+    )
     equations = solution.equations
     parameters = known.copy()
     parameters[list(grouping.base)] += solution.values - start
@@ -246,7 +215,6 @@ def identify_robot(runs: Sequence[RobotRun], machine: CoupledMachine, what: Robo
         grouping=grouping,
         base=base,
         identified=judge.outcome(),
-        torque_error=_torque_error(solution, left_out, machine),
         left_out=left_out,
         condition_number=condition,
         equations=equations,
@@ -335,15 +303,17 @@ def resting_windows(run: RobotRun, machine: CoupledMachine, window: Window) -> B
     return window.average(run.slow(machine.stick_speed).astype(np.float64)) > 0.0
 
 
-def _windows_of(runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, what: RobotParameters) -> Equations:
+def _windows_of(
+    runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, free: frozenset[ColumnGroup], half_width: float
+) -> Equations:
     """Return all equations, unweighted; what is not free is subtracted. Raises IdentificationError, UsageError."""
     machine, parts = regressor.machine, []
     for index, run in enumerate(runs):
         if run.joint_count != len(machine.joints):
             raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
-        window = Window.of(what.half_width, run.period)
-        rigid = _rigid_torque(run, machine, window) * (ColumnGroup.INERTIAL not in what.groups)
-        torque = window.average(run.torque) - rigid - _known_torque(run, regressor, window, what.groups)
+        window = Window.of(half_width, run.period)
+        rigid = _rigid_torque(run, machine, window) * (ColumnGroup.INERTIAL not in free)
+        torque = window.average(run.torque) - rigid - _known_torque(run, regressor, window, free)
         rows = np.stack([window_of_column(run, regressor, window, own) for own in grouping.base], axis=2)
         valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
         place, joint = np.nonzero(valid)
@@ -745,19 +715,6 @@ def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> 
     scale = 1.0 / solution.weights[joints]
     previous = (equations.torques - equations.rows @ start) * scale
     return LeftOutTorque(residual * scale, previous, joints, solution.blocks)
-
-
-def _torque_error(solution: _Solution, left_out: LeftOutTorque, machine: CoupledMachine) -> TorqueError:
-    equations, count = solution.equations, len(machine.joints)
-    explained = (equations.torques - equations.rows @ solution.values) / solution.weights[left_out.joints]
-    rest = (explained, left_out.residual, left_out.previous)
-    return TorqueError(*(_per_joint(item, left_out.joints, count) for item in rest))
-
-
-def _per_joint(residual: FloatArray, joints: Index, count: int) -> FloatArray:
-    """Return the RMS of each joint (J,); NaN without a window."""
-    chosen = [residual[joints == joint] for joint in range(count)]
-    return np.array([_rms(item) if len(item) else np.nan for item in chosen])
 
 
 def _folds(equations: Equations) -> Index:

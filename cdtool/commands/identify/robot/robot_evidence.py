@@ -1,81 +1,24 @@
-"""What the outputs show of a robot's joints: unseen torque, friction over speed, decision on the friction, motion.
-
-The runs are read again, and the chosen forms of friction fitted again: an identification keeps no samples.
-"""
+"""What the outputs show of a robot's joints: unseen torque, friction over speed, motion."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve, friction_curve, speed_edges
-from cdtool.commands.identify.estimate import Missing, NotIdentifiable
-from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction
-from cdtool.commands.identify.robot.robot_dynamics import (
-    HALF_WIDTH,
-    RobotFit,
-    RobotParameters,
-    Window,
-    identify_robot,
-    window_of_column,
-)
-from cdtool.commands.identify.robot.robot_excitation import (
-    JointMotion,
-    PlannedRobotMotion,
-    measure_joint_motion,
-    plan_robot_motion,
-)
+from cdtool.commands.identify.robot.friction_choice import FrictionForm
+from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, Window, window_of_column
+from cdtool.commands.identify.robot.robot_excitation import JointMotion
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
-from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
-from cdtool.machines.coupled import CoupledMachine
-from cdtool.machines.urdf_robot import UrdfRobot
 
 # A line is interrupted where windows are further apart than this many usual steps.
 _GAP = 1.5
-_FORMS: Mapping[FrictionForm, RobotParameters] = {
-    FrictionForm.OFFSET: RobotParameters(friction=False),
-    FrictionForm.FRICTION_ALONE: RobotParameters(offsets=False),
-    FrictionForm.FRICTION: RobotParameters(),
-    FrictionForm.DRIVE_INERTIA: RobotParameters(drive_inertia=True),
-    FrictionForm.WITH_INERTIAS: RobotParameters(inertial=True),
-}
-# Those with which the old friction of a joint is compared.
-_REFITTED = (FrictionForm.FRICTION_ALONE, FrictionForm.FRICTION)
-
-
-class FrictionAnswer(Enum):
-    """Whether the friction of a joint is new, and why the old one stays."""
-
-    NEW = "new friction"
-    NOT_BETTER = "not better by more than one standard error"
-    NOT_IDENTIFIABLE = "new friction is not identifiable"
-    NOT_MOVED = "the joint does not move"
-    UNEXPLAINED = "the machine explains too little of the torque"
-
-
-@dataclass(frozen=True)
-class FrictionDecision:
-    """The friction of a joint: the answer, and RMS errors [N m, N] of the torque on parts that were left out.
-
-    `form`: the new one; where the old friction stays, that which predicted best of those compared with it, None without
-    any. `before`: with the old friction, `after`: with `form`.
-    `torque`: RMS in motion. `floor`: between runs of equal motion. NaN for what is not known.
-    """
-
-    answer: FrictionAnswer
-    form: FrictionForm | None
-    before: float
-    after: float
-    torque: float
-    floor: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,13 +66,9 @@ class JointFrictionCurve:
 
 @dataclass(frozen=True, eq=False)
 class RobotJointEvidence:
-    """What the logs show of one joint; `unseen` and `friction` are None for a joint without enough motion.
-
-    `units`: of torque, and of travel.
-    """
+    """What the logs show of one joint; `unseen` and `friction` are None for a joint without enough motion."""
 
     motion: JointMotion
-    units: tuple[str, str]
     unseen: UnseenTorque | None = None
     friction: JointFrictionCurve | None = None
 
@@ -139,103 +78,14 @@ def _rms(residual: FloatArray) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else math.nan
 
 
-def decision_of(done: IdentifiedMachine, joint: int) -> FrictionDecision | None:
-    """Return the decision on the friction of a joint; None for an axis."""
-    friction, robot = done.joints[joint].robot, done.robot
-    if friction is None or robot is None:
-        return None
-    before = friction.errors.get(FrictionForm.PREVIOUS, math.nan)
-    compared = _compared(friction)
-    form = compared if friction.form is FrictionForm.PREVIOUS else friction.form
-    after = friction.errors.get(form, math.nan) if form else math.nan
-    floor = float(robot.repeated.floor[joint])
-    answer = _answer(friction, done.joints[joint].refused)
-    return FrictionDecision(answer, form, before, after, friction.torque, floor)
-
-
-def _answer(friction: JointFriction, refused: Mapping[str, str]) -> FrictionAnswer:
-    if friction.form is not FrictionForm.PREVIOUS:
-        return FrictionAnswer.NEW
-    if "friction" in refused:
-        return FrictionAnswer.UNEXPLAINED
-    if not math.isfinite(friction.errors.get(FrictionForm.PREVIOUS, math.nan)):
-        return FrictionAnswer.NOT_MOVED
-    return FrictionAnswer.NOT_BETTER if _compared(friction) else FrictionAnswer.NOT_IDENTIFIABLE
-
-
-def _compared(friction: JointFriction) -> FrictionForm | None:
-    """Return the form that was compared with the old friction, by the rule of choose_friction."""
-    known = [form for form in _REFITTED if math.isfinite(friction.errors.get(form, math.nan))]
-    if known:
-        return min(known, key=lambda form: friction.errors[form])
-    has_offset = math.isfinite(friction.errors.get(FrictionForm.OFFSET, math.nan))
-    return FrictionForm.OFFSET if has_offset else None
-
-
-def base_set_of(done: IdentifiedMachine) -> NotIdentifiable | None:
-    """Return why the full set of base parameters is not identifiable; None if it is, or for an axis."""
-    inertias = done.robot.inertias if done.robot else None
-    return next(iter(inertias.not_identifiable), None) if inertias else None
-
-
-def inertia_plan(done: IdentifiedMachine, motions: Sequence[JointMotion]) -> PlannedRobotMotion | None:
-    """Return the motion that would show the inertias of all links; None if nothing is missing, or nothing moves."""
-    refused = base_set_of(done)
-    if refused is None:
-        return None
-    return plan_robot_motion(motions, int(refused.numbers.get("base_parameters", 0.0)))
-
-
-def robot_evidence(
-    done: IdentifiedMachine, runs: Sequence[RobotRun], machine: CoupledMachine
-) -> tuple[RobotJointEvidence, ...]:
-    """Return what the logs show of each joint.
-
-    Parameters
-    ----------
-    done : IdentifiedMachine
-        What was identified from these runs.
-    runs : sequence of RobotRun
-        All usable runs as they were logged.
-    machine : CoupledMachine
-        The robot as it was before.
-
-    Returns
-    -------
-    tuple of RobotJointEvidence
-        In the order of the joints.
-
-    Raises
-    ------
-    IdentificationError
-        No joint moves.
-    """
-    motions = measure_joint_motion(runs, machine)
-    factors = done.robot.torque_factors if done.robot else 1.0
-    scaled = [replace(run, torque=run.torque * factors) for run in runs]
-    explained = without_unexplained(scaled, machine, HALF_WIDTH).runs
-    fits: dict[FrictionForm, RobotFit] = {}
-    units = _units_of(machine)
-    evidence = []
-    for joint, item in enumerate(done.joints):
-        decision = decision_of(done, joint)
-        form = decision.form if decision else None
-        if item.robot is None or form is None:
-            evidence.append(RobotJointEvidence(motions[joint], units[joint]))
-            continue
-        if form not in fits:
-            fits[form] = identify_robot(explained, machine, _FORMS[form])
-        shown = _Joint(joint, form, fits[form], explained)
-        evidence.append(RobotJointEvidence(motions[joint], units[joint], shown.unseen(), shown.friction(machine)))
-    return tuple(evidence)
-
-
-def _units_of(machine: CoupledMachine) -> list[tuple[str, str]]:
-    """Return the units of torque and travel of each joint."""
-    if not isinstance(machine, UrdfRobot):
-        return [("N m", "rad")] * len(machine.joints)
-    slides = {joint.name: joint.prismatic for joint in machine.tree.joints}
-    return [("N", "m") if slides[name] else ("N m", "rad") for name in machine.tree.order]
+def joint_evidence(
+    motion: JointMotion, form: FrictionForm | None, fits: Mapping[FrictionForm, RobotFit], runs: Sequence[RobotRun]
+) -> RobotJointEvidence:
+    """Return what the fit of a form, to these runs, shows of a joint; without a form only its motion."""
+    if form is None:
+        return RobotJointEvidence(motion)
+    shown = _Joint(motion.joint, form, fits[form], runs)
+    return RobotJointEvidence(motion, shown.unseen(), shown.friction())
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +119,7 @@ class _Joint:
         broken = [np.insert(line, gaps, np.nan) for line in lines]
         return UnseenTorque(run.name, len(self.runs), self.form, time, *broken)
 
-    def friction(self, machine: CoupledMachine) -> JointFrictionCurve | None:
+    def friction(self) -> JointFrictionCurve | None:
         """Return the friction over speed, with the inertias that belong to the form."""
         equations = self.fit.equations
         own = equations.joints.astype(np.int64) == self.joint
@@ -291,13 +141,13 @@ class _Joint:
             return None
         reach = float(np.max(np.abs(speed)))
         at = np.linspace(-reach if speed.min() < 0.0 else 0.0, reach if speed.max() > 0.0 else 0.0, 81)
-        before = regressor_of(machine).values
+        before = regressor_of(self.fit.machine).values
         return JointFrictionCurve(
             points,
             self.form,
             at,
-            self._modelled(self.fit.machine, self.fit.parameters, at),
-            self._modelled(machine, before, at),
+            self._modelled(self.fit.parameters, at),
+            self._modelled(before, at),
         )
 
     def _places(self, run: RobotRun, window: Window, times: FloatArray) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -316,8 +166,9 @@ class _Joint:
                 total = total + change[column] * window_of_column(run, regressor, window, column)[:, self.joint]
         return np.asarray(total)
 
-    def _modelled(self, machine: CoupledMachine, parameters: FloatArray, speed: FloatArray) -> FloatArray:
+    def _modelled(self, parameters: FloatArray, speed: FloatArray) -> FloatArray:
         """Return the friction of the joint over the speed (n,)."""
+        machine = self.fit.machine
         values = {
             column.group: float(parameters[index])
             for index, column in enumerate(regressor_of(machine).columns)
@@ -329,12 +180,3 @@ class _Joint:
             values[ColumnGroup.VISCOUS] * speed + values[ColumnGroup.COULOMB] * direction + values[ColumnGroup.CONSTANT]
         )
         return np.asarray(total)
-
-
-def excitation_needs(motion: JointMotion) -> tuple[Missing, ...]:
-    """Return what the motion of a joint does not have for its friction: speeds, directions; empty if it has all."""
-    if not motion.is_moving:
-        return (Missing.OTHER_MOTION,)
-    missing = [] if len(motion.excitation.speeds) > 1 else [Missing.SECOND_SPEED]
-    missing += [Missing.REVERSALS] if motion.excitation.is_one_way else []
-    return tuple(missing)

@@ -10,9 +10,9 @@ joint each. All on the load side.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Protocol
 
 import numpy as np
 
@@ -53,33 +53,6 @@ class RegressorColumn:
     joint: int
 
 
-class Regressor(Protocol):
-    """The regressor of a machine; every array (n, J), columns one by one to spare memory."""
-
-    @property
-    def machine(self) -> CoupledMachine:
-        """Return the machine."""
-        ...
-
-    @property
-    def columns(self) -> tuple[RegressorColumn, ...]:
-        """Return the columns, P of them."""
-        ...
-
-    @property
-    def values(self) -> FloatArray:
-        """Return the machine's own parameters (P,), on the load side."""
-        ...
-
-    def torque(self, column: int, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """Return the torque (n, J) of the parameter 1."""
-        ...
-
-    def momentum(self, column: int, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return momentum and rest (n, J) of the parameter 1: d momentum / dt + rest = torque."""
-        ...
-
-
 def regressor_of(machine: CoupledMachine) -> Regressor:
     """Return the regressor of a robot from a URDF or of a planar arm; raises UsageError for another machine."""
     if isinstance(machine, UrdfRobot):
@@ -91,10 +64,11 @@ def regressor_of(machine: CoupledMachine) -> Regressor:
     )
 
 
-class _JointColumns:
-    """The columns of drive and friction, the same for every machine.
+class Regressor(ABC):
+    """The regressor of a machine: every array (n, J), columns one by one to spare memory.
 
-    Dry friction is Coulomb tanh(slope v), or Coulomb sign(v) above the stick speed without a slope, as in the machine.
+    The columns of drive and friction are the same for every machine. Dry friction is Coulomb tanh(slope v), or Coulomb
+    sign(v) above the stick speed without a slope, as in the machine.
     """
 
     def __init__(self, machine: CoupledMachine, inertial: tuple[RegressorColumn, ...]) -> None:
@@ -104,7 +78,11 @@ class _JointColumns:
             RegressorColumn(group, f"{group.value} {name}", j) for group in PER_JOINT for j, name in enumerate(names)
         )
         self.columns = inertial + own
-        self._inertial_count = len(inertial)
+
+    @property
+    @abstractmethod
+    def values(self) -> FloatArray:
+        """Return the machine's own parameters (P,), on the load side."""
 
     def joint_values(self) -> FloatArray:
         """Return viscous, Coulomb and constant friction on the load side (3 J,)."""
@@ -144,7 +122,7 @@ class _JointColumns:
         return torque
 
     def momentum(self, column: int, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return momentum and rest (n, J) of the parameter 1."""
+        """Return momentum and rest (n, J) of the parameter 1: d momentum / dt + rest = torque."""
         what = self.columns[column]
         if what.group is ColumnGroup.INERTIAL:
             return self._inertial_momentum(column, position, speed)
@@ -154,16 +132,18 @@ class _JointColumns:
         momentum[:, what.joint] = speed[:, what.joint]
         return momentum, np.zeros_like(speed)
 
+    @abstractmethod
     def _inertial_torque(
         self, column: int, position: FloatArray, speed: FloatArray, acceleration: FloatArray
-    ) -> FloatArray:
-        raise NotImplementedError
+    ) -> FloatArray: ...
 
-    def _inertial_momentum(self, column: int, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        raise NotImplementedError
+    @abstractmethod
+    def _inertial_momentum(
+        self, column: int, position: FloatArray, speed: FloatArray
+    ) -> tuple[FloatArray, FloatArray]: ...
 
 
-class TreeRegressor(_JointColumns):
+class TreeRegressor(Regressor):
     """The regressor of a robot from a URDF: ten inertial columns per moving body, in the order of the tree's joints."""
 
     def __init__(self, machine: UrdfRobot) -> None:
@@ -204,7 +184,7 @@ class TreeRegressor(_JointColumns):
         return momentum, gravity
 
 
-class PlanarRegressor(_JointColumns):
+class PlanarRegressor(Regressor):
     """The regressor of a planar arm: M11, M22, h, g1, g2 of its equation, drives not included in M11 and M22.
 
     With the absolute angles q1, q2 (thesis 6.23, 6.24); all five are base parameters.

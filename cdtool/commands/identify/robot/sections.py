@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
-from cdtool.commands.identify.identification_outputs import JointEvidence, robot_plan_of
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.commands.identify.identifying_robot import InertiaIdentification, RobotIdentification
-from cdtool.commands.identify.robot.plots import JointPanel, draw_joint_frictions, draw_unseen_torques
-from cdtool.commands.identify.robot.robot_evidence import FrictionAnswer, decision_of, excitation_needs
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer
+from cdtool.commands.identify.robot.plots import draw_joint_frictions, draw_unseen_torques
 from cdtool.commands.identify.words import (
     listed_numbers,
     short_number,
@@ -33,61 +31,43 @@ _FRICTION = (
 )
 
 
-def robot_sections(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -> list[PageSection]:
+def robot_sections(done: IdentifiedMachine) -> list[PageSection]:
     """Return the sections of a robot; none of an axis."""
     robot = done.robot
     if robot is None:
         return []
-    panels = _panels(done, evidence)
-    sections = [_friction_section(done, robot, panels), _motion_section(evidence)]
-    if robot.inertias is not None:
-        sections.append(_inertia_section(robot.inertias))
-    travel = [item.robot.units[1] if item.robot else "rad" for item in evidence]
-    lines = words_of_robot(
-        robot, robot_plan_of(done, evidence), [joint.joint for joint in done.joints], travel, len(done.runs)
-    )
+    sections = [_friction_section(done, robot), _motion_section(done), _inertia_section(robot.inertias)]
+    lines = words_of_robot(robot, done.joints, len(done.runs))
     if lines:
         table = Table("robot", "The whole robot", (Heading("finding"),), [[Cell(visible(line))] for line in lines])
         sections.append(PageSection("Whole robot", (table,)))
     return sections
 
 
-def _panels(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -> list[JointPanel]:
-    panels = []
-    for place, item in enumerate(evidence):
-        decision = decision_of(done, place)
-        if decision is not None and item.robot is not None:
-            robot = item.robot
-            panels.append(JointPanel(item.joint, decision, robot.units, robot.unseen, robot.friction))
-    return panels
-
-
-def _friction_section(done: IdentifiedMachine, robot: RobotIdentification, panels: Sequence[JointPanel]) -> PageSection:
-    tables = [_decision_table(panels), _forms_table(done, robot)]
-    figures = []
-    if any(panel.unseen is not None for panel in panels):
-        figures.append((partial(draw_unseen_torques, panels), _UNSEEN))
-    if any(panel.friction is not None for panel in panels):
-        figures.append((partial(draw_joint_frictions, panels), _FRICTION))
-    return PageSection("Prediction of unseen runs, joints", tuple(tables), images_of(figures))
-
-
-def _decision_table(panels: Sequence[JointPanel]) -> Table:
+def _friction_section(done: IdentifiedMachine, robot: RobotIdentification) -> PageSection:
+    rows = list(zip(done.joints, robot.joints, robot.repeated.floor.tolist(), strict=True))
     fields = (
-        (Heading("joint"), lambda item: name_cell(visible(item.name))),
-        (Heading("unit"), lambda item: Cell(item.units[0])),
-        (Heading("torque, RMS", numeric=True), lambda item: number_cell(item.decision.torque)),
-        (Heading("old friction", numeric=True), lambda item: number_cell(item.decision.before)),
-        (Heading("new friction", numeric=True), lambda item: number_cell(item.decision.after)),
-        (Heading("between equal runs", numeric=True), lambda item: number_cell(item.decision.floor)),
+        (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
+        (Heading("unit"), lambda item: Cell(item[0].units[1])),
+        (Heading("torque, RMS", numeric=True), lambda item: number_cell(item[1].torque)),
+        (Heading("old friction", numeric=True), lambda item: number_cell(item[1].before)),
+        (Heading("new friction", numeric=True), lambda item: number_cell(item[1].after)),
+        (Heading("between equal runs", numeric=True), lambda item: number_cell(item[2])),
         (
             Heading("used"),
-            lambda item: Cell(
-                words_of_decision(item.decision), tone="good" if item.decision.answer is FrictionAnswer.NEW else ""
-            ),
+            lambda item: Cell(words_of_decision(item[1]), tone="good" if item[1].answer is FrictionAnswer.NEW else ""),
         ),
     )
-    return tabulate("torque", "Torque that is not explained in what was left out of the fit, RMS", fields, panels)
+    title = "Torque that is not explained in what was left out of the fit, RMS"
+    tables = (tabulate("torque", title, fields, rows), _forms_table(done, robot))
+    figures = []
+    unseen = [item for item in rows if item[0].evidence and item[0].evidence.unseen]
+    if unseen:
+        figures.append((partial(draw_unseen_torques, unseen), _UNSEEN))
+    friction = [item[0] for item in rows if item[0].evidence and item[0].evidence.friction]
+    if friction:
+        figures.append((partial(draw_joint_frictions, friction), _FRICTION))
+    return PageSection("Prediction of unseen runs, joints", tables, images_of(figures))
 
 
 def _forms_table(done: IdentifiedMachine, robot: RobotIdentification) -> Table:
@@ -100,41 +80,38 @@ def _forms_table(done: IdentifiedMachine, robot: RobotIdentification) -> Table:
     return Table("forms", "All forms that were compared", columns, rows)
 
 
-def _motion_section(evidence: Sequence[JointEvidence]) -> PageSection:
-    rows = []
-    for item in evidence:
-        if item.robot is None:
-            continue
-        motion, travel = item.robot.motion, item.robot.units[1]
-        moved = motion.excitation
-        needs = excitation_needs(motion)
-        rows.append(
-            [
-                name_cell(visible(item.joint)),
-                Cell(travel),
-                Cell(f"{short_number(motion.lowest)} to {short_number(motion.highest)}"),
-                Cell(listed_numbers(moved.speeds, 2) if moved.speeds else NOTHING),
-                number_cell(moved.highest_speed),
-                number_cell(moved.highest_acceleration),
-                Cell(percent(moved.forward_share) if motion.is_moving else NOTHING),
-                number_cell(moved.moving_time),
-                Cell(words_of_needs(needs) or "nothing", tone="unknown" if needs else "good"),
-            ]
-        )
-    headings = (
-        ("joint", False),
-        ("unit", False),
-        ("range", False),
-        ("speeds that are held [/s]", False),
-        ("highest speed [/s]", True),
-        ("highest acceleration [/s²]", True),
-        ("forward", False),
-        ("moving time [s]", True),
-        ("missing for its friction", False),
+def _motion_section(done: IdentifiedMachine) -> PageSection:
+    moved = [(joint, joint.evidence.motion) for joint in done.joints if joint.evidence]
+    fields = (
+        (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
+        (Heading("unit"), lambda item: Cell(item[0].units[2])),
+        (
+            Heading("range"),
+            lambda item: Cell(f"{short_number(item[1].lowest)} to {short_number(item[1].highest)}"),
+        ),
+        (
+            Heading("speeds that are held [/s]"),
+            lambda item: Cell(listed_numbers(item[1].excitation.speeds, 2) or NOTHING),
+        ),
+        (Heading("highest speed [/s]", numeric=True), lambda item: number_cell(item[1].excitation.highest_speed)),
+        (
+            Heading("highest acceleration [/s²]", numeric=True),
+            lambda item: number_cell(item[1].excitation.highest_acceleration),
+        ),
+        (
+            Heading("forward"),
+            lambda item: Cell(percent(item[1].excitation.forward_share) if item[1].is_moving else NOTHING),
+        ),
+        (Heading("moving time [s]", numeric=True), lambda item: number_cell(item[1].excitation.moving_time)),
+        (
+            Heading("missing for its friction"),
+            lambda item: Cell(
+                words_of_needs(item[1].missing) or "nothing", tone="unknown" if item[1].missing else "good"
+            ),
+        ),
     )
-    columns = tuple(Heading(heading, numeric=numeric) for heading, numeric in headings)
-    table = Table("motion", "Logged motion of each joint", columns, rows)
-    return PageSection("Excitation, joints", (table,) if rows else ())
+    table = tabulate("motion", "Logged motion of each joint", fields, moved)
+    return PageSection("Excitation, joints", (table,))
 
 
 def _inertia_section(found: InertiaIdentification) -> PageSection:

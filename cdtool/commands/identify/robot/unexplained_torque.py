@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import BoolArray
-from cdtool.commands.identify.robot.robot_dynamics import RobotFit, RobotParameters, identify_robot
+from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, identify_robot
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 
@@ -27,19 +27,19 @@ class ExplainedRuns:
     share: float
 
 
-def without_unexplained(runs: Sequence[RobotRun], machine: CoupledMachine, half_width: float) -> ExplainedRuns:
+def without_unexplained(runs: Sequence[RobotRun], machine: CoupledMachine) -> ExplainedRuns:
     """Return the runs without the times at which the friction fitted to all of them explains a torque by no means.
 
-    That is a residual beyond eight robust standard deviations of its joint; its window of `half_width` [s] to either
+    That is a residual beyond eight robust standard deviations of its joint; its window to either
     side is left out for all joints. Contacts that last for much of the logs pass for friction. Raises what
     identify_robot raises.
     """
-    fit = identify_robot(runs, machine, RobotParameters(half_width=half_width))
+    fit = identify_robot(runs, machine)
     is_outside = _outside(fit)
     equations, cleaned = fit.equations, []
     for index, run in enumerate(runs):
         times = np.unique(equations.times[is_outside & (equations.runs == index)])
-        cleaned.append(run.without(_near(run, times, half_width)) if len(times) else run)
+        cleaned.append(run.without(_near(run, times)) if len(times) else run)
     return ExplainedRuns(tuple(cleaned), float(np.mean(is_outside)))
 
 
@@ -58,10 +58,10 @@ def _outside(fit: RobotFit) -> BoolArray:
     return outside
 
 
-def _near(run: RobotRun, times: np.ndarray[tuple[int], np.dtype[np.float64]], half_width: float) -> BoolArray:
-    """Return which samples (n,) are within `half_width` of one of the sorted times."""
+def _near(run: RobotRun, times: np.ndarray[tuple[int], np.dtype[np.float64]]) -> BoolArray:
+    """Return which samples (n,) are within a window of one of the sorted times."""
     clock = run.time
     after = np.clip(np.searchsorted(times, clock), 1, len(times)) if len(times) > 1 else np.ones(len(clock), np.int64)
     before = times[after - 1]
     behind = times[np.minimum(after, len(times) - 1)]
-    return np.asarray(np.minimum(np.abs(clock - before), np.abs(clock - behind)) <= half_width)
+    return np.asarray(np.minimum(np.abs(clock - before), np.abs(clock - behind)) <= HALF_WIDTH)

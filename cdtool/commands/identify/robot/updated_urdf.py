@@ -1,13 +1,12 @@
-"""The text of a URDF with identified inertial parameters; every other byte stays as it was, comments included."""
+"""The text of a URDF with identified inertial parameters; everything else stays as it was, comments included."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from xml.etree import ElementTree
-from xml.parsers import expat
+from typing import Any
+from xml.dom.minidom import parseString
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 
@@ -19,23 +18,27 @@ from cdtool.machines.kinematic_tree import KinematicTree, TreeLink
 
 _ROTATIONAL = ("ixx", "ixy", "iyy", "ixz", "iyz", "izz")
 _LEAST_MASS = 1e-9
-# A start tag; a quoted value may contain ">".
-_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
-_STEP = "  "
 
 
 def updated_urdf(text: str, tree: KinematicTree) -> str:
-    """Return the URDF with the inertial parameters of a tree that was read from it.
+    """Return the URDF with the inertial parameters of a tree that was read from it; comments and layout stay.
 
     A joint's link carries them. Links that are fixed to it keep theirs if the rest is a physical body; else they lose
     them, and the joint's link carries all. Centre of mass and inertia are in the axes of the link, at full precision.
     Raises ConfigurationError for broken XML, a URDF of another robot, and for a moving body without mass.
     """
-    data = text.encode()
-    places, root = _places(data), ElementTree.fromstring(data.partition(b"?>")[2] if _is_declared(data) else data)
-    links = {link.get("name", ""): _read(link) for link in root.findall("link")}
-    children = {joint.get("name", ""): _child(joint) for joint in root.findall("joint")}
-    edits: list[_Edit] = []
+    try:
+        document = parseString(text)
+    except ExpatError as fault:
+        raise ConfigurationError(
+            f"broken XML in line {fault.lineno}, column {fault.offset + 1} of the URDF", "a URDF file is needed"
+        ) from fault
+    root: Any = document.documentElement
+    elements = {link.getAttribute("name"): link for link in _children(root, "link")}
+    if root.tagName != "robot" or not elements:
+        raise ConfigurationError("the URDF has no link in <robot>", "a URDF's root is <robot>")
+    links = {name: _read(link) for name, link in elements.items()}
+    children = {joint.getAttribute("name"): _child(joint) for joint in _children(root, "joint")}
     for index, joint in enumerate(tree.joints):
         carried = [link for link in tree.links if link.joint == index and link.name in links]
         own = next((link for link in carried if link.name == children.get(joint.name)), None)
@@ -45,117 +48,19 @@ def updated_urdf(text: str, tree: KinematicTree) -> str:
         total = pseudo_inertia(body_parameters(joint))
         matrix, emptied = _own_part(total, fixed, links)
         inverse = np.linalg.inv(_placement(own))
-        edits.append(places[own.name].replacement(data, _numbers(inverse @ matrix @ inverse.T, joint.name)))
-        edits.extend(places[link.name].removal(data) for link in emptied if places[link.name].inertial)
-    for edit in sorted(edits, key=lambda item: item.start, reverse=True):
-        data = data[: edit.start] + edit.text + data[edit.end :]
-    return data.decode()
+        _write(document, elements[own.name], inverse @ matrix @ inverse.T, joint.name)
+        for link in emptied:
+            for inertial in _children(elements[link.name], "inertial"):
+                elements[link.name].removeChild(inertial)
+    return str(document.toxml())
 
 
-@dataclass(frozen=True)
-class _Edit:
-    """Bytes `start` to `end` become `text`."""
-
-    start: int
-    end: int
-    text: bytes
+def _children(element: Any, tag: str) -> list[Any]:
+    return [node for node in element.childNodes if node.nodeType == node.ELEMENT_NODE and node.tagName == tag]
 
 
-@dataclass
-class _LinkPlace:
-    """Where a link is: the bytes of its start tag, and of its <inertial> (start, end), None without one."""
-
-    tag: tuple[int, int]
-    inertial: tuple[int, int] | None = None
-
-    def replacement(self, data: bytes, numbers: Sequence[str]) -> _Edit:
-        """Return the edit that writes origin, mass and inertia."""
-        if self.inertial:
-            margin = _margin(data, self.inertial[0])
-            return _Edit(*self.inertial, _element(numbers, margin, _inner_margin(data, self.inertial)))
-        outer = _margin(data, self.tag[0])
-        margin = outer + _STEP
-        start, end = self.tag
-        tag = data[start:end]
-        inner = f"\n{margin}".encode() + _element(numbers, margin, margin + _STEP)
-        if not tag.endswith(b"/>"):
-            return _Edit(end, end, inner)
-        opened = tag[:-2].rstrip() + b">"
-        return _Edit(start, end, opened + inner + f"\n{outer}</link>".encode())
-
-    def removal(self, data: bytes) -> _Edit:
-        """Return the edit that removes the inertial element and its line."""
-        assert self.inertial is not None
-        start, end = self.inertial
-        while start and data[start - 1 : start] in (b" ", b"\t"):
-            start -= 1
-        return _Edit(start - (data[start - 1 : start] == b"\n"), end, b"")
-
-
-def _is_declared(data: bytes) -> bool:
-    return data.lstrip().startswith(b"<?xml")
-
-
-def _places(data: bytes) -> dict[str, _LinkPlace]:
-    """Return where each link of the robot is; raises ConfigurationError for broken XML and another root."""
-    parser = expat.ParserCreate("utf-8")
-    path: list[str] = []
-    places: dict[str, _LinkPlace] = {}
-    current: list[_LinkPlace] = []
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        path.append(tag)
-        at = parser.CurrentByteIndex
-        if path == ["robot", "link"]:
-            current[:] = [_LinkPlace((at, _tag_end(data, at)))]
-            places[attributes.get("name", "")] = current[0]
-        elif path == ["robot", "link", "inertial"] and current[0].inertial is None:
-            current[0].inertial = (at, _tag_end(data, at))
-
-    def end(_: str) -> None:
-        at = parser.CurrentByteIndex
-        own = current[0].inertial if path == ["robot", "link", "inertial"] else None
-        # The end of an empty element <inertial/> is its start.
-        if own and at >= own[1] and at == data.find(b"</inertial", own[0]):
-            current[0].inertial = (own[0], _tag_end(data, at))
-        path.pop()
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    try:
-        parser.Parse(data, True)
-    except expat.ExpatError as fault:
-        raise ConfigurationError(
-            f"broken XML in line {fault.lineno}, column {fault.offset + 1} of the URDF", "a URDF file is needed"
-        ) from fault
-    if not places:
-        raise ConfigurationError("the URDF has no link in <robot>", "a URDF's root is <robot>")
-    return places
-
-
-def _tag_end(data: bytes, start: int) -> int:
-    found = _TAG.match(data, start)
-    return found.end() if found else start
-
-
-def _margin(data: bytes, at: int) -> str:
-    """Return the white space in front of a tag in its line."""
-    line = data[data.rfind(b"\n", 0, at) + 1 : at]
-    return line.decode() if not line.strip() else ""
-
-
-def _inner_margin(data: bytes, span: tuple[int, int]) -> str:
-    """Return the white space in front of the first element inside a span."""
-    found = re.search(rb"\n([ \t]*)<[^/]", data[span[0] : span[1]])
-    return found[1].decode() if found else _margin(data, span[0]) + _STEP
-
-
-def _element(numbers: Sequence[str], margin: str, inner: str) -> bytes:
-    return "\n".join(("<inertial>", *(inner + line for line in numbers), f"{margin}</inertial>")).encode()
-
-
-def _child(joint: ElementTree.Element) -> str:
-    child = joint.find("child")
-    return child.get("link", "") if child is not None else ""
+def _child(joint: Any) -> str:
+    return next((str(child.getAttribute("link")) for child in _children(joint, "child")), "")
 
 
 def _own_part(
@@ -178,20 +83,24 @@ def _placement(link: TreeLink) -> FloatArray:
     return matrix
 
 
-def _read(link: ElementTree.Element) -> FloatArray:
+def _read(link: Any) -> FloatArray:
     """Return a link's pseudo-inertia in its own frame; zero without mass and inertia."""
-    inertial = link.find("inertial")
-    if inertial is None:
-        return np.zeros((4, 4))
-    origin, mass, inertia = inertial.find("origin"), inertial.find("mass"), inertial.find("inertia")
-    numbers = [float(inertia.get(key, "0")) if inertia is not None else 0.0 for key in _ROTATIONAL]
-    weight = float(mass.get("value", "0")) if mass is not None else 0.0
-    about_centre = pseudo_inertia(np.array([weight, 0.0, 0.0, 0.0, *numbers]))
-    transform = np.eye(4)
-    if origin is not None:
-        transform[:3, 3] = [float(part) for part in origin.get("xyz", "0 0 0").split()]
-        transform[:3, :3] = _rotation([float(part) for part in origin.get("rpy", "0 0 0").split()])
-    return np.asarray(transform @ about_centre @ transform.T)
+    matrix = np.zeros((4, 4))
+    for inertial in _children(link, "inertial")[:1]:
+        values = {node.tagName: node for tag in ("origin", "mass", "inertia") for node in _children(inertial, tag)[:1]}
+        numbers = [_number(values.get("inertia"), key) for key in _ROTATIONAL]
+        about_centre = pseudo_inertia(np.array([_number(values.get("mass"), "value"), 0.0, 0.0, 0.0, *numbers]))
+        transform = np.eye(4)
+        if "origin" in values:
+            place, angles = (values["origin"].getAttribute(key) or "0 0 0" for key in ("xyz", "rpy"))
+            transform[:3, 3] = [float(part) for part in place.split()]
+            transform[:3, :3] = _rotation([float(part) for part in angles.split()])
+        matrix = np.asarray(transform @ about_centre @ transform.T)
+    return matrix
+
+
+def _number(element: Any, key: str) -> float:
+    return float(element.getAttribute(key) or "0") if element else 0.0
 
 
 def _rotation(angles: Sequence[float]) -> FloatArray:
@@ -206,8 +115,8 @@ def _rotation(angles: Sequence[float]) -> FloatArray:
     )
 
 
-def _numbers(matrix: FloatArray, joint: str) -> tuple[str, str, str]:
-    """Return the elements origin, mass and inertia of a pseudo-inertia in the link's frame."""
+def _write(document: Any, link: Any, matrix: FloatArray, joint: str) -> None:
+    """Write a pseudo-inertia in the link's frame as its origin, mass and inertia."""
     mass = float(matrix[3, 3])
     if mass < _LEAST_MASS:
         raise ConfigurationError(
@@ -218,6 +127,15 @@ def _numbers(matrix: FloatArray, joint: str) -> tuple[str, str, str]:
     shift = np.eye(4)
     shift[:3, 3] = -centre
     values = dict(zip(_ROTATIONAL, body_of(shift @ matrix @ shift.T)[4:].tolist(), strict=True))
-    place = " ".join(repr(value) for value in centre.tolist())
-    inertia = " ".join(f'{key}="{value!r}"' for key, value in sorted(values.items()))
-    return f'<origin xyz="{place}" rpy="0 0 0"/>', f'<mass value="{mass!r}"/>', f"<inertia {inertia}/>"
+    inertials = _children(link, "inertial")
+    inertial = inertials[0] if inertials else link.appendChild(document.createElement("inertial"))
+    attributes = {
+        "origin": {"xyz": " ".join(map(repr, centre.tolist())), "rpy": "0 0 0"},
+        "mass": {"value": repr(mass)},
+        "inertia": {key: repr(value) for key, value in values.items()},
+    }
+    for tag, items in attributes.items():
+        present = _children(inertial, tag)
+        element = present[0] if present else inertial.appendChild(document.createElement(tag))
+        for key, value in items.items():
+            element.setAttribute(key, value)

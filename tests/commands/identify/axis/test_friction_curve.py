@@ -1,4 +1,4 @@
-"""Friction over speed and position: means, standard errors between strokes, forms, random profiles."""
+"""Friction over speed and position: means, standard errors between strokes, random profiles."""
 
 from __future__ import annotations
 
@@ -7,17 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.axis.filtered_regression import filter_run, fit_linear
-from cdtool.commands.identify.axis.friction_curve import (
-    FrictionForm,
-    FrictionShape,
-    friction_curve,
-    profile_covariance,
-    speed_edges,
-)
-from cdtool.machines.axis_model.axis_run import AxisRun
-
-PERIOD = 1e-3
+from cdtool.commands.identify.axis.filtered_regression import fit_linear
+from cdtool.commands.identify.axis.friction_curve import friction_curve, profile_covariance, speed_edges
 
 
 def test_the_curve_of_a_line_is_the_line():
@@ -52,29 +43,6 @@ def test_the_standard_error_is_that_between_strokes_not_between_samples():
     force = rng.standard_normal(16)[stroke] + 0.1 * rng.standard_normal(3200)
     curve = friction_curve(np.full(3200, 0.5), force, stroke, np.array([0.0, 1.0]))
     assert curve.standard_error[0] == pytest.approx(0.25, rel=0.4)
-
-
-@pytest.mark.parametrize(("form", "count"), [(FrictionForm.COULOMB_VISCOUS, 2), (FrictionForm.STRIBECK, 3)])
-def test_a_form_describes_its_own_friction(form, count):
-    time = np.arange(8000) * PERIOD
-    position = 0.1 * np.sin(2.0 * math.pi * 0.5 * time)
-    run = filter_run(AxisRun("log", 0.0, PERIOD, np.zeros(8000), position=position), 20.0)
-    shape = FrictionShape(form, 0.3, 0.05)
-    columns = shape.columns(run)
-    assert columns.shape == (8000, 2 * count)
-    forward = run.moving & (run.inner_speed > 0.1)
-    expected = [1.0, run.inner_speed[forward], np.exp(-((run.inner_speed[forward] / 0.05) ** 2))][:count]
-    for column, values in zip(columns[forward].T, expected, strict=False):
-        np.testing.assert_allclose(column, values, atol=0.01)
-    np.testing.assert_allclose(columns[forward][:, count:], 0.0, atol=1e-9)
-
-
-def test_the_spline_sums_to_the_sign():
-    time = np.arange(4000) * PERIOD
-    speed = 0.2 * np.sin(2.0 * math.pi * 0.5 * time)
-    run = filter_run(AxisRun("log", 0.0, PERIOD, np.zeros(4000), speed=speed), 20.0)
-    columns = FrictionShape(FrictionForm.SPLINE, 0.2).columns(run)[run.complete]
-    np.testing.assert_allclose(columns.sum(axis=1), run.low_pass.value(run.sign)[run.complete], atol=1e-9)
 
 
 def test_random_profiles_act_as_the_true_profiles_do():

@@ -10,14 +10,10 @@ import numpy as np
 import pytest
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.identify.axis.filtered_regression import ResidualLoss
-from cdtool.commands.identify.axis.friction_curve import FrictionForm
 from cdtool.commands.identify.axis.rigid_axis import (
     RigidAxisFit,
     RigidAxisSettings,
     identify_rigid_axis,
-    low_passed_force,
-    predict_force,
 )
 from cdtool.commands.identify.estimate import IdentificationError, Method, Missing, NotIdentifiable
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
@@ -158,47 +154,28 @@ def test_a_real_axis_has_its_published_parameters_to_a_hundredth(method):
 
 
 @needs_data("emps/DATA_EMPS.mat")
-@pytest.mark.parametrize("low_pass", [20.0, 55.0])
-def test_the_force_of_unseen_strokes_of_a_real_axis_is_predicted(low_pass):
-    fit = identify_rigid_axis([part(emps(), slice(0, 12_480), "first")], 0.0, RigidAxisSettings(low_pass_hz=low_pass))
-    rest = part(emps(), slice(12_480, None), "rest")
-    error = low_passed_force(fit, rest) - predict_force(fit, rest)
-    assert rest.position is not None
-    is_fast = np.abs(np.gradient(rest.position, rest.period)) > 0.05 * 0.1245
-    assert math.sqrt(np.nanmean(error**2)) <= 1.75
-    assert math.sqrt(np.nanmean(error[is_fast] ** 2)) <= 1.55
-    assert np.isfinite(error).sum() > 12_000
-    if low_pass > 50.0:
-        # Even the force as it was logged, with its noise.
-        assert math.sqrt(np.nanmean((rest.torque - predict_force(fit, rest)) ** 2)) <= 2.0
-
-
-@needs_data("emps/DATA_EMPS.mat")
-def test_cross_validation_over_strokes_is_between_the_floor_and_the_plain_model():
+def test_the_force_of_unseen_strokes_of_a_real_axis_is_predicted():
     validation = identify_rigid_axis([emps()], 0.0).cross_validation
     assert validation is not None
-    assert validation.folds == 8
+    assert (validation.folds, validation.worst.of_runs) == (8, 1)
     assert validation.repeats >= 6
-    assert 0.2 < validation.floor < 0.4
-    errors = validation.errors
-    assert validation.best is FrictionForm.SPLINE
-    assert errors[FrictionForm.SPLINE].moving < errors[FrictionForm.STRIBECK].moving < 1.25
-    assert errors[FrictionForm.STRIBECK].moving < errors[FrictionForm.COULOMB_VISCOUS].moving < 1.4
+    assert 0.2 < validation.floor < 0.45
+    # Published parameters leave 2.3 N of strokes that were not fitted.
+    assert validation.error == validation.worst.error < 2.2
+    assert len(validation.worst.time) > 2000
+    assert validation.left_over == validation.error / validation.floor
 
 
-@needs_data("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat")
-def test_between_force_pulses_the_prediction_holds():
-    from scipy.io import loadmat
-
-    pulses = loadmat(data("emps") / "DATA_EMPS_PULSES.mat")["pulses_N"].ravel().astype(np.float64)
-    run = emps("DATA_EMPS_PULSES")
-    fit = identify_rigid_axis([emps()], 0.0)
-    error = predict_force(fit, run) - low_passed_force(fit, run)
-    calm = np.ones(len(error), dtype=np.bool_)
-    for begin in np.flatnonzero(np.diff(pulses)):
-        calm[max(begin - 30, 0) : begin + 130] = False
-    assert math.sqrt(np.nanmean(error[calm] ** 2)) <= 1.65
-    assert np.nanmean(error[~calm] ** 2) > 2.0 * np.nanmean(error[calm] ** 2)
+def test_the_run_that_is_described_worst_is_predicted_by_the_others():
+    runs = clean()
+    moves = np.abs(np.gradient(runs[1].position, runs[1].period)) > 0.01
+    runs[1] = replace(runs[1], torque=runs[1].torque + 30.0 * moves)
+    validation = identify_rigid_axis(runs, 0.0).cross_validation
+    assert validation is not None
+    assert (validation.worst.run, validation.worst.of_runs) == ("run 1", 3)
+    # The other runs do not contain the 30 N: that is what the residual shows.
+    assert np.mean(validation.worst.measured - validation.worst.predicted) == pytest.approx(30.0, abs=6.0)
+    assert validation.worst.error > validation.error
 
 
 @pytest.fixture(scope="module")
@@ -239,21 +216,19 @@ def test_the_known_parameters_of_a_clean_axis_are_found():
     assert fit.condition_number < 20.0
 
 
-def test_rotary_units_and_the_joint_are_passed_on():
-    fit = identify_rigid_axis(clean(), 0.0, RigidAxisSettings(rotary=True, joint=2))
+def test_rotary_units_are_passed_on():
+    fit = identify_rigid_axis(clean(), 0.0, RigidAxisSettings(units=("kg m2", "N m", "rad")))
     units = {item.key: item.unit for item in fit.identified.estimates}
     assert units["load_mass"] == "kg m2"
     assert units["viscous_friction"] == "N m s/rad"
     assert units["coulomb_forward"] == "N m"
-    assert {item.joint for item in fit.identified.estimates} == {2}
 
 
-@pytest.mark.parametrize("loss", list(ResidualLoss))
-def test_speed_alone_is_enough(loss):
+def test_speed_alone_is_enough():
     runs = [
         replace(run, position=None, speed=np.gradient(run.position, run.period)) for run in clean(period=2e-3, count=2)
     ]
-    fit = identify_rigid_axis(runs, 0.0, replace(PLAIN, loss=loss))
+    fit = identify_rigid_axis(runs, 0.0, PLAIN)
     for key, value in TRUTH.items():
         assert fit.identified[key].value == pytest.approx(value, rel=0.05), key
 
@@ -268,18 +243,6 @@ def test_gaps_change_little():
     fit = identify_rigid_axis(runs, 0.0)
     for key, value in TRUTH.items():
         assert fit.identified[key].value == pytest.approx(value, rel=0.02), key
-
-
-def test_a_robust_loss_ignores_bursts_of_wrong_torque():
-    runs = clean()
-    for run in runs:
-        run.torque[200::300] += 400.0
-    plain, robust = (
-        identify_rigid_axis(runs, 0.0, RigidAxisSettings(loss=loss))
-        for loss in (ResidualLoss.SQUARES, ResidualLoss.HUBER)
-    )
-    assert abs(robust.total_mass - 80.0) < 0.5
-    assert abs(plain.total_mass - 80.0) > 2.0 * abs(robust.total_mass - 80.0)
 
 
 def test_two_speeds_are_too_few_for_the_viscous_friction():
@@ -302,11 +265,6 @@ def test_one_direction_leaves_only_the_sum_of_coulomb_and_constant_force():
     assert fit.identified["viscous_friction"].value == pytest.approx(150.0, rel=0.02)
     (level,) = fit.levels
     assert level.force == pytest.approx(35.0 + 150.0 * level.speed, rel=0.01)
-    backward = clean(speeds=(0.2,) * 2)[0]
-    predicted = predict_force(fit, backward)
-    going_back = np.gradient(backward.position, backward.period) < -0.1
-    assert np.isnan(predicted[going_back]).all()
-    assert np.isfinite(predicted).any()
 
 
 def test_constant_speed_does_not_show_the_mass():
@@ -462,7 +420,6 @@ def test_the_residual_over_position_shows_an_obstruction():
 def test_a_single_stroke_has_no_cross_validation():
     fit = identify_rigid_axis(clean(count=1, speeds=(0.3,)), 0.0)
     assert fit.cross_validation is None
-    assert fit.prediction.shape.directions == (1,)
 
 
 def test_stated_standard_errors_cover():
@@ -470,8 +427,7 @@ def test_stated_standard_errors_cover():
     count = 36
     deviations = {key: np.zeros(count) for key in TRUTH}
     for seed in range(count):
-        fit = identify_rigid_axis(simulated(seed, count=4), 0.0, RigidAxisSettings(cross_validate=False))
-        assert fit.cross_validation is None
+        fit = identify_rigid_axis(simulated(seed, count=4), 0.0)
         for key, value in TRUTH.items():
             estimate = fit.identified[key]
             deviations[key][seed] = abs(estimate.value - value) / estimate.standard_error

@@ -190,17 +190,11 @@ def test_measured_torque_shows_the_gains_of_the_gate_within_their_standard_error
     assert fit.lag == pytest.approx(GATE.current_lag + GATE.torque_filter_time, rel=0.3)
 
 
-def test_a_log_without_references_shows_the_gains_at_constant_speed(runs: list[AxisRun]) -> None:
-    blind = [replace(run, reference_speed=None) for run in runs]
-    fit = identify_controller(blind)
-    for key in ("speed_gain", "integral_gain"):
-        assert fit.identified[key].value == pytest.approx(TRUE[key], rel=0.01)
-    for key in ("anti_windup_rate", "slew_limit", "force_limit"):
-        assert missing(fit, key).missing == (Missing.REFERENCE_SPEED,)
-    measured = identify_controller([measured_only(run) for run in blind])
-    for key in ("speed_gain", "integral_gain"):
-        assert deviation(measured.identified[key], TRUE[key]) < 3.0
-        assert 0.005 < measured.identified[key].relative_error < 0.2
+def test_the_computed_command_is_the_logged_one(runs: list[AxisRun]) -> None:
+    compared = identify_controller(runs[:3]).comparison
+    assert compared is not None and compared.is_command
+    assert len(compared.time) > 8000
+    assert np.max(np.abs(compared.measured - compared.computed)) < 1e-3
 
 
 def test_rounded_units_of_a_written_log_are_no_obstacle(tmp_path: Path) -> None:
@@ -427,16 +421,11 @@ def test_references_of_another_motion_explain_nothing() -> None:
     assert missing(fit, "speed_gain").missing == (Missing.OTHER_CONTROLLER,)
 
 
-def test_unsteady_motion_without_references_shows_no_gains() -> None:
-    fit = identify_controller([replace(Loop().run(seed), reference_speed=None) for seed in range(2)])
-    assert fit.controller is None and "speed_gain" not in fit.identified
-    assert missing(fit, "speed_gain").missing == (Missing.REFERENCE_SPEED,)
-
-
-def test_a_position_alone_without_references_shows_nothing(runs: list[AxisRun]) -> None:
-    fit = identify_controller([replace(run, speed=None, reference_speed=None) for run in runs[:2]])
-    assert fit.controller is None and not fit.identified.estimates
-    assert math.isnan(fit.residual_rms)
+def test_a_log_without_references_is_refused(runs: list[AxisRun]) -> None:
+    """At constant speed gains came out up to 7 standard errors wrong: what the reference did there is not known."""
+    for channels in ({"reference_speed": None}, {"speed": None, "reference_speed": None}):
+        with pytest.raises(IdentificationError, match="a reference"):
+            identify_controller([replace(run, **channels) for run in runs[:2]])
 
 
 def test_a_wrong_sign_is_an_error_that_says_where_to_look() -> None:

@@ -76,11 +76,18 @@ def test_standard_errors_cover_on_other_tracks() -> None:
     assert np.mean(inside) >= 0.8
 
 
+def test_the_starts_follow_the_model(fit: TwoMassFit) -> None:
+    (start,) = fit.starts
+    measured = start.ensemble.mean["torque"]
+    assert start.ensemble.count == 8
+    assert np.sqrt(np.mean((measured - start.modelled["torque"]) ** 2)) < 0.05 * np.max(np.abs(measured))
+
+
 def test_a_second_speed_makes_viscous_friction_better_known() -> None:
     slow = replace(GATE, nominal_speed=0.08)
     one = identify_two_mass(free_runs(GATE, 3, 3), SETTINGS)
     two = identify_two_mass([*free_runs(GATE, 3, 3), *free_runs(slow, 4, 3)], SETTINGS)
-    assert len(two.ensembles) == 2
+    assert len(two.starts) == 2
     errors = []
     for found in (one.identified, two.identified):
         refused = {item.key: item.numbers["relative_standard_error"] for item in found.not_identifiable}

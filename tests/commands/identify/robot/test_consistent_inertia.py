@@ -20,13 +20,13 @@ from cdtool.commands.identify.robot.consistent_inertia import (
     is_consistent,
     pseudo_inertia,
 )
-from cdtool.commands.identify.robot.robot_dynamics import RobotFit, RobotParameters, identify_robot
+from cdtool.commands.identify.robot.robot_dynamics import FRICTION, RobotFit, identify_robot
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, body_parameters, regressor_of, with_bodies
 from cdtool.machines.urdf_robot import UrdfRobot
 from tests.commands.identify.robot_motion import coloured, fourier, planar_arm
 from tests.synthetic.robots import six_joint_robot
 
-WHAT = RobotParameters(inertial=True)
+WHAT = FRICTION | {ColumnGroup.INERTIAL}
 
 
 def cloud(seed: int, points: int) -> FloatArray:
@@ -90,7 +90,7 @@ def other(robot: UrdfRobot) -> UrdfRobot:
 def fit_of(robot: UrdfRobot, believed: UrdfRobot, noise: float, seed: int = 1) -> RobotFit:
     motion = fourier(seed, 6, 12.0, 0.01, amplitude=0.4)
     run = motion.run(robot, noise * coloured(seed, motion.speed.shape, 5.0))
-    return identify_robot([run], believed, replace(WHAT, half_width=0.2))
+    return identify_robot([run], believed, WHAT, half_width=0.2)
 
 
 def base_of(fit: RobotFit) -> FloatArray:

@@ -32,7 +32,7 @@ def values_of(friction: JointFriction) -> dict[str, float]:
 
 
 def test_missing_friction_is_found() -> None:
-    first, second = choose_friction(runs_of(ARM), frictionless(ARM), 0.1)
+    (first, second), _ = choose_friction(runs_of(ARM), frictionless(ARM))
     assert first.form is FrictionForm.FRICTION
     assert values_of(first)["viscous_friction"] == pytest.approx(0.396, rel=0.05)
     assert values_of(first)["coulomb_friction"] == pytest.approx(2.4, rel=0.02)
@@ -42,27 +42,27 @@ def test_missing_friction_is_found() -> None:
     assert first.explained_share > 0.99
 
 
-def test_friction_that_is_right_is_kept_and_the_refitted_one_is_shown() -> None:
-    for friction in choose_friction(runs_of(ARM, noise=0.5), ARM, 0.1):
+def test_friction_that_is_right_is_kept_and_the_one_it_was_compared_with_is_named() -> None:
+    for friction in choose_friction(runs_of(ARM, noise=0.5), ARM)[0]:
         assert friction.form is FrictionForm.PREVIOUS
         assert friction.identified.estimates == ()
-        assert {item.key for item in friction.refitted} == {"viscous_friction", "coulomb_friction", "constant_force"}
+        assert friction.compared in (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE)
 
 
 def test_only_the_joint_whose_friction_changed_gets_a_new_one() -> None:
     changed = replace(ARM, coulomb_friction=(0.06, ARM.coulomb_friction[1]))
-    first, second = choose_friction(runs_of(changed, noise=0.5), ARM, 0.1)
+    (first, second), _ = choose_friction(runs_of(changed, noise=0.5), ARM)
     assert values_of(first)["coulomb_friction"] == pytest.approx(3.6, rel=0.05)
     assert second.form is FrictionForm.PREVIOUS
 
 
 def test_a_missing_motor_inertia_is_found_and_one_from_a_data_sheet_is_kept() -> None:
     without = replace(ARM, motor_inertia=(0.0, 0.0))
-    first, _ = choose_friction(runs_of(ARM), without, 0.1)
+    (first, _), _ = choose_friction(runs_of(ARM), without)
     assert first.form is FrictionForm.DRIVE_INERTIA
     assert values_of(first)["drive_inertia"] == pytest.approx(1.5e-5 * 3600.0, rel=0.1)
     wrong = replace(ARM, motor_inertia=(1e-5, 1e-5))
-    assert {item.form for item in choose_friction(runs_of(ARM), wrong, 0.1)} <= {
+    assert {item.form for item in choose_friction(runs_of(ARM), wrong)[0]} <= {
         FrictionForm.FRICTION,
         FrictionForm.FRICTION_ALONE,
         FrictionForm.PREVIOUS,
@@ -71,7 +71,7 @@ def test_a_missing_motor_inertia_is_found_and_one_from_a_data_sheet_is_kept() ->
 
 def test_viscous_friction_of_slow_motion_is_known_only_together_with_the_rest() -> None:
     slow = replace(ARM, viscous_friction=(1e-6, 1e-6))
-    friction = choose_friction(runs_of(slow, 0.02, 0.3), frictionless(ARM), 0.1)[0]
+    friction = choose_friction(runs_of(slow, 0.02, 0.3), frictionless(ARM))[0][0]
     assert "viscous_friction" not in values_of(friction)
     assert values_of(friction)["coulomb_friction"] == pytest.approx(2.4, rel=0.1)
     assert [item.key for item in friction.together] == ["viscous_friction"]
@@ -87,7 +87,7 @@ def test_a_joint_that_rests_keeps_its_friction_and_has_no_errors() -> None:
     position = motion.position.copy()
     position[:, 1] = 0.2
     acceleration = motion.acceleration * [1.0, 0.0]
-    friction = choose_friction([Motion(0.01, position, rests, acceleration).run(ARM)], frictionless(ARM), 0.1)[1]
+    friction = choose_friction([Motion(0.01, position, rests, acceleration).run(ARM)], frictionless(ARM))[0][1]
     assert friction.form is FrictionForm.PREVIOUS
     assert np.isnan(friction.explained_share)
     assert set(friction.errors) == {FrictionForm.PREVIOUS}
@@ -95,4 +95,4 @@ def test_a_joint_that_rests_keeps_its_friction_and_has_no_errors() -> None:
 
 def test_runs_of_another_machine_are_refused() -> None:
     with pytest.raises(UsageError, match="3 joints"):
-        choose_friction([RobotRun("three", 0.0, 0.01, *np.ones((3, 100, 3)))], ARM, 0.1)
+        choose_friction([RobotRun("three", 0.0, 0.01, *np.ones((3, 100, 3)))], ARM)

@@ -9,12 +9,13 @@ import pytest
 
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.robot.planar_links import PlanarLinks, planar_links
-from cdtool.commands.identify.robot.robot_dynamics import RobotParameters, identify_robot
+from cdtool.commands.identify.robot.robot_dynamics import FRICTION, identify_robot
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup
 from cdtool.machines.planar_arm import PlanarArm
 from tests.commands.identify.robot_motion import coloured, fourier, planar_arm
 
 ARM = planar_arm(coulomb_slope=50.0)
-INERTIAL = RobotParameters(inertial=True)
+INERTIAL = FRICTION | {ColumnGroup.INERTIAL}
 
 
 def links(machine: PlanarArm, present: PlanarArm, noise: float = 0.0, seed: int = 1) -> PlanarLinks:

@@ -13,18 +13,9 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.commands.identify.identification_outputs import evidence_of, identification_summary
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.commands.identify.identifying_robot import LoadedRuns
-from cdtool.commands.identify.robot.robot_evidence import (
-    FrictionAnswer,
-    RobotJointEvidence,
-    decision_of,
-    excitation_needs,
-    robot_evidence,
-)
-from cdtool.commands.identify.robot.robot_run import robot_run
-from cdtool.formats.machine_file import read_machine_file
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer
 from cdtool.machines.planar_arm import PlanarArm
 from tests.command import cdtool as command
 from tests.commands.identify.robot_motion import channels_of, coloured, fourier, planar_arm, ur10e, write_log
@@ -68,22 +59,18 @@ def rms(values: np.ndarray) -> float:
 
 
 @pytest.fixture(scope="module")
-def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[IdentifiedMachine, tuple[RobotJointEvidence, ...]]:
+def arm(tmp_path_factory: pytest.TempPathFactory) -> IdentifiedMachine:
     folder = tmp_path_factory.mktemp("arm")
     path = arm_files(folder, ARM, 0.05)
-    logs = [str(folder / "run*.csv")]
-    done = cdtool.identify(logs, path)
-    return done, tuple(item.robot for item in evidence_of(done, logs, path) if item.robot)
+    return cdtool.identify([str(folder / "run*.csv")], path)
 
 
 def test_new_friction_is_decided_and_drawn_as_it_is(arm) -> None:
-    done, evidence = arm
-    for joint, item in enumerate(evidence):
-        decision = decision_of(done, joint)
-        assert decision.answer is FrictionAnswer.NEW
-        assert decision.after < 0.1 * decision.before
-        assert item.units == ("N m", "rad")
-        curve = item.friction
+    for joint, item in enumerate(arm.joints):
+        assert item.robot.answer is FrictionAnswer.NEW
+        assert item.robot.after < 0.1 * item.robot.before
+        assert item.units == ("kg m2", "N m", "rad", "N m s/rad")
+        curve = item.evidence.friction
         truth = TRUE.viscous_friction[joint] * curve.points.abscissa
         truth = truth + TRUE.coulomb_friction[joint] * np.sign(curve.points.abscissa) + TRUE.constant_force[joint]
         fast = np.abs(curve.points.abscissa) > 0.2
@@ -96,9 +83,8 @@ def test_new_friction_is_decided_and_drawn_as_it_is(arm) -> None:
 
 
 def test_the_residual_of_unseen_parts_is_that_of_the_worst_run(arm) -> None:
-    done, evidence = arm
-    for joint, item in enumerate(evidence):
-        decision, unseen = decision_of(done, joint), item.unseen
+    for item in arm.joints:
+        decision, unseen = item.robot, item.evidence.unseen
         assert unseen.of_runs == 2
         assert rms(unseen.measured - unseen.predicted) == pytest.approx(decision.after, rel=0.3)
         assert rms(unseen.measured - unseen.previous) == pytest.approx(decision.before, rel=0.3)
@@ -109,35 +95,30 @@ def test_the_residual_of_unseen_parts_is_that_of_the_worst_run(arm) -> None:
 
 def test_friction_that_is_right_is_kept_with_the_error_of_the_other(tmp_path: Path) -> None:
     path = arm_files(tmp_path, ARM + RIGHT, 0.5)
-    logs = [str(tmp_path / "run*.csv")]
-    done = cdtool.identify(logs, path)
-    evidence = evidence_of(done, logs, path)
-    for joint, item in enumerate(evidence):
-        decision = decision_of(done, joint)
-        assert decision.answer is FrictionAnswer.NOT_BETTER
-        assert decision.after == pytest.approx(decision.before, rel=0.1)
+    done = cdtool.identify([str(tmp_path / "run*.csv")], path)
+    for joint, item in enumerate(done.joints):
         assert item.robot is not None
-        assert item.robot.friction is not None
-        assert np.interp(0.5, item.robot.friction.speed, item.robot.friction.previous) == pytest.approx(
+        assert item.robot.answer is FrictionAnswer.NOT_BETTER
+        assert item.robot.after == pytest.approx(item.robot.before, rel=0.1)
+        assert item.evidence is not None
+        assert item.evidence.friction is not None
+        assert np.interp(0.5, item.evidence.friction.speed, item.evidence.friction.previous) == pytest.approx(
             0.5 * TRUE.viscous_friction[joint] + TRUE.coulomb_friction[joint] + TRUE.constant_force[joint], abs=0.01
         )
-    summary = identification_summary(done, evidence)
+    summary = done.summary
     assert summary["joints"][0]["friction_decision"]["answer"] == "not_better"
     assert summary["joints"][0]["motion"]["missing"] == []
 
 
 def test_a_joint_that_rests_has_nothing_but_its_need() -> None:
     folder = ROOT / "sample_logs" / "arm" / "trial_1"
-    logs = [str(folder / "free" / "0[1-3].*")]
-    done = cdtool.identify(logs, folder / "machine.toml")
-    _, forearm = evidence_of(done, logs, folder / "machine.toml")
-    decision = decision_of(done, 1)
-    assert decision is not None
-    assert decision.answer is FrictionAnswer.NOT_MOVED
-    assert math.isnan(decision.before)
+    _, forearm = cdtool.identify([str(folder / "free" / "0[1-3].*")], folder / "machine.toml").joints
     assert forearm.robot is not None
-    assert forearm.robot.unseen is None
-    assert excitation_needs(forearm.robot.motion)
+    assert forearm.robot.answer is FrictionAnswer.NOT_MOVED
+    assert math.isnan(forearm.robot.before)
+    assert forearm.evidence is not None
+    assert forearm.evidence.unseen is None
+    assert forearm.evidence.motion.missing
     # No speed is made up from the noise at rest.
     assert all(not plan.speeds for plan in forearm.plan)
 
@@ -215,13 +196,10 @@ def test_torques_of_the_evidence_are_by_the_new_constants(tmp_path: Path) -> Non
     payload = LoadedRuns((tmp_path / "loaded.csv",), 0.7, "forearm", (0.25, 0.0, 0.0))
     path = tmp_path / "machine.toml"
     done = cdtool.identify([tmp_path / "free.csv"], path, other_logs=payload)
-    run = robot_run(cdtool.read(tmp_path / "free.csv", read_machine_file(path)))
-    evidence = robot_evidence(done, [run], TRUE)
-    for joint, item in enumerate(evidence):
-        assert item.unseen is not None
-        decision = decision_of(done, joint)
-        assert decision is not None
-        assert rms(item.unseen.measured - item.unseen.predicted) == pytest.approx(decision.after, rel=0.05)
+    for joint in done.joints:
+        assert joint.robot is not None and joint.evidence is not None and joint.evidence.unseen is not None
+        unseen = joint.evidence.unseen
+        assert rms(unseen.measured - unseen.predicted) == pytest.approx(joint.robot.after, rel=0.05)
 
 
 def test_the_command_identifies_torque_constants_of_a_robot_from_a_urdf(tmp_path: Path) -> None:

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.robot.robot_dynamics import RobotParameters, identify_robot
+from cdtool.commands.identify.robot.robot_dynamics import FRICTION, identify_robot
 from cdtool.commands.identify.robot.robot_excitation import PlannedRobotMotion, measure_joint_motion, plan_robot_motion
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from tests.commands.identify.robot_motion import Motion, coloured, fourier, planar_arm, ur10e, ur10e_run
 
@@ -74,7 +75,7 @@ def test_samples_without_a_value_are_left_out_and_a_short_run_has_no_motion() ->
 
 
 def base_set_is_missing(run: RobotRun, machine) -> bool:
-    fit = identify_robot([run], machine, RobotParameters(inertial=True))
+    fit = identify_robot([run], machine, FRICTION | {ColumnGroup.INERTIAL})
     return any(item.key == "base_parameters" for item in fit.identified.not_identifiable)
 
 

@@ -7,19 +7,20 @@ import math
 import numpy as np
 import pytest
 
+from cdtool.commands.identify.axis.excitation import excitation_of
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve
-from cdtool.commands.identify.robot.friction_choice import FrictionForm
-from cdtool.commands.identify.robot.plots import JointPanel, draw_joint_frictions, draw_unseen_torques
-from cdtool.commands.identify.robot.robot_evidence import (
-    FrictionAnswer,
-    FrictionDecision,
-    JointFrictionCurve,
-    UnseenTorque,
-)
+from cdtool.commands.identify.estimate import Identified
+from cdtool.commands.identify.joint import JointIdentification
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction
+from cdtool.commands.identify.robot.plots import draw_joint_frictions, draw_unseen_torques
+from cdtool.commands.identify.robot.robot_evidence import JointFrictionCurve, RobotJointEvidence, UnseenTorque
+from cdtool.commands.identify.robot.robot_excitation import JointMotion
 from cdtool.report.plots.figures import png
 
+Panel = tuple[JointIdentification, JointFriction, float]
 
-def panel(answer: FrictionAnswer, name: str = "elbow", floor: float = math.nan) -> JointPanel:
+
+def panel(answer: FrictionAnswer, name: str = "elbow", floor: float = math.nan) -> Panel:
     """Measured torque 10; 9 with the new friction, 7 with the old one."""
     time = np.linspace(0.0, 5.0, 101)
     form, whole = FrictionForm.FRICTION, np.full(101, 10.0)
@@ -30,7 +31,12 @@ def panel(answer: FrictionAnswer, name: str = "elbow", floor: float = math.nan) 
         np.array([-0.5, 0.5]), np.array([-4.0, 4.0]), np.array([0.25, np.nan]), np.array([9, 1], dtype=np.int64)
     )
     curve = JointFrictionCurve(points, form, speed, 4.0 * np.sign(speed), 2.0 * np.sign(speed))
-    return JointPanel(name, FrictionDecision(answer, form, 3.0, 1.0, 10.0, floor), ("N m", "rad"), unseen, curve)
+    used = form if answer is FrictionAnswer.NEW else FrictionForm.PREVIOUS
+    friction = JointFriction(0, used, Identified(()), (), {form: 1.0, FrictionForm.PREVIOUS: 3.0}, 10.0)
+    motion = JointMotion(0, excitation_of(*np.zeros((4, 0)), 0, 0), 0.0, 0.0)
+    evidence = RobotJointEvidence(motion, unseen, curve)
+    units = ("kg m2", "N m", "rad", "N m s/rad")
+    return JointIdentification(name, units=units, robot=friction, evidence=evidence), friction, floor
 
 
 @pytest.mark.parametrize(
@@ -49,18 +55,15 @@ def test_the_friction_in_use_is_the_one_of_the_machine_file(
     assert np.nanmax(np.abs(lines["residual, other friction"] - other)) < 1e-12
     assert np.isnan(lines["residual, friction in use"][40])
     assert above.get_title(loc="left") == title
-    (friction,) = draw_joint_frictions([panel(answer)]).axes
+    (friction,) = draw_joint_frictions([panel(answer)[0]]).axes
     used = [line for line in friction.get_lines() if line.get_label() == "friction in use"]
     assert np.max(used[-1].get_ydata()) == (4.0 if answer is FrictionAnswer.NEW else 2.0)
 
 
-def test_the_floor_is_a_band_and_joints_without_motion_have_no_panel() -> None:
-    still = JointPanel("hand", FrictionDecision(FrictionAnswer.NOT_MOVED, None, *(math.nan,) * 4), ("N m", "rad"))
-    figure = draw_unseen_torques([panel(FrictionAnswer.NEW, floor=0.5), still, panel(FrictionAnswer.NEW, "wrist")])
+def test_the_floor_is_a_band_of_its_joint() -> None:
+    figure = draw_unseen_torques([panel(FrictionAnswer.NEW, floor=0.5), panel(FrictionAnswer.NEW, "wrist")])
     shown = [axes for axes in figure.axes if axes.get_visible()]
     assert len(shown) == 4
-    titles = [axes.get_title(loc="left") for axes in shown]
-    assert not any("hand" in title for title in titles)
     (band,) = [patch for axes in shown for patch in axes.patches if patch.get_label().startswith("between")]
     assert band.get_height() == pytest.approx(1.0)
     assert png(figure).startswith(b"\x89PNG")
