@@ -11,9 +11,8 @@ rounded: float64 represents the stamps with a resolution of 0.24 us only, but th
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Collection, Generator, Mapping, Sequence
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 
@@ -106,12 +105,6 @@ def exact_differences(
 
 def _is_large(seconds: FloatArray, first: int) -> bool:
     return bool(seconds[first] > _FIRST and np.all(np.abs(seconds) < _LAST))
-
-
-# A total is of so many rows, and as exact as the written numbers are.
-_FEWEST_SUMMED, _SAME_SUM = 3, 1e-6
-# The sum of a column, and its largest number.
-Sum = tuple[float, float]
 
 
 class StampColumns:
@@ -257,16 +250,11 @@ def table_pieces(
     reader = RowReader(dialect, replace(requested, categories=categories), survey=wanted is None)
     stamped = StampColumns(dialect, requested)
     rounded: Counter[str] = Counter()
-    above, before = dict[int, Sum](), dict[int, FloatArray]()
     for rows in reader.pieces():
-        above |= {i: added(above.get(i), values) for i, values in before.items()}
-        before = rows.numbers if wanted is None else {}
         numbers = {names[column]: values for column, values in rows.numbers.items()}
         rounded.update({key: rounded_integers(values) for key, values in numbers.items()})
         yield Piece("", None, numbers | stamped.seconds(rows), rows.count)
     findings = reader.findings
-    if wanted is None and is_total(rows, above):
-        findings.append(Finding("total_row", "", {"line": rows.last_line}))
     findings += stamped.findings()
     remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
     if wanted is None and not remaining:
@@ -364,28 +352,3 @@ def _set_clock(dialect: Dialect, table: TextTable, clock: str, wanted: ChannelMa
         table.findings = [
             found for found in table.findings if (found.kind, found.channel) != ("rounded_integers", clock)
         ]
-
-
-def added(above: Sum | None, column: FloatArray) -> Sum:
-    """Return sum and largest number of a column to the end of its next rows."""
-    total, largest = above or (0.0, 0.0)
-    column = column[np.isfinite(column)]
-    with np.errstate(over="ignore"):
-        return total + float(column.sum()), max(largest, float(np.abs(column).max(initial=0.0)))
-
-
-def is_total(rows: Rows, above: Mapping[int, Sum]) -> bool:
-    """Return whether the last numbers of columns are the sums of those above, more than each of them.
-
-    `above` are the sums to the end of the rows before; the first column of a table is its clock.
-    """
-    found = False
-    for i, column in rows.numbers.items():
-        last = float(column[-1]) if i and rows.count and rows.first + rows.count > _FEWEST_SUMMED else np.nan
-        if not np.isfinite(last):
-            continue
-        total, largest = added(above.get(i), column[:-1])
-        if not largest < abs(last) or not math.isclose(total, last, rel_tol=_SAME_SUM):
-            return False
-        found = True
-    return found
