@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
-from cdtool.formats.column_names import split_unit
 from cdtool.formats.columns import Piece
-from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
+from cdtool.formats.pieces import Pieces
+from cdtool.formats.source import Source
 from cdtool.recordings.clock import EPOCH
 from cdtool.recordings.units import find_unit
 
-Table = TypeVar("Table")  # what the reader of a table returns after its last piece
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-z]|$)", re.IGNORECASE)
 # Ratios of two units of time: clocks whose steps have another ratio differ in their rates.
 _FACTORS = tuple(10.0**power for power in (-9, -6, -3, 0, 3, 6, 9)) + tuple(
@@ -122,20 +122,20 @@ def _end_apart(a: FloatArray, b: FloatArray) -> bool:
 
 
 def pieces_by_own_clock(
-    dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None, stated: bool
-) -> Generator[Piece, None, tuple[Table, list[Finding], float | None]]:
+    dialect: Dialect, clocks: Clocks, pieces: Pieces, keys: Collection[str] | None, stated: bool = False
+) -> Pieces:
     """Yield the pieces of a table unchanged or, if its clocks have other rates, by clock with their times [s].
 
     The first piece decides, unless it is `stated` that each column has the clock beside it. A clock without a unit in
-    the header is in s. A shorter clock ends with empty cells: rows without a time are left out of its columns. The
-    return value is that of `pieces`, the findings on the clocks, and the origin of the times [s] (None: unchanged).
+    the header is in s. A shorter clock ends with empty cells: rows without a time are left out of its columns.
     """
     piece = next(pieces)
     if not stated and not have_other_rates(dialect, clocks, piece.values):
         first = dialect.names[clocks.columns[0]] if clocks.columns else ""
         findings = other_clocks(dialect, clocks, first, dialect.names, piece.values)
         yield piece
-        return (yield from pieces), findings, None
+        table: Source = yield from pieces
+        return replace(table, findings=(*table.findings, *findings))
     names = dialect.names
     of_group = {
         k: [
@@ -161,7 +161,17 @@ def pieces_by_own_clock(
         try:
             piece = next(pieces)
         except StopIteration as end:
-            return end.value, _own_clock_findings(dialect, steps, lost, stated), origin
+            table = end.value
+            break
+    times = {names[column] for column in clocks.columns}
+    kept = [key for key in table.columns if key not in times and (keys is None or key in keys)]
+    return replace(
+        table,
+        columns={key: replace(table.columns[key], time=np.empty(0)) for key in kept},
+        findings=(*table.findings, *_own_clock_findings(dialect, steps, lost, stated)),
+        origin=origin or dialect.origin,
+        first_row=0,
+    )
 
 
 def _epoch_origin(clocks: Iterable[FloatArray]) -> float:
@@ -186,16 +196,6 @@ def _own_clock_findings(
             Finding("clock_unit_assumed", "time", {"clocks": tuple(assumed), "step": next(iter(assumed.values()))})
         )
     return findings + [Finding("values_without_time", key, {"count": count}) for key, count in lost.items() if count]
-
-
-def unit_from_header(dialect: Dialect, name: str) -> str | None:
-    """Return the unit of a column in the header, or in the row of units below it; None if there is no unit."""
-    column = dialect.names.index(name)
-    text = dialect.units[column].strip() if column < len(dialect.units) else ""
-    if text[:1] + text[-1:] in ("[]", "()"):
-        text = text[1:-1].strip()
-    texts = [item for item in (text, split_unit(name.partition("#")[0])[1]) if item and item != "-"]
-    return next((item for item in texts if find_unit(item)), next(iter(texts), None))
 
 
 def _factor(dialect: Dialect, name: str, default: float) -> float:

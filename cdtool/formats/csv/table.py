@@ -12,9 +12,8 @@ rounded: float64 represents the stamps with a resolution of 0.24 us only, but th
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Generator, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import chain, islice
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,14 +23,15 @@ from cdtool.base.findings import Finding
 from cdtool.base.plain_text import digits
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import column_key
-from cdtool.formats.columns import Categories, Piece
+from cdtool.formats.columns import Categories, Column, Piece
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.rows import RowReader, Rows, plain_rows
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, StampLayout, seconds_since, unwrap
 from cdtool.formats.csv.text import BLOCK_BYTES
-from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
-from cdtool.formats.pieces import PieceRun
+from cdtool.formats.pieces import Pieces, join_pieces
+from cdtool.formats.source import Source
 from cdtool.recordings.clock.stamps import EPOCH, count_leading_strays
 
 # Days since 1899-12-30, as counted by Excel, of 1970-01-01, and of the start of the years 2000 and 2100.
@@ -175,70 +175,35 @@ class StampColumns:
         return findings
 
 
-@dataclass
-class TextTable:
-    """The columns of a text table with findings.
-
-    `stamped` are the columns of dates or times of day; `origin` [s] was subtracted from the columns with a date.
-    `unbroken`: every line after the first row is a row. `words` are the texts of columns of categories.
-    """
-
-    values: dict[str, FloatArray]
-    findings: list[Finding]
-    origin: float = 0.0
-    stamped: set[str] = field(default_factory=set)
-    unbroken: bool = True
-    words: dict[str, dict[float, str]] = field(default_factory=dict)
-
-
 def read_table(
     dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
-) -> TextTable:
+) -> Source:
     """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
     table = None if wanted is None or wanted.worded else _plain_table(dialect, keys)
-    table = table or _joined_blocks(dialect, keys, clock, wanted)
-    if clock is not None and wanted is not None:
-        _set_clock(dialect, table, clock, wanted)
-    return table
+    table = table or join_pieces(table_pieces(dialect, keys, clock, wanted), sort=False)
+    return table if clock is None or wanted is None else _with_clock(dialect, table, clock, wanted)
 
 
-def _plain_table(dialect: Dialect, keys: Collection[str]) -> TextTable | None:
+def _plain_table(dialect: Dialect, keys: Collection[str]) -> Source | None:
     """Return a small table that has only numbers in plain rows, read at once; None if it may have anything else."""
     text, names = dialect.text, dialect.names
     if dialect.stamped or text.padding or text.content is None or not 0 < len(text.content) <= BLOCK_BYTES:
         return None
-    rows, columns = (
-        text.content[text.mark + dialect.offset : text.size],
-        [i for i, name in enumerate(names) if name in keys],
-    )
+    columns = [i for i, name in enumerate(names) if name in keys]
+    rows = text.content[text.mark + dialect.offset : text.size]
     plain = plain_rows(dialect, columns, (), rows, ended=True) if rows.endswith(b"\n") and columns else None
     if plain is None:
         return None
     values = {names[column]: plain[1][column] for column in columns}
-    return TextTable(values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))])
-
-
-def _joined_blocks(dialect: Dialect, keys: Collection[str], clock: str | None, wanted: ChannelMap | None) -> TextTable:
-    """Return the columns of a table that is read block by block."""
-    run = PieceRun(table_pieces(dialect, keys, clock, wanted))
-    first, *more = islice(pieces := iter(run), 2)
-    values, count = first.values, first.rows
-    if more:  # in one array per column: half the memory of a list of pieces
-        most = dialect.text.count_lines(dialect.offset)
-        values, count = {key: np.empty(most) for key in values}, 0
-        for piece in chain([first], more, pieces):
-            for key, column in piece.values.items():
-                values[key][count : count + piece.rows] = column
-            count += piece.rows
-    table = run.source
-    table.values = {key: values[key][:count] for key in table.values}
-    return table
+    return _source(
+        dialect, values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))]
+    )
 
 
 def table_pieces(
     dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
-) -> Generator[Piece, None, TextTable]:
-    """Yield those of the columns `keys` that have numbers, block by block; return the table without its rows.
+) -> Pieces:
+    """Yield those of the columns `keys` that have numbers, block by block.
 
     `clock` is the time column of the channel map `wanted`; without one the columns are surveyed. The last row is
     removed from the last block if the file's end is incomplete. Raises RecordingError.
@@ -254,20 +219,32 @@ def table_pieces(
         numbers = {names[column]: values for column, values in rows.numbers.items()}
         rounded.update({key: rounded_integers(values) for key, values in numbers.items()})
         yield Piece("", None, numbers | stamped.seconds(rows), rows.count)
-    findings = reader.findings
-    findings += stamped.findings()
-    remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
+    findings = [*reader.findings, *stamped.findings()]
+    remaining = [name for name in names if name in {*(names[i] for i in reader.values.numeric), *stamped.names}]
     if wanted is None and not remaining:
         raise RecordingError("no column has only numbers", str(findings[0]) if findings else "")
-    for key in names:
-        findings += rounding_finding(key, rounded[key]) if key in remaining else []
-    return TextTable(
-        {key: np.empty(0) for key in names if key in remaining},
-        findings,
-        (stamped.origin or 0) / NS,
-        {*stamped.names},
-        reader.lines.only_rows,
-        {names[column]: each.words for column, each in categories.items()},
+    findings += [note for key in remaining for note in rounding_finding(key, rounded[key])]
+    table = _source(dialect, dict.fromkeys(remaining, np.empty(0)), findings)
+    known = {**table.columns}
+    known |= {key: replace(known[key], unit="s") for key in stamped.names}
+    known |= {names[i]: replace(known[names[i]], words=each.words) for i, each in categories.items()}
+    first = table.first_row if reader.lines.only_rows else 0
+    origin = (stamped.origin or 0) / NS or table.origin
+    return replace(table, columns=known, first_row=first, origin=origin)
+
+
+def _source(dialect: Dialect, values: Mapping[str, FloatArray], findings: Sequence[Finding]) -> Source:
+    """Return columns of numbers, of which every line below the head is a row."""
+    return Source(
+        path=dialect.text.path,
+        format="csv",
+        columns={key: Column(key, column, unit=unit_from_header(dialect, key)) for key, column in values.items()},
+        origin=dialect.origin,
+        findings=(*dialect.findings, *findings),
+        details=dialect.details,
+        names=dialect.names,
+        first_row=dialect.first_line,
+        dialect=dialect.as_pins,
     )
 
 
@@ -321,34 +298,36 @@ def _two_readings(dialect: Dialect, column: int) -> RecordingError:
     )
 
 
-def _set_clock(dialect: Dialect, table: TextTable, clock: str, wanted: ChannelMap) -> None:
+def _with_clock(dialect: Dialect, table: Source, clock: str, wanted: ChannelMap) -> Source:
     """Check the machine file's unit against the clock's column, and convert days of Excel to seconds.
 
     It is read again if its stamps have more digits than float64 can represent.
     """
-    if clock in table.stamped:
+    number, values = dialect.names.index(clock), table.columns[clock].values
+    if number in dialect.stamped:
         if wanted.time.factor != 1.0:
             raise RecordingError(
                 f"column '{clock}' has dates or times of day, which are read in s",
                 'write unit = "s" in [channels] time',
             )
-        return
-    values = table.values[clock]
+        return table
     finite = values[np.isfinite(values)]
     if not len(finite):
-        return
+        return table
     if wanted.pins.time_format == "excel":
-        table.origin = since_1970(float(finite[0]))
-        table.values[clock] = (values - finite[0]) * DAY_S
-        return
+        return _with_times(table, clock, (values - finite[0]) * DAY_S, since_1970(float(finite[0])))
     readings = "" if wanted.pins.time_format else two_readings(values, wanted.time.factor)
     if readings:
         raise RecordingError(
             f"column '{clock}' {readings}", 'pin time_format = "excel" or "number" in [csv] of the machine file'
         )
-    exact = exact_differences(dialect, dialect.names.index(clock), values, wanted.time.factor)
-    if exact is not None:
-        table.values[clock], table.origin = exact
-        table.findings = [
-            found for found in table.findings if (found.kind, found.channel) != ("rounded_integers", clock)
-        ]
+    exact = exact_differences(dialect, number, values, wanted.time.factor)
+    if exact is None:
+        return table
+    findings = tuple(note for note in table.findings if (note.kind, note.channel) != ("rounded_integers", clock))
+    return _with_times(replace(table, findings=findings), clock, *exact)
+
+
+def _with_times(table: Source, clock: str, times: FloatArray, origin: float) -> Source:
+    columns = {**table.columns, clock: replace(table.columns[clock], values=times)}
+    return replace(table, columns=columns, origin=origin or table.origin)
