@@ -7,10 +7,11 @@ clock, it belongs to the columns before it. Adjacent clocks belong to the same r
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.formats.columns import Piece
 from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
-from cdtool.formats.pieces import Pieces
-from cdtool.formats.source import Source
+from cdtool.formats.pieces import PieceRun, Pieces
 from cdtool.recordings.clock import EPOCH
 from cdtool.recordings.units import find_unit
 
@@ -52,13 +52,8 @@ class Clocks:
         starts = [i for i in clock_columns if i - 1 not in clock_columns]
         groups = [tuple(i for i in clock_columns if start <= i < end) for start, end in pairwise([*starts, count])]
         is_after_columns = bool(clock_columns) and clock_columns[0] > 0 and clock_columns[-1] == count - 1
-        of = {}
-        for column in range(count):
-            before = [k for k, group in enumerate(groups) if group[0] < column]
-            after = [k for k, group in enumerate(groups) if group[0] > column]
-            nearest = after[:1] if is_after_columns else before[-1:]
-            if column not in clock_columns and nearest:
-                of[column] = nearest[0]
+        nearest = {i: bisect(starts, i) - (not is_after_columns) for i in range(count) if i not in clock_columns}
+        of = {i: k for i, k in nearest.items() if 0 <= k < len(groups)}
         return cls(tuple(groups), of)
 
     @property
@@ -66,9 +61,9 @@ class Clocks:
         """Return the numbers of all clocks."""
         return tuple(column for group in self.groups for column in group)
 
-    def group(self, column: int) -> int | None:
-        """Return the group of a clock or of any other column; None if no clock is adjacent to the column."""
-        return next((k for k, group in enumerate(self.groups) if column in group), self.of.get(column))
+    def beside(self, group: int, names: Sequence[str], keys: Collection[str]) -> tuple[str, ...]:
+        """Return the columns `keys` that belong to a group of clocks."""
+        return tuple(names[column] for column, k in self.of.items() if k == group and names[column] in keys)
 
 
 def other_clocks(
@@ -81,9 +76,7 @@ def other_clocks(
     names, findings = dialect.names, []
     for k, group in enumerate(clocks.groups):
         other = names[group[0]]
-        columns = tuple(
-            names[column] for column, nearest in clocks.of.items() if nearest == k and names[column] in keys
-        )
+        columns = clocks.beside(k, names, keys)
         if columns and names.index(first) not in group and {first, other} <= values.keys():
             difference = _difference(dialect, values, first, other)
             fact = {"first": first, "difference": difference, "columns": columns}
@@ -134,41 +127,30 @@ def pieces_by_own_clock(
         first = dialect.names[clocks.columns[0]] if clocks.columns else ""
         findings = other_clocks(dialect, clocks, first, dialect.names, piece.values)
         yield piece
-        table: Source = yield from pieces
+        table = yield from pieces
         return replace(table, findings=(*table.findings, *findings))
     names = dialect.names
-    of_group = {
-        k: [
-            names[column]
-            for column, nearest in clocks.of.items()
-            if nearest == k and (keys is None or names[column] in keys)
-        ]
-        for k in range(len(clocks.groups))
-    }
+    of_group = {k: clocks.beside(k, names, names if keys is None else keys) for k in range(len(clocks.groups))}
     clock_names = {k: names[clocks.groups[k][0]] for k, members in of_group.items() if members}
     factors = {k: _factor(dialect, name, 1.0) for k, name in clock_names.items()}
     origin = _epoch_origin(piece.values[name] * factors[k] for k, name in clock_names.items())
     lost: Counter[str] = Counter()
     steps = {name: _step(piece.values[name]) for name in clock_names.values()}
-    while True:
+    run = PieceRun(pieces)
+    for each in chain([piece], run):
         for k, name in clock_names.items():
-            time = piece.values[name] * factors[k]
+            time = each.values[name] * factors[k]
             timed = np.isfinite(time)
-            values = {key: piece.values[key] for key in of_group[k] if key in piece.values}
+            values = {key: each.values[key] for key in of_group[k] if key in each.values}
             lost.update({key: int(np.count_nonzero(np.isfinite(column[~timed]))) for key, column in values.items()})
             rows = int(np.count_nonzero(timed))
             yield Piece(name, time[timed] - origin, {key: column[timed] for key, column in values.items()}, rows)
-        try:
-            piece = next(pieces)
-        except StopIteration as end:
-            table = end.value
-            break
     times = {names[column] for column in clocks.columns}
-    kept = [key for key in table.columns if key not in times and (keys is None or key in keys)]
+    kept = [key for key in run.source.columns if key not in times and (keys is None or key in keys)]
     return replace(
-        table,
-        columns={key: replace(table.columns[key], time=np.empty(0)) for key in kept},
-        findings=(*table.findings, *_own_clock_findings(dialect, steps, lost, stated)),
+        run.source,
+        columns={key: replace(run.source.columns[key], time=np.empty(0)) for key in kept},
+        findings=(*run.source.findings, *_own_clock_findings(dialect, steps, lost, stated)),
         origin=origin or dialect.origin,
         first_row=0,
     )

@@ -84,27 +84,18 @@ def exact_differences(
     if decimals is None or np.fmax.reduce(stamps, initial=-np.inf) * factor <= _FIRST:  # the usual case
         return None
     known = np.isfinite(stamps)
-    if not known.any():
+    finite, scale = stamps[known], 10**decimals
+    first_row = count_leading_strays(finite, EPOCH / factor)
+    if not (finite[first_row:] * factor > _FIRST)[:1].any() or np.abs(finite).max() * factor >= _LAST:
         return None
-    first_row = count_leading_strays(stamps[known], EPOCH / factor)
-    if not _is_large(stamps[known] * factor, first_row):
-        return None
-    scale = 10**decimals
-    whole = np.rint(stamps[known])
-    exact = np.zeros(len(stamps), dtype=np.int64)
-    exact[known] = whole.astype(np.int64) * scale + np.rint((stamps[known] - whole) * scale).astype(np.int64)
+    whole = np.rint(finite)
+    rounded = whole.astype(np.int64) * scale + np.rint((finite - whole) * scale).astype(np.int64)
     reader = RowReader(dialect, RequestedColumns((), whole=(column,), decimals=decimals), survey=True)
-    ticks = np.concatenate([rows.whole[column] for rows in reader.pieces()])[: len(stamps)]
-    plain = ticks != MISSING_STAMP
-    exact[plain] = ticks[plain]
-    start = int(exact[known][first_row])
+    ticks = np.concatenate([rows.whole[column] for rows in reader.pieces()])[: len(stamps)][known]
+    exact = np.where(ticks == MISSING_STAMP, rounded, ticks)
     differences = np.full(len(stamps), np.nan)
-    differences[known] = (exact[known] - start) / scale
-    return differences, start / NS
-
-
-def _is_large(seconds: FloatArray, first: int) -> bool:
-    return bool(seconds[first] > _FIRST and np.all(np.abs(seconds) < _LAST))
+    differences[known] = (exact - exact[first_row]) / scale
+    return differences, int(exact[first_row]) / NS
 
 
 class StampColumns:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import islice, pairwise
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.cells import kind, split_line
@@ -118,8 +118,6 @@ def resolve_marks(dialect: Dialect) -> Marks:
     numbers: list[tuple[str, int]] = []
     points: dict[int, tuple[str, int]] = {}
     for text, line, column in _marked_cells(dialect):
-        if _MARKED.search(text) is None:
-            continue
         numbers.append((text, line))
         if _GROUPED.fullmatch(text) is None or len(numbers) == _ENOUGH:
             break  # this number decides, or enough of them were seen
@@ -127,8 +125,9 @@ def resolve_marks(dialect: Dialect) -> Marks:
     marks = find_marks(numbers, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
     if marks.sure or marks.decimal != ".":
         return marks
+    first_rows = [cells for _, cells, _ in islice(_rows(dialect, ("",)), _ROWS_HELD)] if points else []
     for column, (text, line) in points.items():
-        whole = next((cells[column] for cells in _first_rows(dialect) if _WHOLE.fullmatch(cells[column])), None)
+        whole = next((cells[column] for cells in first_rows if _WHOLE.fullmatch(cells[column])), None)
         if whole is not None:
             raise RecordingError(
                 f"line {line}, column '{dialect.names[column]}': '{text}' next to '{whole}' may be "
@@ -139,18 +138,24 @@ def resolve_marks(dialect: Dialect) -> Marks:
 
 
 def _marked_cells(dialect: Dialect) -> Iterator[tuple[str, int, int]]:
-    """Yield the cells of columns of numbers with line and column, in the file's order, of blocks that have a mark."""
-    line, end = dialect.first_line, dialect.text.line_end
+    """Yield the cells of columns of numbers that have a mark, with line and column, in the file's order."""
+    for line, cells, is_last in _rows(dialect, [mark for mark in (".", "'", ",") if mark != dialect.separator]):
+        for column, cell in enumerate(cells):
+            # A last line without a line end may be cut off: `1.0` may have been `1.000`.
+            if dialect.kinds[column] in "NM" and _MARKED.search(cell) and (not is_last or _GROUPED.fullmatch(cell)):
+                yield cell, line, column
+
+
+def _rows(dialect: Dialect, marks: Sequence[str]) -> Iterator[tuple[int, list[str], bool]]:
+    """Yield the rows of blocks with one of the marks: line, cells, and whether the block ends without a line end."""
+    line = dialect.first_line
     for block in dialect.text.blocks(dialect.offset):
-        rows = block.split(end)
-        if any(mark in block for mark in (b".", b"'", b",") if mark != dialect.separator.encode()):
-            for number, raw in enumerate(rows, line):
-                # A last line without a line end may be cut off: `1.0` may have been `1.000`.
-                cut = number == line + len(rows) - 1
-                for column, cell in enumerate(_cells(dialect, raw)):
-                    if dialect.kinds[column] in "NM" and (not cut or _GROUPED.fullmatch(cell)):
-                        yield cell, number, column
-        line += len(rows) - 1
+        lines = block.split(dialect.text.line_end)
+        if any(mark.encode() in block for mark in marks):
+            for i, raw in enumerate(lines):
+                if cells := _cells(dialect, raw):
+                    yield line + i, cells, i == len(lines) - 1
+        line += len(lines) - 1
 
 
 def _cells(dialect: Dialect, raw: bytes) -> list[str]:
@@ -160,11 +165,3 @@ def _cells(dialect: Dialect, raw: bytes) -> list[str]:
     if len(cells) != dialect.width or (dialect.kinds[0] in "NT" and kind(cells[0]) == "X"):
         return []
     return cells
-
-
-def _first_rows(dialect: Dialect) -> Iterator[list[str]]:
-    for block in dialect.text.blocks(dialect.offset):
-        for raw in block.split(dialect.text.line_end, _ROWS_HELD)[:_ROWS_HELD]:
-            if cells := _cells(dialect, raw):
-                yield cells
-        return

@@ -26,7 +26,7 @@ class Dialect(Head):
     row ends with a separator, which is not followed by another cell. `stamped` and `words` describe the columns T and
     X, by number. `commented`: the sample has comments other than commented rows; `sampled` is the number of its rows.
     `blank_is_missing`: a blank line is a row whose only cell is empty.
-    `short_rows`: rows may end early, and their other cells are empty; if `short_width` is not 0, after as many cells.
+    `short_rows`: how many cells a row may have that ends early; its other cells are empty.
     `origin` [s] is stated by the head of a file that cdtool wrote.
     """
 
@@ -46,18 +46,13 @@ class Dialect(Head):
     blank_is_missing: bool = False
     stamped: dict[int, StampLayouts] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
-    short_rows: bool = False
-    short_width: int = 0
+    short_rows: range = range(0)
     origin: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return the names of the columns; without a header their numbers from 0."""
         return self.header or tuple(str(i) for i in range(self.width - self.trailing))
-
-    def may_end_after(self, cells: int) -> bool:
-        """Return whether a row may end after so many cells, though it has more columns."""
-        return self.short_rows and (cells == self.short_width if self.short_width else 1 < cells < self.width)
 
     @property
     def details(self) -> dict[str, str]:

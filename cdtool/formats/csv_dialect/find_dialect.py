@@ -151,8 +151,8 @@ class Sample:
     """The lines of a sample by kind: `table` are names and rows, `comments` are the lines that start with `mark`.
 
     `named` is a line that only names the separator (sep=;); `skipped` are the lines that the machine file skips.
-    `data` are the rows of `width` cells below the `head`. `short`: how many cells rows have that end early; they are
-    completed here. 0: all rows have all cells.
+    `data` are the rows of `width` cells below the `head`; those that end early, after `short_rows` cells, are completed
+    here.
     """
 
     every: Sequence[Line]
@@ -166,7 +166,7 @@ class Sample:
     data: Sequence[SplitLine]
     head: Head
     kinds: str
-    short: int
+    short_rows: range
 
     @property
     def not_numbers(self) -> list[int]:
@@ -212,7 +212,7 @@ def read_sample_lines(text: Text, stream: bytes, pins: TablePins) -> Sample:
         data=data,
         head=head,
         kinds=column_kinds([row.cells for row in _sample_evenly(data)], width),
-        short=split.width if width > split.width else 0,
+        short_rows=range(split.width, split.width + (width > split.width)),
     )
 
 
@@ -299,8 +299,7 @@ def _by_lines(text: Text, stream: bytes, pins: TablePins) -> Dialect:
         trailing=trailing,
         blank_is_missing=_are_missing_samples(sample.every, head.first_line, sample.width),
         stamped=_stamped_columns(sample, pins),
-        short_rows=sample.short > 0,
-        short_width=sample.short,
+        short_rows=sample.short_rows,
         words={i: _first_words(sample.data, i) for i in sample.not_numbers},
         origin=_written_origin(sample.every),
         findings=tuple(_findings(text, sample)),
