@@ -181,38 +181,10 @@ def test_a_row_that_is_cut_off_below_a_blank_line_is_not_a_footer(log, machine):
         read_recording(log(table), machine(channels))
 
 
-@pytest.mark.parametrize(
-    ("last", "said"),
-    {
-        ",112.5,-11.0": True,
-        "45,112.5,-11.0": True,
-        "10,112.5,-11.0": True,
-        "10,112.5,": True,
-        "10,112.5,-1.0": False,
-        "10,12.0,-2.0": False,
-        ",,": False,
-    }.items(),
-)
-def test_a_last_row_with_the_sums_of_the_rows_above_is_said(log, last, said):
-    lines = [f"{i},{2.5 * i},{-0.5 * i if i < 7 else -0.25 * (i < 9)}" for i in range(10)]
-    source = Csv().columns(log("\n".join(["t,a,b", *lines, last, ""])))
-    assert [fact_of(finding) for finding in source.findings if finding.kind == "total_row"] == [
-        ("total_row", {"line": 12})
-    ] * said
-    assert len(source.columns["a"].values) == 11
-
-
 def test_a_total_above_a_line_that_is_cut_off_is_no_sample(log):
     source = Csv().columns(log("t;x\n" + "".join(f"{i};{i}.5\n" for i in range(9)) + "Sum;40.5\n9"))
     assert len(source.columns["x"].values) == 9
     assert [finding.kind for finding in source.findings] == ["last_line_cut", "footer_skipped"]
-
-
-def test_a_total_in_a_table_of_many_blocks_is_a_finding(log):
-    rows = "".join(f"{i},{i % 7}.5,{i % 3}\n" for i in range(400_000))
-    sums = sum(i % 7 + 0.5 for i in range(400_000)), sum(i % 3 for i in range(400_000))
-    source = Csv().columns(log(f"t,a,b\n{rows},{sums[0]},{sums[1]}\n"))
-    assert [fact_of(finding) for finding in source.findings] == [("total_row", {"line": 400_002})]
 
 
 def test_a_line_that_is_cut_off_below_a_footer_has_its_own_number(log):

@@ -6,9 +6,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Generator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -18,21 +17,11 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, UsageError, naming
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
-from cdtool.formats.columns import Column, Piece
-from cdtool.formats.csv.gzipped import open_text
-from cdtool.formats.groups import PREFIX
-from cdtool.formats.pieces import Pieces, join_pieces
-from cdtool.formats.source import Source, stated_origin
+from cdtool.formats.pieces import Pieces, join_pieces, split_by_clock
+from cdtool.formats.source import Source
 
 if TYPE_CHECKING:
-    from cdtool.formats.csv.several_clocks import Clocks
-    from cdtool.formats.csv.table import TextTable
     from cdtool.formats.csv_dialect.dialect import Dialect
-
-_MARK = b"# " + PREFIX.encode()
-_KEY = _MARK + b"origin_s: "
-# Bytes that are searched for it: the provenance may contain a long list of parts, or of losses.
-_HEAD = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -59,7 +48,7 @@ class Csv:
 
         `pins` are in place of those of the map.
         """
-        from cdtool.formats.csv.several_clocks import Clocks
+        from cdtool.formats.csv.several_clocks import Clocks, pieces_by_own_clock
         from cdtool.formats.csv.table import read_table
         from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
@@ -67,12 +56,12 @@ class Csv:
             dialect = find_dialect(path, pins or (TablePins() if wanted is None else wanted.pins))
             if wanted is not None:
                 return _read_wanted(dialect, wanted)
-            table = read_table(dialect, dialect.names)
-            return join_pieces(_by_clock(dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
+            pieces = split_by_clock(read_table(dialect, dialect.names))
+            return join_pieces(pieces_by_own_clock(dialect, Clocks.by_names(dialect), pieces, None), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
-        from cdtool.formats.csv.several_clocks import Clocks
+        from cdtool.formats.csv.several_clocks import Clocks, pieces_by_own_clock
         from cdtool.formats.csv.table import table_pieces
         from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
@@ -83,39 +72,11 @@ class Csv:
             read = dialect.names if keys is None else {*keys, dialect.names[-1]}
             if len(clocks.groups) > 1:
                 read = {*read, *(dialect.names[i] for i in clocks.columns)}
-            return (yield from _by_clock(dialect, clocks, keys, table_pieces(dialect, read)))
-
-
-def _as_piece(table: TextTable) -> Generator[Piece, None, TextTable]:
-    """Yield the columns of a table, and return it."""
-    yield Piece("", None, table.values, len(next(iter(table.values.values()))))
-    return table
-
-
-def _by_clock(
-    dialect: Dialect,
-    clocks: Clocks,
-    keys: Collection[str] | None,
-    pieces: Generator[Piece, None, TextTable],
-    stated: bool = False,
-) -> Pieces:
-    """Yield the columns of a table, by clock if it has several clocks whose rates differ, or if that is `stated`."""
-    from cdtool.formats.csv.several_clocks import pieces_by_own_clock
-
-    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys, stated)
-    table.findings += findings
-    if origin is None:
-        return _source(dialect, table)
-    times = {dialect.names[column] for column in clocks.columns}
-    kept = {key for key in table.values if key not in times and (keys is None or key in keys)}
-    table.values = {key: values for key, values in table.values.items() if key in kept}
-    source = _source(dialect, table)
-    columns = {key: replace(column, time=np.empty(0)) for key, column in source.columns.items()}
-    return replace(source, columns=columns, origin=origin or written_origin(dialect.text.path), first_row=0)
+            return (yield from pieces_by_own_clock(dialect, clocks, table_pieces(dialect, read), keys))
 
 
 def _read_wanted(dialect: Dialect, wanted: ChannelMap) -> Source:
-    from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clocks
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clocks, pieces_by_own_clock
     from cdtool.formats.csv.table import read_table
 
     names, time = dialect.names, wanted.time
@@ -123,49 +84,26 @@ def _read_wanted(dialect: Dialect, wanted: ChannelMap) -> Source:
     clocks = Clocks.by_names(dialect, clock)
     own = time.column == OWN_CLOCK and time.factor == 1.0
     if len(clocks.groups) < 2 or (clock is None and not own):
-        return _source(dialect, read_table(dialect, wanted_keys(wanted, names), clock, wanted))
+        return read_table(dialect, wanted_keys(wanted, names), clock, wanted)
     keys = wanted_keys(wanted if clock is not None else replace(wanted, time=TimeSource()), names)
     table = read_table(dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
-    other = [] if clock is None else other_clocks(dialect, clocks, clock, keys, table.values)
-    if other and not own:
-        beside = f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}'"
-        differs = other[0].words_for("difference[what]")
-        raise RecordingError(f"{beside}, but the machine file names '{clock}': {differs}", HINT)
-    if clock is not None and not other:
-        table.values = {key: values for key, values in table.values.items() if key in keys}
-        return _source(dialect, table)
-    if clock is not None:  # back to the file's values, which can be compared with the other clocks
-        table.values[clock] = table.values[clock] + table.origin
+    if clock is not None:
+        values = {key: column.values for key, column in table.columns.items()}
+        other = other_clocks(dialect, clocks, clock, keys, values)
+        if other and not own:
+            beside = f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}'"
+            differs = other[0].words_for("difference[what]")
+            raise RecordingError(f"{beside}, but the machine file names '{clock}': {differs}", HINT)
+        if not other:
+            return replace(table, columns={key: column for key, column in table.columns.items() if key in keys})
+        # Back to the file's values, which can be compared with the other clocks.
+        as_written = replace(table.columns[clock], values=table.columns[clock].values + table.origin)
+        table = replace(table, columns={**table.columns, clock: as_written})
     channels = [key for key in keys if key != clock]
     for key in channels:
         if dialect.names.index(key) not in clocks.of:
             raise RecordingError(f"no clock is beside column '{key}'", "name its clock in [channels] time")
-    return join_pieces(_by_clock(dialect, clocks, channels, _as_piece(table), stated=True), sort=False)
-
-
-def _source(dialect: Dialect, table: TextTable) -> Source:
-    from cdtool.formats.csv.several_clocks import unit_from_header
-
-    columns = {
-        key: Column(
-            key,
-            values,
-            unit="s" if key in table.stamped else unit_from_header(dialect, key),
-            words=table.words.get(key, {}),
-        )
-        for key, values in table.values.items()
-    }
-    return Source(
-        path=dialect.text.path,
-        format=Csv.name,
-        columns=columns,
-        origin=table.origin or written_origin(dialect.text.path),
-        findings=(*dialect.findings, *table.findings),
-        details=dialect.details,
-        names=dialect.names,
-        first_row=dialect.first_line if table.unbroken else 0,
-        dialect=dialect.as_pins,
-    )
+    return join_pieces(pieces_by_own_clock(dialect, clocks, split_by_clock(table), channels, stated=True), sort=False)
 
 
 def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[str, str]) -> None:
@@ -177,14 +115,3 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
     values = np.column_stack(list(columns.values()))
     body = (row * len(values)) % tuple(values.ravel().tolist())
     path.write_text(",".join(columns) + "\n" + body, encoding="utf-8", newline="\n")
-
-
-def written_origin(path: Path) -> float:
-    """Return the origin [s] that the head of a text table states; 0 if it does not state one."""
-    with open_text(path) as file:
-        head = file.read(len(_MARK)) or b""
-        if head != _MARK:  # the usual case
-            return 0.0
-        head += file.read(_HEAD - len(_MARK)) or b""
-    lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())
-    return stated_origin(next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0"))

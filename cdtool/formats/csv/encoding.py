@@ -37,8 +37,6 @@ def looks_like_text(sample: bytes) -> bool:
     if head.startswith(_OTHER_KINDS):
         return False
     encoding, mark = _by_mark(head)
-    if encoding is None:
-        encoding = _wide_without_mark(head)
     if encoding in UNIT_BYTES:
         usable = len(head) - (len(head) - mark) % UNIT_BYTES[encoding]
         try:
@@ -72,8 +70,8 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     if not looks_like_text(sample):
         raise RecordingError("is not a table of numbers: binary or markup", "name a CSV, MCAP or MAT file")
     marked, mark = _by_mark(sample)
-    encoding = pinned or marked or _wide_without_mark(sample) or _narrow(sample)
-    if pinned and marked and codecs.lookup(pinned).name != marked:
+    encoding = pinned or marked or _narrow(sample)
+    if pinned and mark and marked and codecs.lookup(pinned).name != marked:
         raise RecordingError(
             f"line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
@@ -103,7 +101,9 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
 
 
 def _by_mark(sample: bytes) -> tuple[str | None, int]:
-    return next(((name, len(mark)) for mark, name in _MARKS if sample.startswith(mark)), (None, 0))
+    """Return the encoding by a byte order mark, and how long that is; without one UTF-16, if the bytes are such."""
+    known = ((name, len(mark)) for mark, name in _MARKS if sample.startswith(mark))
+    return next(known, (_wide_without_mark(sample), 0))
 
 
 def _wide_without_mark(sample: bytes) -> str | None:

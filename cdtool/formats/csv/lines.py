@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 from cdtool.base.errors import RecordingError
+from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 
 COMMENTS = ("#", "%", "//")
@@ -41,6 +43,23 @@ class Line:
     def is_comment(self, mark: str) -> bool:
         """Return whether the line is a comment that starts with the mark."""
         return begins_comment(self.text, mark)
+
+
+@dataclass(frozen=True)
+class SplitLine(Line):
+    """A line as cells."""
+
+    cells: list[str]
+
+    @cached_property
+    def kinds(self) -> str:
+        """Return the kind of each cell, as one letter."""
+        return "".join(map(kind, self.cells))
+
+    @classmethod
+    def of(cls, line: Line, separator: str) -> SplitLine:
+        """Return a line split at a separator."""
+        return cls(line.number, line.text, line.start, split_line(line.text, separator))
 
 
 def begins_comment(text: str, mark: str) -> bool:

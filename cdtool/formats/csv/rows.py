@@ -42,13 +42,12 @@ _END = re.compile(r"(?:.*(?P<mark>[.,eE]))?[+-]?(?P<digits>[0-9]*)")
 
 @dataclass
 class Rows:
-    """Rows of a table from row `first` (0: its first row); the last one is in line `last_line` (from 1).
+    """Rows of a table; the last one is in line `last_line` (from 1).
 
     Cells (n,) by the number of their column: `numbers` are NaN where a cell is empty, `whole` (integers, also stamps)
     are MISSING_STAMP there.
     """
 
-    first: int
     count: int
     last_line: int
     numbers: dict[int, FloatArray]
@@ -106,7 +105,7 @@ class RowReader:
             return None
         self.lines.line += count
         self.lines.rows += count
-        return Rows(self.lines.rows - count, count, self.lines.line - 1, numbers, whole)
+        return Rows(count, self.lines.line - 1, numbers, whole)
 
     def _by_lines(self, block: bytes, ended: bool) -> Iterator[Rows]:
         """Yield the rows of a block of any lines."""
@@ -128,7 +127,7 @@ class RowReader:
             numbers[column], rows = self.values.numbers(column, columns[column])
             unread += [(row, column) for row in rows]
         self.values.lose((lines[row], column, columns[column][row]) for row, column in unread)
-        return Rows(self.lines.rows - len(cells), len(cells), lines[-1] if lines else 0, numbers, whole)
+        return Rows(len(cells), lines[-1] if lines else 0, numbers, whole)
 
     def _whole(
         self, texts: Mapping[int, Sequence[str]] | Sequence[Sequence[str]]
@@ -156,7 +155,7 @@ class RowReader:
     def _check_last_line(self, rows: Rows) -> list[Finding]:
         """Check a last row without line end: keep it, keep it with a warning, or remove it with a loss."""
         dialect, text, last = self.dialect, self.dialect.text, self.dialect.width - 1
-        is_read = dialect.short_rows or last in (*self.values.numeric, *self.requested.stamps)
+        is_read = bool(dialect.short_rows) or last in (*self.values.numeric, *self.requested.stamps)
         *others, unfinished = text.tail()
         if not rows.count or dialect.trailing or not is_read or not unfinished.strip():
             return []
@@ -227,7 +226,7 @@ def _have_cells(dialect: Dialect, data: npt.NDArray[np.uint8], ended: bool) -> b
     separators = np.flatnonzero(data == ord(dialect.separator))
     cells = 1 + np.diff(np.searchsorted(separators, ends), prepend=0)
     short = cells[cells != dialect.width]
-    return all(dialect.may_end_after(each) for each in np.unique(short)) and (ended or cells[-1] == dialect.width)
+    return all(each in dialect.short_rows for each in np.unique(short)) and (ended or cells[-1] == dialect.width)
 
 
 def _parsed(

@@ -7,23 +7,23 @@ clock, it belongs to the columns before it. Adjacent clocks belong to the same r
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Mapping
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, TypeVar
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
-from cdtool.formats.column_names import split_unit
 from cdtool.formats.columns import Piece
-from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
+from cdtool.formats.pieces import PieceRun, Pieces
 from cdtool.recordings.clock import EPOCH
 from cdtool.recordings.units import find_unit
 
-Table = TypeVar("Table")  # what the reader of a table returns after its last piece
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-z]|$)", re.IGNORECASE)
 # Ratios of two units of time: clocks whose steps have another ratio differ in their rates.
 _FACTORS = tuple(10.0**power for power in (-9, -6, -3, 0, 3, 6, 9)) + tuple(
@@ -52,13 +52,8 @@ class Clocks:
         starts = [i for i in clock_columns if i - 1 not in clock_columns]
         groups = [tuple(i for i in clock_columns if start <= i < end) for start, end in pairwise([*starts, count])]
         is_after_columns = bool(clock_columns) and clock_columns[0] > 0 and clock_columns[-1] == count - 1
-        of = {}
-        for column in range(count):
-            before = [k for k, group in enumerate(groups) if group[0] < column]
-            after = [k for k, group in enumerate(groups) if group[0] > column]
-            nearest = after[:1] if is_after_columns else before[-1:]
-            if column not in clock_columns and nearest:
-                of[column] = nearest[0]
+        nearest = {i: bisect(starts, i) - (not is_after_columns) for i in range(count) if i not in clock_columns}
+        of = {i: k for i, k in nearest.items() if 0 <= k < len(groups)}
         return cls(tuple(groups), of)
 
     @property
@@ -66,9 +61,9 @@ class Clocks:
         """Return the numbers of all clocks."""
         return tuple(column for group in self.groups for column in group)
 
-    def group(self, column: int) -> int | None:
-        """Return the group of a clock or of any other column; None if no clock is adjacent to the column."""
-        return next((k for k, group in enumerate(self.groups) if column in group), self.of.get(column))
+    def beside(self, group: int, names: Sequence[str], keys: Collection[str]) -> tuple[str, ...]:
+        """Return the columns `keys` that belong to a group of clocks."""
+        return tuple(names[column] for column, k in self.of.items() if k == group and names[column] in keys)
 
 
 def other_clocks(
@@ -81,9 +76,7 @@ def other_clocks(
     names, findings = dialect.names, []
     for k, group in enumerate(clocks.groups):
         other = names[group[0]]
-        columns = tuple(
-            names[column] for column, nearest in clocks.of.items() if nearest == k and names[column] in keys
-        )
+        columns = clocks.beside(k, names, keys)
         if columns and names.index(first) not in group and {first, other} <= values.keys():
             difference = _difference(dialect, values, first, other)
             fact = {"first": first, "difference": difference, "columns": columns}
@@ -122,46 +115,45 @@ def _end_apart(a: FloatArray, b: FloatArray) -> bool:
 
 
 def pieces_by_own_clock(
-    dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None, stated: bool
-) -> Generator[Piece, None, tuple[Table, list[Finding], float | None]]:
+    dialect: Dialect, clocks: Clocks, pieces: Pieces, keys: Collection[str] | None, stated: bool = False
+) -> Pieces:
     """Yield the pieces of a table unchanged or, if its clocks have other rates, by clock with their times [s].
 
     The first piece decides, unless it is `stated` that each column has the clock beside it. A clock without a unit in
-    the header is in s. A shorter clock ends with empty cells: rows without a time are left out of its columns. The
-    return value is that of `pieces`, the findings on the clocks, and the origin of the times [s] (None: unchanged).
+    the header is in s. A shorter clock ends with empty cells: rows without a time are left out of its columns.
     """
     piece = next(pieces)
     if not stated and not have_other_rates(dialect, clocks, piece.values):
         first = dialect.names[clocks.columns[0]] if clocks.columns else ""
         findings = other_clocks(dialect, clocks, first, dialect.names, piece.values)
         yield piece
-        return (yield from pieces), findings, None
+        table = yield from pieces
+        return replace(table, findings=(*table.findings, *findings))
     names = dialect.names
-    of_group = {
-        k: [
-            names[column]
-            for column, nearest in clocks.of.items()
-            if nearest == k and (keys is None or names[column] in keys)
-        ]
-        for k in range(len(clocks.groups))
-    }
+    of_group = {k: clocks.beside(k, names, names if keys is None else keys) for k in range(len(clocks.groups))}
     clock_names = {k: names[clocks.groups[k][0]] for k, members in of_group.items() if members}
     factors = {k: _factor(dialect, name, 1.0) for k, name in clock_names.items()}
     origin = _epoch_origin(piece.values[name] * factors[k] for k, name in clock_names.items())
     lost: Counter[str] = Counter()
     steps = {name: _step(piece.values[name]) for name in clock_names.values()}
-    while True:
+    run = PieceRun(pieces)
+    for each in chain([piece], run):
         for k, name in clock_names.items():
-            time = piece.values[name] * factors[k]
+            time = each.values[name] * factors[k]
             timed = np.isfinite(time)
-            values = {key: piece.values[key] for key in of_group[k] if key in piece.values}
+            values = {key: each.values[key] for key in of_group[k] if key in each.values}
             lost.update({key: int(np.count_nonzero(np.isfinite(column[~timed]))) for key, column in values.items()})
             rows = int(np.count_nonzero(timed))
             yield Piece(name, time[timed] - origin, {key: column[timed] for key, column in values.items()}, rows)
-        try:
-            piece = next(pieces)
-        except StopIteration as end:
-            return end.value, _own_clock_findings(dialect, steps, lost, stated), origin
+    times = {names[column] for column in clocks.columns}
+    kept = [key for key in run.source.columns if key not in times and (keys is None or key in keys)]
+    return replace(
+        run.source,
+        columns={key: replace(run.source.columns[key], time=np.empty(0)) for key in kept},
+        findings=(*run.source.findings, *_own_clock_findings(dialect, steps, lost, stated)),
+        origin=origin or dialect.origin,
+        first_row=0,
+    )
 
 
 def _epoch_origin(clocks: Iterable[FloatArray]) -> float:
@@ -186,16 +178,6 @@ def _own_clock_findings(
             Finding("clock_unit_assumed", "time", {"clocks": tuple(assumed), "step": next(iter(assumed.values()))})
         )
     return findings + [Finding("values_without_time", key, {"count": count}) for key, count in lost.items() if count]
-
-
-def unit_from_header(dialect: Dialect, name: str) -> str | None:
-    """Return the unit of a column in the header, or in the row of units below it; None if there is no unit."""
-    column = dialect.names.index(name)
-    text = dialect.units[column].strip() if column < len(dialect.units) else ""
-    if text[:1] + text[-1:] in ("[]", "()"):
-        text = text[1:-1].strip()
-    texts = [item for item in (text, split_unit(name.partition("#")[0])[1]) if item and item != "-"]
-    return next((item for item in texts if find_unit(item)), next(iter(texts), None))
 
 
 def _factor(dialect: Dialect, name: str, default: float) -> float:

@@ -11,11 +11,9 @@ rounded: float64 represents the stamps with a resolution of 0.24 us only, but th
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Collection, Generator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import chain, islice
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,14 +23,15 @@ from cdtool.base.findings import Finding
 from cdtool.base.plain_text import digits
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.column_names import column_key
-from cdtool.formats.columns import Categories, Piece
+from cdtool.formats.columns import Categories, Column, Piece
 from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.rows import RowReader, Rows, plain_rows
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, StampLayout, seconds_since, unwrap
 from cdtool.formats.csv.text import BLOCK_BYTES
-from cdtool.formats.csv_dialect.dialect import Dialect
+from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
-from cdtool.formats.pieces import PieceRun
+from cdtool.formats.pieces import Pieces, join_pieces
+from cdtool.formats.source import Source
 from cdtool.recordings.clock.stamps import EPOCH, count_leading_strays
 
 # Days since 1899-12-30, as counted by Excel, of 1970-01-01, and of the start of the years 2000 and 2100.
@@ -85,33 +84,18 @@ def exact_differences(
     if decimals is None or np.fmax.reduce(stamps, initial=-np.inf) * factor <= _FIRST:  # the usual case
         return None
     known = np.isfinite(stamps)
-    if not known.any():
+    finite, scale = stamps[known], 10**decimals
+    first_row = count_leading_strays(finite, EPOCH / factor)
+    if not (finite[first_row:] * factor > _FIRST)[:1].any() or np.abs(finite).max() * factor >= _LAST:
         return None
-    first_row = count_leading_strays(stamps[known], EPOCH / factor)
-    if not _is_large(stamps[known] * factor, first_row):
-        return None
-    scale = 10**decimals
-    whole = np.rint(stamps[known])
-    exact = np.zeros(len(stamps), dtype=np.int64)
-    exact[known] = whole.astype(np.int64) * scale + np.rint((stamps[known] - whole) * scale).astype(np.int64)
+    whole = np.rint(finite)
+    rounded = whole.astype(np.int64) * scale + np.rint((finite - whole) * scale).astype(np.int64)
     reader = RowReader(dialect, RequestedColumns((), whole=(column,), decimals=decimals), survey=True)
-    ticks = np.concatenate([rows.whole[column] for rows in reader.pieces()])[: len(stamps)]
-    plain = ticks != MISSING_STAMP
-    exact[plain] = ticks[plain]
-    start = int(exact[known][first_row])
+    ticks = np.concatenate([rows.whole[column] for rows in reader.pieces()])[: len(stamps)][known]
+    exact = np.where(ticks == MISSING_STAMP, rounded, ticks)
     differences = np.full(len(stamps), np.nan)
-    differences[known] = (exact[known] - start) / scale
-    return differences, start / NS
-
-
-def _is_large(seconds: FloatArray, first: int) -> bool:
-    return bool(seconds[first] > _FIRST and np.all(np.abs(seconds) < _LAST))
-
-
-# A total is of so many rows, and as exact as the written numbers are.
-_FEWEST_SUMMED, _SAME_SUM = 3, 1e-6
-# The sum of a column, and its largest number.
-Sum = tuple[float, float]
+    differences[known] = (exact - exact[first_row]) / scale
+    return differences, int(exact[first_row]) / NS
 
 
 class StampColumns:
@@ -182,70 +166,35 @@ class StampColumns:
         return findings
 
 
-@dataclass
-class TextTable:
-    """The columns of a text table with findings.
-
-    `stamped` are the columns of dates or times of day; `origin` [s] was subtracted from the columns with a date.
-    `unbroken`: every line after the first row is a row. `words` are the texts of columns of categories.
-    """
-
-    values: dict[str, FloatArray]
-    findings: list[Finding]
-    origin: float = 0.0
-    stamped: set[str] = field(default_factory=set)
-    unbroken: bool = True
-    words: dict[str, dict[float, str]] = field(default_factory=dict)
-
-
 def read_table(
     dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
-) -> TextTable:
+) -> Source:
     """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
     table = None if wanted is None or wanted.worded else _plain_table(dialect, keys)
-    table = table or _joined_blocks(dialect, keys, clock, wanted)
-    if clock is not None and wanted is not None:
-        _set_clock(dialect, table, clock, wanted)
-    return table
+    table = table or join_pieces(table_pieces(dialect, keys, clock, wanted), sort=False)
+    return table if clock is None or wanted is None else _with_clock(dialect, table, clock, wanted)
 
 
-def _plain_table(dialect: Dialect, keys: Collection[str]) -> TextTable | None:
+def _plain_table(dialect: Dialect, keys: Collection[str]) -> Source | None:
     """Return a small table that has only numbers in plain rows, read at once; None if it may have anything else."""
     text, names = dialect.text, dialect.names
     if dialect.stamped or text.padding or text.content is None or not 0 < len(text.content) <= BLOCK_BYTES:
         return None
-    rows, columns = (
-        text.content[text.mark + dialect.offset : text.size],
-        [i for i, name in enumerate(names) if name in keys],
-    )
+    columns = [i for i, name in enumerate(names) if name in keys]
+    rows = text.content[text.mark + dialect.offset : text.size]
     plain = plain_rows(dialect, columns, (), rows, ended=True) if rows.endswith(b"\n") and columns else None
     if plain is None:
         return None
     values = {names[column]: plain[1][column] for column in columns}
-    return TextTable(values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))])
-
-
-def _joined_blocks(dialect: Dialect, keys: Collection[str], clock: str | None, wanted: ChannelMap | None) -> TextTable:
-    """Return the columns of a table that is read block by block."""
-    run = PieceRun(table_pieces(dialect, keys, clock, wanted))
-    first, *more = islice(pieces := iter(run), 2)
-    values, count = first.values, first.rows
-    if more:  # in one array per column: half the memory of a list of pieces
-        most = dialect.text.count_lines(dialect.offset)
-        values, count = {key: np.empty(most) for key in values}, 0
-        for piece in chain([first], more, pieces):
-            for key, column in piece.values.items():
-                values[key][count : count + piece.rows] = column
-            count += piece.rows
-    table = run.source
-    table.values = {key: values[key][:count] for key in table.values}
-    return table
+    return _source(
+        dialect, values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))]
+    )
 
 
 def table_pieces(
     dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
-) -> Generator[Piece, None, TextTable]:
-    """Yield those of the columns `keys` that have numbers, block by block; return the table without its rows.
+) -> Pieces:
+    """Yield those of the columns `keys` that have numbers, block by block.
 
     `clock` is the time column of the channel map `wanted`; without one the columns are surveyed. The last row is
     removed from the last block if the file's end is incomplete. Raises RecordingError.
@@ -257,29 +206,36 @@ def table_pieces(
     reader = RowReader(dialect, replace(requested, categories=categories), survey=wanted is None)
     stamped = StampColumns(dialect, requested)
     rounded: Counter[str] = Counter()
-    above, before = dict[int, Sum](), dict[int, FloatArray]()
     for rows in reader.pieces():
-        above |= {i: added(above.get(i), values) for i, values in before.items()}
-        before = rows.numbers if wanted is None else {}
         numbers = {names[column]: values for column, values in rows.numbers.items()}
         rounded.update({key: rounded_integers(values) for key, values in numbers.items()})
         yield Piece("", None, numbers | stamped.seconds(rows), rows.count)
-    findings = reader.findings
-    if wanted is None and is_total(rows, above):
-        findings.append(Finding("total_row", "", {"line": rows.last_line}))
-    findings += stamped.findings()
-    remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
+    findings = [*reader.findings, *stamped.findings()]
+    remaining = [name for name in names if name in {*(names[i] for i in reader.values.numeric), *stamped.names}]
     if wanted is None and not remaining:
         raise RecordingError("no column has only numbers", str(findings[0]) if findings else "")
-    for key in names:
-        findings += rounding_finding(key, rounded[key]) if key in remaining else []
-    return TextTable(
-        {key: np.empty(0) for key in names if key in remaining},
-        findings,
-        (stamped.origin or 0) / NS,
-        {*stamped.names},
-        reader.lines.only_rows,
-        {names[column]: each.words for column, each in categories.items()},
+    findings += [note for key in remaining for note in rounding_finding(key, rounded[key])]
+    table = _source(dialect, dict.fromkeys(remaining, np.empty(0)), findings)
+    known = {**table.columns}
+    known |= {key: replace(known[key], unit="s") for key in stamped.names}
+    known |= {names[i]: replace(known[names[i]], words=each.words) for i, each in categories.items()}
+    first = table.first_row if reader.lines.only_rows else 0
+    origin = (stamped.origin or 0) / NS or table.origin
+    return replace(table, columns=known, first_row=first, origin=origin)
+
+
+def _source(dialect: Dialect, values: Mapping[str, FloatArray], findings: Sequence[Finding]) -> Source:
+    """Return columns of numbers, of which every line below the head is a row."""
+    return Source(
+        path=dialect.text.path,
+        format="csv",
+        columns={key: Column(key, column, unit=unit_from_header(dialect, key)) for key, column in values.items()},
+        origin=dialect.origin,
+        findings=(*dialect.findings, *findings),
+        details=dialect.details,
+        names=dialect.names,
+        first_row=dialect.first_line,
+        dialect=dialect.as_pins,
     )
 
 
@@ -333,59 +289,36 @@ def _two_readings(dialect: Dialect, column: int) -> RecordingError:
     )
 
 
-def _set_clock(dialect: Dialect, table: TextTable, clock: str, wanted: ChannelMap) -> None:
+def _with_clock(dialect: Dialect, table: Source, clock: str, wanted: ChannelMap) -> Source:
     """Check the machine file's unit against the clock's column, and convert days of Excel to seconds.
 
     It is read again if its stamps have more digits than float64 can represent.
     """
-    if clock in table.stamped:
+    number, values = dialect.names.index(clock), table.columns[clock].values
+    if number in dialect.stamped:
         if wanted.time.factor != 1.0:
             raise RecordingError(
                 f"column '{clock}' has dates or times of day, which are read in s",
                 'write unit = "s" in [channels] time',
             )
-        return
-    values = table.values[clock]
+        return table
     finite = values[np.isfinite(values)]
     if not len(finite):
-        return
+        return table
     if wanted.pins.time_format == "excel":
-        table.origin = since_1970(float(finite[0]))
-        table.values[clock] = (values - finite[0]) * DAY_S
-        return
+        return _with_times(table, clock, (values - finite[0]) * DAY_S, since_1970(float(finite[0])))
     readings = "" if wanted.pins.time_format else two_readings(values, wanted.time.factor)
     if readings:
         raise RecordingError(
             f"column '{clock}' {readings}", 'pin time_format = "excel" or "number" in [csv] of the machine file'
         )
-    exact = exact_differences(dialect, dialect.names.index(clock), values, wanted.time.factor)
-    if exact is not None:
-        table.values[clock], table.origin = exact
-        table.findings = [
-            found for found in table.findings if (found.kind, found.channel) != ("rounded_integers", clock)
-        ]
+    exact = exact_differences(dialect, number, values, wanted.time.factor)
+    if exact is None:
+        return table
+    findings = tuple(note for note in table.findings if (note.kind, note.channel) != ("rounded_integers", clock))
+    return _with_times(replace(table, findings=findings), clock, *exact)
 
 
-def added(above: Sum | None, column: FloatArray) -> Sum:
-    """Return sum and largest number of a column to the end of its next rows."""
-    total, largest = above or (0.0, 0.0)
-    column = column[np.isfinite(column)]
-    with np.errstate(over="ignore"):
-        return total + float(column.sum()), max(largest, float(np.abs(column).max(initial=0.0)))
-
-
-def is_total(rows: Rows, above: Mapping[int, Sum]) -> bool:
-    """Return whether the last numbers of columns are the sums of those above, more than each of them.
-
-    `above` are the sums to the end of the rows before; the first column of a table is its clock.
-    """
-    found = False
-    for i, column in rows.numbers.items():
-        last = float(column[-1]) if i and rows.count and rows.first + rows.count > _FEWEST_SUMMED else np.nan
-        if not np.isfinite(last):
-            continue
-        total, largest = added(above.get(i), column[:-1])
-        if not largest < abs(last) or not math.isclose(total, last, rel_tol=_SAME_SUM):
-            return False
-        found = True
-    return found
+def _with_times(table: Source, clock: str, times: FloatArray, origin: float) -> Source:
+    columns = {**table.columns, clock: replace(table.columns[clock], values=times)}
+    return replace(table, columns=columns, origin=origin or table.origin)

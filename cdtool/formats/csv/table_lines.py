@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding, lines_of
 from cdtool.base.plain_text import counted
 from cdtool.formats.csv.cell_values import CellValues
 from cdtool.formats.csv.cells import has_numbers, has_open_quote, kind, split_line
-from cdtool.formats.csv.lines import begins_comment, is_ruler
+from cdtool.formats.csv.lines import SplitLine, begins_comment, is_ruler
 from cdtool.formats.csv_dialect.dialect import Dialect
 
 # Blank lines, comments and repeated headers, of which there may be more only beside as many rows.
@@ -19,14 +18,6 @@ _MOST_SKIPPED = 20_000
 _MOST = 12
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
 _MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
-
-
-class _Pending(NamedTuple):
-    """A line that is a row only if a row follows."""
-
-    line: int
-    cells: list[str]
-    text: str
 
 
 class TableLines:
@@ -43,7 +34,7 @@ class TableLines:
         self.cut_line, self.ends_skipped = 0, False
         self._blank: list[int] = []
         self._skipped: dict[str, list[int]] = {}
-        self._pending: list[_Pending] = []
+        self._pending: list[SplitLine] = []  # rows only if a row follows
         # Whether a row above starts with a word: then lines that do are no footer.
         self._words_above = dialect.kinds[0] not in "NT" or dialect.text.padding > 0
         self._headers = {text.strip() for text in dialect.header_text}
@@ -68,7 +59,7 @@ class TableLines:
         line, self.line = self.line, self.line + 1
         if not text.strip(self._blanks):
             self._blank.append(line)
-            self._pending += [_Pending(line, [""], text)] if self.dialect.blank_is_missing else []
+            self._pending += [SplitLine(line, text, 0, [""])] if self.dialect.blank_is_missing else []
             self._check_count()
             return []
         kind_of_line = self._kind(text)
@@ -80,13 +71,13 @@ class TableLines:
         cells = split_line(text, self.dialect.separator)
         if self._may_be_footer(line, cells, text, unfinished):
             self.ends_skipped = unfinished
-            self._pending.append(_Pending(line, cells, text))
+            self._pending.append(SplitLine(line, text, 0, cells))
             return []
         if unfinished and line > self.dialect.first_line and self._is_cut(text, cells):
             self.cut_line = line
             return []
         self._check_row(line, text, cells, unfinished)
-        rows = [*((each.line, each.cells) for each in self._pending), (line, cells)]
+        rows = [*((each.number, each.cells) for each in self._pending), (line, cells)]
         self._words_above |= any(kind(row[0]) == "X" for _, row in rows)
         self._pending = []
         self.rows += len(rows)
@@ -108,12 +99,12 @@ class TableLines:
         return self.rows > 0 and fits and is_label and len(known) < _MOST and not self._words_above
 
     @property
-    def _footer(self) -> list[_Pending]:
+    def _footer(self) -> list[SplitLine]:
         return [each for each in self._pending if each.text.strip()]
 
     def _apart(self, line: int) -> bool:
         """Return whether a blank line is above the footer that starts in a line, or earlier."""
-        first = self._footer[0].line if self._footer else line
+        first = self._footer[0].number if self._footer else line
         return bool(self._blank) and any(each == first - 1 for each in self._blank)
 
     def _kind(self, text: str) -> str:
@@ -153,13 +144,13 @@ class TableLines:
                 f"line {line} contains a carriage return: line ends are mixed",
                 "save the file again with one kind of line end",
             )
-        fits = len(cells) == width or (self.dialect.may_end_after(len(cells)) and not unfinished)
+        fits = len(cells) == width or (len(cells) in self.dialect.short_rows and not unfinished)
         if text.count('"') % 2 and (len(cells) != width or has_open_quote(text, self.dialect.separator)):
             raise RecordingError(f"line {line} has a quote that is not closed", "write quotes in pairs")
         words = next((each for each in self._footer if len(each.cells) != width), None)
         if words is not None:
             raise RecordingError(
-                f"line {words.line} has {counted(len(words.cells), 'cell')}, the header has {width}: "
+                f"line {words.number} has {counted(len(words.cells), 'cell')}, the header has {width}: "
                 f"{words.text.strip()[:40]!r} between the rows",
                 "repair or remove the line; pin comment in [csv] if such lines are comments",
             )
@@ -190,7 +181,7 @@ class TableLines:
             findings = [Finding("blank_rows" if dialect.blank_is_missing else skipped, "", lines_of(blank))]
         findings += [Finding(each, "", lines_of(lines)) for each, lines in self._skipped.items()]
         if footer:
-            fact = lines_of([each.line for each in footer])
+            fact = lines_of([each.number for each in footer])
             words = dialect.width > 1 and all(len(each.cells) == 1 for each in footer)
             text = {} if words else {"text": footer[0].text.strip()}
             findings.append(Finding("words_below_rows" if words else "footer_skipped", "", fact | text))

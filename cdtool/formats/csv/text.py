@@ -15,8 +15,6 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
-
 from cdtool.base.errors import RecordingError
 from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
@@ -66,14 +64,6 @@ class Text:
         """Return the last lines of the stream, including an unfinished last line; the first may be part of a line."""
         start = max(self.mark, self.size - TAIL_BYTES)
         return b"".join(self.chunks(start - self.mark)).split(self.line_end)
-
-    def count_lines(self, offset: int) -> int:
-        """Return the number of lines after byte `offset` of the stream, including an unfinished last line."""
-        end, total, last = self.line_end, 0, self.line_end
-        for piece in self.chunks(offset):
-            total += int(np.count_nonzero(np.frombuffer(piece, dtype=np.uint8) == end[0]))  # quicker than bytes.count
-            last = piece[-1:] or last
-        return total + (last != end)
 
     def blocks(self, offset: int) -> Iterator[bytes]:
         """Yield blocks of complete lines after byte `offset` of the stream.

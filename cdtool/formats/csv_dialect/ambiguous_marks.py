@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import islice, pairwise
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.cells import kind, split_line
-from cdtool.formats.csv.lines import Line, begins_comment
+from cdtool.formats.csv.lines import SplitLine, begins_comment
 from cdtool.formats.csv_dialect.dialect import Dialect
-from cdtool.formats.csv_dialect.head import Head
 from cdtool.formats.csv_dialect.marks import Marks, find_marks
 
 _EXPONENT = r"[eE][+-]?[0-9]+"
@@ -37,9 +36,7 @@ _ENOUGH = 1000
 _ROWS_HELD = 2000
 
 
-def refuse_commas_that_may_be_decimal(
-    data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, named: bool
-) -> None:
+def refuse_commas_that_may_be_decimal(data: Sequence[SplitLine], kinds: str, separator: str, named: bool) -> None:
     """Raise RecordingError if a row without a header may be one number: `0,05` may be two cells or 0.05.
 
     `named`: a comment above the rows is a single word, perhaps the name of one column.
@@ -47,21 +44,22 @@ def refuse_commas_that_may_be_decimal(
     if separator != ",":
         return
     pairs = kinds == "NN" and _may_be_one(data)
-    points = not pairs and any("." in cell for _, row in data for i, cell in enumerate(row) if kinds[i] == "N")
+    points = not pairs and any("." in cell for row in data for i, cell in enumerate(row.cells) if kinds[i] == "N")
+    columns = range(1, len(kinds))
     ambiguous = next(
-        ((line, row, i) for line, row in data for i in range(1, len(row)) if _is_fraction(data, kinds, row, i, points)),
-        None,
+        ((row, i) for row in data for i in columns if _is_fraction(data, kinds, row.cells, i, points)), None
     )
     if ambiguous is None and pairs and (named or (len(data) > 2 and not _is_counter(data))):
-        ambiguous = (*data[0], 1)
+        ambiguous = data[0], 1
     if ambiguous is not None:
-        line, row, i = ambiguous
+        row, i = ambiguous
         raise RecordingError(
-            f"line {line.number}: '{row[i - 1]},{row[i]}' may be one number (decimal comma) or two cells", _HINT
+            f"line {row.number}: '{row.cells[i - 1]},{row.cells[i]}' may be one number (decimal comma) or two cells",
+            _HINT,
         )
 
 
-def _is_fraction(data: Sequence[tuple[Line, list[str]]], kinds: str, row: Sequence[str], i: int, points: bool) -> bool:
+def _is_fraction(data: Sequence[SplitLine], kinds: str, row: Sequence[str], i: int, points: bool) -> bool:
     """Return whether cell `i` may be the decimals of the cell before it.
 
     After a number: digits with leading zeros, or with an exponent. After a time of day: 3, 6 or 9 digits in all rows.
@@ -72,43 +70,41 @@ def _is_fraction(data: Sequence[tuple[Line, list[str]]], kinds: str, row: Sequen
         if row[i].startswith("0") and _GROUP.fullmatch(row[i]) and _FIRST_GROUP.fullmatch(row[i - 1]):
             return True
         return not points and _PADDED.fullmatch(row[i]) is not None
-    if kinds[i - 1] != "T" or ":" not in row[i - 1] or row is not data[0][1]:  # once: the test is of all rows
+    if kinds[i - 1] != "T" or ":" not in row[i - 1] or row is not data[0].cells:  # once: the test is of all rows
         return False
-    digits = {len(cells[i]) if cells[i].isdigit() else 0 for _, cells in data}
+    digits = {len(each.cells[i]) if each.cells[i].isdigit() else 0 for each in data}
     return len(digits) == 1 and digits <= {3, 6, 9}
 
 
-def _may_be_one(data: Sequence[tuple[Line, list[str]]]) -> bool:
+def _may_be_one(data: Sequence[SplitLine]) -> bool:
     """Return whether each row of two cells may be one number: `1,5`, `-3,07e+00`, `1.234,5` or `1,234.5`."""
-    decimals = all(_WHOLE_PART.fullmatch(row[0]) and _FRACTION.fullmatch(row[1]) for _, row in data)
-    return decimals or all(_FIRST_GROUP.fullmatch(row[0]) and _GROUP.fullmatch(row[1]) for _, row in data)
+    pairs = [row.cells for row in data]
+    decimals = all(_WHOLE_PART.fullmatch(whole) and _FRACTION.fullmatch(rest) for whole, rest in pairs)
+    return decimals or all(_FIRST_GROUP.fullmatch(whole) and _GROUP.fullmatch(rest) for whole, rest in pairs)
 
 
-def _is_counter(data: Sequence[tuple[Line, list[str]]]) -> bool:
+def _is_counter(data: Sequence[SplitLine]) -> bool:
     """Return whether the first column rises in equal steps, like a counter or a clock, and the second one changes."""
-    first = [cells[0].replace(".", "") for _, cells in data]
-    if not all(cell.isdigit() for cell in first) or len({cells[1] for _, cells in data}) == 1:
+    first = [row.cells[0].replace(".", "") for row in data]
+    if not all(cell.isdigit() for cell in first) or len({row.cells[1] for row in data}) == 1:
         return False
     steps = {int(b) - int(a) for a, b in pairwise(first)}
     return len(steps) == 1 and min(steps) > 0
 
 
-def refuse_one_column_of_decimals(
-    rows: Sequence[tuple[Line, list[str]]], head: Head, data: Sequence[tuple[Line, list[str]]]
-) -> None:
-    """Raise RecordingError if one name or number is above lines such as `1,5`.
+def refuse_one_column_of_decimals(above: Sequence[SplitLine], data: Sequence[SplitLine]) -> None:
+    """Raise RecordingError if one name or number is `above` rows such as `1,5` without names.
 
     Such lines may be one column with a decimal comma, or two columns without names.
     """
-    above = [(line, cells) for line, cells in rows if line.number < head.first.number]
-    if head.names is not None or not above or len(above[-1][1]) != 1:
+    if not above or len(above[-1].cells) != 1:
         return
-    word = above[-1][1][0]
+    word = above[-1].cells[0]
     if kind(word) != "N" and not _may_be_one(data):
         return
     raise RecordingError(
-        f"line {head.first.number} ({head.first.text[:40]!r}) may be one number (decimal comma) or two cells; "
-        f"line {above[-1][0].number} has one ({word[:40]!r})",
+        f"line {data[0].number} ({data[0].text[:40]!r}) may be one number (decimal comma) or two cells; "
+        f"line {above[-1].number} has one ({word[:40]!r})",
         _HINT,
     )
 
@@ -122,8 +118,6 @@ def resolve_marks(dialect: Dialect) -> Marks:
     numbers: list[tuple[str, int]] = []
     points: dict[int, tuple[str, int]] = {}
     for text, line, column in _marked_cells(dialect):
-        if _MARKED.search(text) is None:
-            continue
         numbers.append((text, line))
         if _GROUPED.fullmatch(text) is None or len(numbers) == _ENOUGH:
             break  # this number decides, or enough of them were seen
@@ -131,8 +125,9 @@ def resolve_marks(dialect: Dialect) -> Marks:
     marks = find_marks(numbers, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
     if marks.sure or marks.decimal != ".":
         return marks
+    first_rows = [cells for _, cells, _ in islice(_rows(dialect, ("",)), _ROWS_HELD)] if points else []
     for column, (text, line) in points.items():
-        whole = next((cells[column] for cells in _first_rows(dialect) if _WHOLE.fullmatch(cells[column])), None)
+        whole = next((cells[column] for cells in first_rows if _WHOLE.fullmatch(cells[column])), None)
         if whole is not None:
             raise RecordingError(
                 f"line {line}, column '{dialect.names[column]}': '{text}' next to '{whole}' may be "
@@ -143,18 +138,24 @@ def resolve_marks(dialect: Dialect) -> Marks:
 
 
 def _marked_cells(dialect: Dialect) -> Iterator[tuple[str, int, int]]:
-    """Yield the cells of columns of numbers with line and column, in the file's order, of blocks that have a mark."""
-    line, end = dialect.first_line, dialect.text.line_end
+    """Yield the cells of columns of numbers that have a mark, with line and column, in the file's order."""
+    for line, cells, is_last in _rows(dialect, [mark for mark in (".", "'", ",") if mark != dialect.separator]):
+        for column, cell in enumerate(cells):
+            # A last line without a line end may be cut off: `1.0` may have been `1.000`.
+            if dialect.kinds[column] in "NM" and _MARKED.search(cell) and (not is_last or _GROUPED.fullmatch(cell)):
+                yield cell, line, column
+
+
+def _rows(dialect: Dialect, marks: Sequence[str]) -> Iterator[tuple[int, list[str], bool]]:
+    """Yield the rows of blocks with one of the marks: line, cells, and whether the block ends without a line end."""
+    line = dialect.first_line
     for block in dialect.text.blocks(dialect.offset):
-        rows = block.split(end)
-        if any(mark in block for mark in (b".", b"'", b",") if mark != dialect.separator.encode()):
-            for number, raw in enumerate(rows, line):
-                # A last line without a line end may be cut off: `1.0` may have been `1.000`.
-                cut = number == line + len(rows) - 1
-                for column, cell in enumerate(_cells(dialect, raw)):
-                    if dialect.kinds[column] in "NM" and (not cut or _GROUPED.fullmatch(cell)):
-                        yield cell, number, column
-        line += len(rows) - 1
+        lines = block.split(dialect.text.line_end)
+        if any(mark.encode() in block for mark in marks):
+            for i, raw in enumerate(lines):
+                if cells := _cells(dialect, raw):
+                    yield line + i, cells, i == len(lines) - 1
+        line += len(lines) - 1
 
 
 def _cells(dialect: Dialect, raw: bytes) -> list[str]:
@@ -164,11 +165,3 @@ def _cells(dialect: Dialect, raw: bytes) -> list[str]:
     if len(cells) != dialect.width or (dialect.kinds[0] in "NT" and kind(cells[0]) == "X"):
         return []
     return cells
-
-
-def _first_rows(dialect: Dialect) -> Iterator[list[str]]:
-    for block in dialect.text.blocks(dialect.offset):
-        for raw in block.split(dialect.text.line_end, _ROWS_HELD)[:_ROWS_HELD]:
-            if cells := _cells(dialect, raw):
-                yield cells
-        return

@@ -6,24 +6,28 @@ from dataclasses import dataclass, field
 
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import TablePins
+from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.cells import SEPARATORS
 from cdtool.formats.csv.stamps import StampLayouts
 from cdtool.formats.csv.text import Text
+from cdtool.formats.csv_dialect.head import Head
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell
+from cdtool.recordings.units import find_unit
 
 # So many cells a block may have: 16 MiB of float64. Rows that end early have more cells than their bytes show.
 MOST_CELLS = 1 << 21
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dialect:
-    """The dialect of a text table: rows of `width` cells start in line `first_line` (from 1), at byte `offset`.
+class Dialect(Head):
+    """The dialect of a text table, whose rows have `width` cells.
 
     `kinds` has one letter per cell: N numbers, T time stamps, X words, M missing in the whole sample. `trailing`: each
     row ends with a separator, which is not followed by another cell. `stamped` and `words` describe the columns T and
-    X, by number. `commented`: the sample has comments other than commented rows; `sampled` is the number of its rows;
-    `preamble` are the lines above them. `blank_is_missing`: a blank line is a row whose only cell is empty.
-    `short_rows`: rows may end early, and their other cells are empty; if `short_width` is not 0, after as many cells.
+    X, by number. `commented`: the sample has comments other than commented rows; `sampled` is the number of its rows.
+    `blank_is_missing`: a blank line is a row whose only cell is empty.
+    `short_rows`: how many cells a row may have that ends early; its other cells are empty.
+    `origin` [s] is stated by the head of a file that cdtool wrote.
     """
 
     text: Text
@@ -31,36 +35,24 @@ class Dialect:
     separator: str
     marks: Marks
     missing: tuple[str, ...]
-    header: tuple[str, ...] | None
-    first_line: int
     sampled: int
-    offset: int
     width: int
     kinds: str
     words: dict[int, SampleCell]
     comment: str = ""
     commented: bool = False
-    header_line: int = 0
-    units: tuple[str, ...] = ()
-    units_line: int = 0
     header_text: tuple[str, ...] = ()
-    from_comment: bool = False
-    preamble: tuple[int, ...] = ()
     trailing: bool = False
     blank_is_missing: bool = False
     stamped: dict[int, StampLayouts] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
-    short_rows: bool = False
-    short_width: int = 0
+    short_rows: range = range(0)
+    origin: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return the names of the columns; without a header their numbers from 0."""
         return self.header or tuple(str(i) for i in range(self.width - self.trailing))
-
-    def may_end_after(self, cells: int) -> bool:
-        """Return whether a row may end after so many cells, though it has more columns."""
-        return self.short_rows and (cells == self.short_width if self.short_width else 1 < cells < self.width)
 
     @property
     def details(self) -> dict[str, str]:
@@ -110,6 +102,16 @@ class Dialect:
         elif pins.time_format:
             lines.append(f"time_format = {quoted(pins.time_format)}")
         return "\n".join(lines)
+
+
+def unit_from_header(dialect: Dialect, name: str) -> str | None:
+    """Return the unit of a column in the header, or in the row of units below it; None if there is no unit."""
+    column = dialect.names.index(name)
+    text = dialect.units[column].strip() if column < len(dialect.units) else ""
+    if text[:1] + text[-1:] in ("[]", "()"):
+        text = text[1:-1].strip()
+    texts = [item for item in (text, split_unit(name.partition("#")[0])[1]) if item and item != "-"]
+    return next((item for item in texts if find_unit(item)), next(iter(texts), None))
 
 
 def quoted(text: str) -> str:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
 from cdtool.formats.csv.encoding import open_table
-from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
+from cdtool.formats.csv.lines import Line, SplitLine, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import Text
 from cdtool.formats.csv_dialect.ambiguous_marks import (
@@ -30,6 +31,8 @@ from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
 from cdtool.formats.csv_dialect.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell, find_marks
+from cdtool.formats.groups import PREFIX
+from cdtool.formats.source import stated_origin
 
 _SCORED = 150
 # A strong separator that occurs equally often in this share of the lines is preferred, even with fewer numbers.
@@ -44,6 +47,8 @@ _SHOWN_ENCODINGS = {
 _LOOKED = 200
 # Rows end early if so many lines, with the names and the first row, show it.
 _ENDING_EARLY = 6
+_WRITTEN = f"# {PREFIX}"
+_ORIGIN = f"{_WRITTEN}origin_s: "
 _TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
 
 
@@ -142,52 +147,26 @@ def _is_number(cell: str, separator: str) -> bool:
 
 
 @dataclass(frozen=True)
-class SampleLines:
+class Sample:
     """The lines of a sample by kind: `table` are names and rows, `comments` are the lines that start with `mark`.
 
-    `separator` is a line that only names the separator (sep=;); `skipped` are the numbers of the lines that the machine
-    file skips.
+    `named` is a line that only names the separator (sep=;); `skipped` are the lines that the machine file skips.
+    `data` are the rows of `width` cells below the `head`; those that end early, after `short_rows` cells, are completed
+    here.
     """
 
     every: Sequence[Line]
-    table: Sequence[Line]
+    table: Sequence[SplitLine]
     comments: Sequence[Line]
     mark: str
-    separator: Line | None
+    named: Line | None
     skipped: Sequence[int]
-
-
-def classify_lines(text: Text, stream: bytes, pins: TablePins) -> SampleLines:
-    """Sort the lines of the sample by kind; raises RecordingError if no line of a table is left."""
-    every = sample_lines(text, stream)
-    filled = [line for line in every if not line.blank]
-    lines = [line for line in filled if line.number > pins.skip_lines]
-    separator = next((line for line in lines if line.separator), None)
-    lines = [line for line in lines if line is not separator]
-    mark = comment_mark(lines, pins.comment)
-    table = [line for line in lines if not line.is_comment(mark)]
-    if not table:
-        raise RecordingError("contains no row of numbers", "a header line and rows of numbers are needed")
-    comments = [line for line in lines if line.is_comment(mark)]
-    return SampleLines(
-        every, table, comments, mark, separator, [line.number for line in filled if line.number <= pins.skip_lines]
-    )
-
-
-@dataclass(frozen=True)
-class CellGrid:
-    """The sample's lines as cells: `rows` are all lines, `data` the lines of `width` cells below the `head`.
-
-    `short`: how many cells rows have that end early; they are completed here. 0: all rows have all cells.
-    """
-
     separator: str
     width: int
-    rows: Sequence[tuple[Line, list[str]]]
-    data: Sequence[tuple[Line, list[str]]]
+    data: Sequence[SplitLine]
     head: Head
     kinds: str
-    short: int
+    short_rows: range
 
     @property
     def not_numbers(self) -> list[int]:
@@ -195,48 +174,67 @@ class CellGrid:
         return [i for i, letter in enumerate(self.kinds) if letter in "TX"]
 
 
-def split_rows(lines: SampleLines, pins: TablePins) -> CellGrid:
+def read_sample_lines(text: Text, stream: bytes, pins: TablePins) -> Sample:
     """Find separator, width and head; raises RecordingError if there is no table, or one that is ambiguous."""
-    named = lines.separator.separator or "" if lines.separator else ""
-    without_rulers = [line for line in lines.table if not is_ruler(line.text)] or lines.table
-    split = find_separator(without_rulers, pins.separator or named, pins.decimal)
-    rows = [(line, split_line(line.text, split.separator)) for line in lines.table]
+    every = sample_lines(text, stream)
+    filled = [line for line in every if not line.blank]
+    lines = [line for line in filled if line.number > pins.skip_lines]
+    named = next((line for line in lines if line.separator), None)
+    lines = [line for line in lines if line is not named]
+    mark = comment_mark(lines, pins.comment)
+    comments = [line for line in lines if line.is_comment(mark)]
+    lines = [line for line in lines if not line.is_comment(mark)]
+    if not lines:
+        raise RecordingError("contains no row of numbers", "a header line and rows of numbers are needed")
+    without_rulers = [line for line in lines if not is_ruler(line.text)] or lines
+    stated = named.separator or "" if named else ""
+    split = find_separator(without_rulers, pins.separator or stated, pins.decimal)
+    table = [SplitLine.of(line, split.separator) for line in lines]
     # Between blanks, an empty cell cannot be seen: rows may be without any of their cells.
-    width = _full_width(rows, split.width) if split.separator != " " else split.width
-    short = split.width if width > split.width else 0
-    if short:
-        rows = [_completed(line, cells, split.separator, width) for line, cells in rows]
-        split = replace(split, width=width)
-        lines = replace(lines, table=[line for line, _ in rows])
-    wide = [(line, cells) for line, cells in rows if len(cells) == split.width]
+    width = _full_width(table, split.width) if split.separator != " " else split.width
+    if width > split.width:
+        table = [_completed(row, split.separator, width) for row in table]
+    wide = [row for row in table if len(row.cells) == width]
     lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
-    kinds = column_kinds([cells for _, cells in _sample_evenly(lower)], split.width)
-    head = HeadFinder(split.separator, split.width, kinds, pins).find(lines.table, lines.comments)
-    end = next((line.number for line, cells in reversed(wide) if kind(cells[0]) != "X" or kinds[0] not in "NT"), 0)
-    data = [(line, cells) for line, cells in wide if head.first.number <= line.number <= end]  # without a footer
-    kinds = column_kinds([cells for _, cells in _sample_evenly(data)], split.width)
-    return CellGrid(split.separator, split.width, rows, data, head, kinds, short)
+    kinds = column_kinds([row.cells for row in _sample_evenly(lower)], width)
+    head = HeadFinder(split.separator, width, kinds, pins).find(table, comments)
+    end = next((row.number for row in reversed(wide) if kind(row.cells[0]) != "X" or kinds[0] not in "NT"), 0)
+    data = [row for row in wide if head.first_line <= row.number <= end]  # without a footer
+    return Sample(
+        every=every,
+        table=table,
+        comments=comments,
+        mark=mark,
+        named=named,
+        skipped=[line.number for line in filled if line.number <= pins.skip_lines],
+        separator=split.separator,
+        width=width,
+        data=data,
+        head=head,
+        kinds=column_kinds([row.cells for row in _sample_evenly(data)], width),
+        short_rows=range(split.width, split.width + (width > split.width)),
+    )
 
 
-def _full_width(rows: Sequence[tuple[Line, list[str]]], width: int) -> int:
+def _full_width(rows: Sequence[SplitLine], width: int) -> int:
     """Return the number of columns: more than most lines have if the names and the first row have more.
 
     Then all other rows end early: their last columns, statistics for example, have a value in the first row only.
     """
-    if len(rows) < _ENDING_EARLY or {len(cells) for _, cells in rows[2:]} != {width}:
+    if len(rows) < _ENDING_EARLY or {len(row.cells) for row in rows[2:]} != {width}:
         return width
-    names, first = rows[0][1], rows[1][1]
-    if not len(names) == len(first) > width or not any(names[width:]) or len(names) * len(rows) > MOST_CELLS:
+    names, first = rows[0], rows[1]
+    wider = len(names.cells)
+    if not wider == len(first.cells) > width or not any(names.cells[width:]) or wider * len(rows) > MOST_CELLS:
         return width
-    named = all(kind(cell) in "XM" for cell in names)
-    return len(names) if named and all(kind(cell) in "NTM" for cell in first) else width
+    return wider if {*names.kinds} <= {*"XM"} and {*first.kinds} <= {*"NTM"} else width
 
 
-def _completed(line: Line, cells: list[str], separator: str, width: int) -> tuple[Line, list[str]]:
+def _completed(row: SplitLine, separator: str, width: int) -> SplitLine:
     """Return a line that ends early with empty cells."""
-    missing = width - len(cells)
-    text = line.text.rstrip("\r\n") + separator * missing if missing > 0 else line.text
-    return replace(line, text=text), [*cells, *[""] * missing]
+    missing = width - len(row.cells)
+    text = row.text.rstrip("\r\n") + separator * missing if missing > 0 else row.text
+    return replace(row, text=text, cells=[*row.cells, *[""] * missing])
 
 
 def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
@@ -278,40 +276,33 @@ def _dialect(text: Text, stream: bytes, pins: TablePins) -> Dialect:
 
 def _by_lines(text: Text, stream: bytes, pins: TablePins) -> Dialect:
     """Return the dialect from all lines of a sample."""
-    lines = classify_lines(text, stream, pins)
-    grid = split_rows(lines, pins)
-    head = grid.head
-    marks = _marks(grid.data, grid.kinds, grid.separator, pins)
-    _refuse_other_readings(lines, grid, pins)
-    trailing = _trailing(head, grid.kinds, grid.data)
-    names = head.names[: grid.width - trailing] if head.names is not None else None
+    sample = read_sample_lines(text, stream, pins)
+    head = sample.head
+    marks = _marks(sample, pins)
+    _refuse_other_readings(sample, pins)
+    trailing = _trailing(sample)
+    if head.header is not None:
+        head = replace(head, header=tuple(_unique(head.header[: sample.width - trailing])))
     return Dialect(
+        **vars(head),
         text=text,
         pins=pins,
-        separator=grid.separator,
+        separator=sample.separator,
         marks=marks,
-        comment=lines.mark,
-        commented=pins.comment is not None or _has_comments(lines, grid),
+        comment=sample.mark,
+        commented=pins.comment is not None or _has_comments(sample),
         missing=(*pins.missing, *NULLS),
-        header=tuple(_unique(names)) if names is not None else None,
-        header_line=head.header_line,
-        units=head.units,
-        units_line=head.units_line,
-        header_text=tuple(line.text for line in lines.table if line.number in (head.header_line, head.units_line)),
-        from_comment=head.from_comment,
-        preamble=head.preamble,
-        first_line=head.first.number,
-        sampled=len(grid.data),
-        offset=head.first.start,
-        width=grid.width,
-        kinds=grid.kinds,
+        header_text=tuple(row.text for row in sample.table if row.number in (head.header_line, head.units_line)),
+        sampled=len(sample.data),
+        width=sample.width,
+        kinds=sample.kinds,
         trailing=trailing,
-        blank_is_missing=_are_missing_samples(lines.every, head.first.number, grid.width),
-        stamped=_stamped_columns(grid, pins),
-        short_rows=grid.short > 0,
-        short_width=grid.short,
-        words={i: _first_words(grid.data, i) for i in grid.not_numbers},
-        findings=tuple(_findings(text, lines, head)),
+        blank_is_missing=_are_missing_samples(sample.every, head.first_line, sample.width),
+        stamped=_stamped_columns(sample, pins),
+        short_rows=sample.short_rows,
+        words={i: _first_words(sample.data, i) for i in sample.not_numbers},
+        origin=_written_origin(sample.every),
+        findings=tuple(_findings(text, sample)),
     )
 
 
@@ -328,33 +319,41 @@ def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
     return not blank or 2 * len(blank) < rows[-1] - first
 
 
-def _refuse_other_readings(lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
+def _refuse_other_readings(sample: Sample, pins: TablePins) -> None:
     """Raise RecordingError if the commas may be decimal marks, or if another table is above this one."""
-    head = grid.head
-    if head.names is None and not pins.separator and not lines.separator:
-        above = [line for line in lines.comments if line.number < head.first.number]
-        named = any(len(line.text.strip(lines.mark).split()) == 1 for line in above)
-        refuse_commas_that_may_be_decimal(grid.data, grid.kinds, grid.separator, named)
-    if grid.width == 2 and grid.separator == "," and not pins.separator:
-        refuse_one_column_of_decimals(grid.rows, head, grid.data)
+    first = sample.head.first_line
+    if sample.head.header is None:
+        if not pins.separator and not sample.named:
+            above = [line for line in sample.comments if line.number < first]
+            named = any(len(line.text.strip(sample.mark).split()) == 1 for line in above)
+            refuse_commas_that_may_be_decimal(sample.data, sample.kinds, sample.separator, named)
+        if sample.width == 2 and sample.separator == "," and not pins.separator:
+            refuse_one_column_of_decimals([row for row in sample.table if row.number < first], sample.data)
     if pins.header is None:  # a pinned header selects the table, and rows above it are reported as a loss
-        refuse_table_above(head, grid.width)
+        refuse_table_above(sample.head, sample.width)
 
 
-def _has_comments(lines: SampleLines, grid: CellGrid) -> bool:
+def _written_origin(lines: Sequence[Line]) -> float:
+    """Return the origin [s] that the head of a file of cdtool states, in its comments before any other line."""
+    head = takewhile(lambda line: line.text.startswith(_WRITTEN), lines)
+    return stated_origin(next((line.text.removeprefix(_ORIGIN) for line in head if line.text.startswith(_ORIGIN)), "0"))
+
+
+def _has_comments(sample: Sample) -> bool:
     """Return whether the sample has comments other than commented rows: above the rows, or of another width."""
-    first = grid.head.first.number
     return any(
-        line.number <= first or len(split_line(line.text, grid.separator)) != grid.width for line in lines.comments
+        line.number <= sample.head.first_line or len(split_line(line.text, sample.separator)) != sample.width
+        for line in sample.comments
     )
 
 
-def _stamped_columns(grid: CellGrid, pins: TablePins) -> dict[int, StampLayouts]:
+def _stamped_columns(sample: Sample, pins: TablePins) -> dict[int, StampLayouts]:
     """Return the columns of dates and times by number; a time next to a column of days is a time of day."""
     layout = pins.time_format if "%" in pins.time_format else ""
     stamped: dict[int, StampLayouts] = {}
-    for i in grid.not_numbers:
-        layouts = _find_layouts([cells[i] for _, cells in grid.data if cells[i] not in (*pins.missing, *NULLS)], layout)
+    for i in sample.not_numbers:
+        cells = [row.cells[i] for row in sample.data if row.cells[i] not in (*pins.missing, *NULLS)]
+        layouts = _find_layouts(cells, layout)
         if layouts.layouts:
             stamped[i] = layouts
     days = [i for i, layouts in stamped.items() if layouts.layouts[0].dated]
@@ -367,51 +366,49 @@ def _find_layouts(cells: list[str], layout: str) -> StampLayouts:
     return pinned if pinned.layouts else find_layout(cells)
 
 
-def _first_words(data: Sequence[tuple[Line, list[str]]], column: int) -> SampleCell:
+def _first_words(data: Sequence[SplitLine], column: int) -> SampleCell:
     """Return the first cell of a column that is neither a number nor missing."""
-    cells = [(cells[column], line.number) for line, cells in data if cells[column] not in MISSING]
-    return SampleCell(*next((cell for cell in cells if kind(cell[0]) in "TX"), cells[0]))
+    cells = [SampleCell(row.cells[column], row.number) for row in data if row.cells[column] not in MISSING]
+    return next((cell for cell in cells if kind(cell.text) in "TX"), cells[0])
 
 
-def _marks(data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, pins: TablePins) -> Marks:
+def _marks(sample: Sample, pins: TablePins) -> Marks:
     if pins.decimal and pins.thousands is not None:
         return Marks(pins.decimal, pins.thousands)
     # Lines without any of these marks have decimal points or whole numbers: a limited number of them is sufficient.
-    mark = re.compile(rf"[{'' if separator == ',' else ','}\"'\u00a0\u202f]|[0-9] [0-9]{{3}}|\.[0-9]{{3}}\.")
-    rows = [row for i, row in enumerate(data) if i < _LOOKED or mark.search(row[0].text)]
+    comma = "" if sample.separator == "," else ","
+    mark = re.compile(rf"[{comma}\"'\u00a0\u202f]|[0-9] [0-9]{{3}}|\.[0-9]{{3}}\.")
+    rows = [row for i, row in enumerate(sample.data) if i < _LOOKED or mark.search(row.text)]
     cells = [
-        (cell, line.number)
-        for line, row in rows
-        for i, cell in enumerate(row)
-        if kinds[i] == "N" and cell and (cell[0].isdigit() or cell[0] in "+-.,\u2212")
+        (cell, row.number)
+        for row in rows
+        for i, cell in enumerate(row.cells)
+        if sample.kinds[i] == "N" and cell and (cell[0].isdigit() or cell[0] in "+-.,\u2212")
     ]
-    return find_marks(cells, separator, pins.decimal, pins.thousands)
+    return find_marks(cells, sample.separator, pins.decimal, pins.thousands)
 
 
-def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) -> bool:
+def _trailing(sample: Sample) -> bool:
     """Return whether each row ends with a separator: the last cell of every row is empty and has no name."""
-    if len(kinds) < 2 or kinds[-1] != "M" or any(cells[-1] for _, cells in data):
+    if sample.width < 2 or sample.kinds[-1] != "M" or any(row.cells[-1] for row in sample.data):
         return False
-    return head.names is None or not head.names[-1]
+    return sample.head.header is None or not sample.head.header[-1]
 
 
-def _findings(text: Text, lines: SampleLines, head: Head) -> list[Finding]:
-    findings = []
-    if lines.skipped:
-        findings.append(Finding("pinned_lines_skipped", "", lines_of(lines.skipped)))
-    encoding = _SHOWN_ENCODINGS.get(text.encoding)
-    if encoding:
-        findings.append(Finding("other_encoding", "", {"encoding": encoding}))
-    if lines.separator:
-        line = lines.separator
-        findings.append(Finding("named_separator", "", {"line": line.number, "text": line.text.strip()[:12]}))
+def _findings(text: Text, sample: Sample) -> Iterator[Finding]:
+    head = sample.head
+    if sample.skipped:
+        yield Finding("pinned_lines_skipped", "", lines_of(sample.skipped))
+    if encoding := _SHOWN_ENCODINGS.get(text.encoding):
+        yield Finding("other_encoding", "", {"encoding": encoding})
+    if line := sample.named:
+        yield Finding("named_separator", "", {"line": line.number, "text": line.text.strip()[:12]})
     if head.numbers:
-        findings.append(Finding("numbers_above_rows", "", lines_of(head.numbers)))
-    if words := [line for line in head.preamble if line not in head.numbers]:
-        findings.append(Finding("words_above_rows", "", lines_of(words)))
+        yield Finding("numbers_above_rows", "", lines_of(head.numbers))
+    if words := [number for number in head.preamble if number not in head.numbers]:
+        yield Finding("words_above_rows", "", lines_of(words))
     if head.from_comment:
-        findings.append(Finding("names_from_comment", "", {"line": head.header_line}))
-    return findings
+        yield Finding("names_from_comment", "", {"line": head.header_line})
 
 
 def _unique(cells: Sequence[str]) -> list[str]:

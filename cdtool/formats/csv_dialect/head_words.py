@@ -26,12 +26,8 @@ _TYPES = frozenset(
 
 def column_kinds(rows: Sequence[Sequence[str]], width: int) -> str:
     """Return one letter per column, the kind of most of its cells: N, T, X, or M if all are missing."""
-    kind_counts = [Counter(kind(row[i]) for row in rows) for i in range(width)]
-    letters = []
-    for counts in kind_counts:
-        present = {letter: counts[letter] for letter in "NTX" if counts[letter]}
-        letters.append(max(present, key=lambda letter: present[letter]) if present else "M")
-    return "".join(letters)
+    counts = [Counter(kind(row[i]) for row in rows) for i in range(width)]
+    return "".join(max("NTX", key=each.__getitem__) if {*each} - {"M"} else "M" for each in counts)
 
 
 def are_numbered(cells: Sequence[str]) -> bool:

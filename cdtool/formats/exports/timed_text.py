@@ -199,7 +199,7 @@ def dialect_of_rows(
         width=width,
         kinds=kinds,
         words=words,
-        short_rows=True,
+        short_rows=range(2, width + 1),
     )
 
 
