@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from cdtool.commands.init import motion_evidence as motion
-from cdtool.commands.init.names.quantity_words import is_reference
+from cdtool.commands.init.names.words import says
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels, Found
 
@@ -77,7 +77,7 @@ def _reference_doubt(quantity: str, stream: Stream, channels: Channels) -> str:
     measured = _stream(channels, quantity)
     if measured is None:
         return "no measured channel follows it"
-    if not is_reference(stream.name):
+    if not says("reference", stream.name):
         return ""
     correlation = motion.likeness(measured, stream)
     return "" if correlation > _FOLLOWS else f"the measured channel does not follow it, r = {correlation:.2f}"

@@ -9,23 +9,17 @@ import numpy as np
 from cdtool.commands.init import motion_evidence as motion
 from cdtool.commands.init.certainty import add_doubts
 from cdtool.commands.init.column_blocks import Blocks, find_angle, find_blocks, find_efforts
-from cdtool.commands.init.names.quantity_words import (
-    contact_pressure_word,
+from cdtool.commands.init.names.units_in_names import label, may_be, pressure_unit, quantity_of_unit
+from cdtool.commands.init.names.words import (
     is_actual,
     is_current,
-    is_load_cell,
-    is_of_body,
     is_one_of_three_axes,
     is_only_a_joint,
-    is_reference,
-    is_something_else,
-    is_twist,
-    side_of_gear,
-    without_kind,
+    says,
+    what_else,
     word_for,
     words,
 )
-from cdtool.commands.init.names.units_in_names import label, may_be, pressure_unit, quantity_of_unit
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels, Found
 from cdtool.recordings.recording import CONTACT_PRESSURE, MEASURED
@@ -84,7 +78,7 @@ def name_strength(quantity: str, stream: Stream) -> tuple[float, str]:
 
     A unit counts only if no word does: `Beschl. [m/s²]`; a name that is only that of a joint may be a position.
     """
-    if is_something_else(stream.name) or _is_sensor_of_force(stream) or not may_be(quantity, stream):
+    if what_else(stream.name) or _is_sensor_of_force(stream) or not may_be(quantity, stream):
         return 0.0, ""
     name = label(stream)
     strength, word = word_for(quantity, name)
@@ -126,7 +120,7 @@ def _has_single_motion(streams: Iterable[Stream]) -> bool:
         stream.width == 1
         and stream.moves
         and not of_families & set(stream.columns)
-        and not is_reference(stream.name)
+        and not says("reference", stream.name)
         and any(name_strength(quantity, stream)[0] >= _SPEAKS for quantity in ("position", "speed"))
         for stream in listed
     )
@@ -273,7 +267,7 @@ def _partner(channels: Channels, stream: Stream, other: str) -> None:
         pair = (stream, candidate) if other == "speed" else (candidate, stream)
         return motion.integral_fit(*pair).correlation
 
-    found = _best([item for item in _unnamed_for(channels, other) if not is_reference(item.name)], fit)
+    found = _best([item for item in _unnamed_for(channels, other) if not says("reference", item.name)], fit)
     if found is not None and found[0] > _FITS:
         relation = "integral" if other == "speed" else "derivative"
         channels.take(other, found[1], f"its {relation} fits '{stream.name}', r = {found[0]:.3f}", _BY_COURSE)
@@ -304,7 +298,7 @@ def _drive(channels: Channels) -> None:
     others = [
         stream
         for stream in _unnamed_for(channels, "torque")
-        if not is_reference(stream.name)
+        if not says("reference", stream.name)
         and not _says_more("torque", stream)
         and abs(motion.likeness(moving, stream)) < _FOLLOWS
     ]
@@ -382,18 +376,23 @@ def _ground_truth(channels: Channels) -> None:
     _contact_pressure(channels)
     singles = [stream for stream in channels.free if stream.width == 1 and stream.moves and may_be("force", stream)]
     named = [(*force_strength(stream), stream) for stream in singles]
-    named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
+    named = [
+        item for item in named if item[0] and ".torque." not in item[2].field and not says("reference", item[2].name)
+    ]
     if named:
         chosen = max(
             named,
-            key=lambda item: (item[0] + is_load_cell(_full(item[2])), float(np.ptp(np.nan_to_num(item[2].values)))),
+            key=lambda item: (
+                item[0] + bool(says("load_cell", _full(item[2]))),
+                float(np.ptp(np.nan_to_num(item[2].values))),
+            ),
         )
         channels.take("force", chosen[2], _TOLD_UNIT if chosen[1] == _TOLD_UNIT else f"name ({chosen[1]})")
     elif "force" not in channels.found:
         peaking = [
             stream
             for stream in singles
-            if not (_is_other("force", stream) or side_of_gear(stream.name) or channels.is_of_family(stream))
+            if not (_is_other("force", stream) or _sides(stream) or channels.is_of_family(stream))
             and motion.rests_and_peaks(stream)
         ]
         if len(peaking) == 1:  # several say nothing about which is the load cell
@@ -415,7 +414,7 @@ def _contact_pressure(channels: Channels) -> None:
     for stream in channels.free:
         if stream.width != 1 or not stream.moves or not may_be(CONTACT_PRESSURE, stream):
             continue
-        unit, word = pressure_unit(stream), contact_pressure_word(stream.name)
+        unit, word = pressure_unit(stream), says("contact_pressure", stream.name)
         if unit and (word or find_unit(unit) == find_unit("N/cm2")):
             channels.take(CONTACT_PRESSURE, stream, f"name ({word})" if word else _TOLD_UNIT)
             return
@@ -423,7 +422,7 @@ def _contact_pressure(channels: Channels) -> None:
 
 def force_strength(stream: Stream) -> tuple[float, str]:
     """Return how strongly a stream's name, topic or unit indicates a measured force, and the word."""
-    if is_something_else(stream.name):
+    if what_else(stream.name):
         return 0.0, ""
     strength, word = word_for("force", _full(stream))
     if word == "wrench" and word_for("torque", label(stream))[0]:
@@ -431,7 +430,7 @@ def force_strength(stream: Stream) -> tuple[float, str]:
     if strength:
         return strength, word
     # An effort in N that is not the drive's is a force: `Effort fermeture (N)`.
-    taken = is_twist(label(stream)) or any(
+    taken = says("twist", label(stream)) or any(
         word_for(quantity, label(stream))[0] >= _SPEAKS for quantity in MEASURED if quantity != "torque"
     )
     return (_BY_UNIT, _TOLD_UNIT) if quantity_of_unit(stream) == "force" and not taken else (0.0, "")
@@ -455,35 +454,35 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
         if not is_actual(other.name) and not _says_more(quantity, other) and not _of_two_sides(stream, other)
     ]
     if quantity == "torque":
-        candidates = [other for other in candidates if is_reference(other.name)]
+        candidates = [other for other in candidates if says("reference", other.name)]
     found = _best(candidates, lambda other: motion.likeness(stream, other))
     if found is None:
         return
     correlation, other = found
-    if correlation < (_FOLLOWS_BY_NAME if is_reference(other.name) else _FOLLOWS):
+    if correlation < (_FOLLOWS_BY_NAME if says("reference", other.name) else _FOLLOWS):
         return
     rest = [channels.found[q].stream for q in ("position", "speed", "torque") if q in channels.found and q != quantity]
     if any(motion.likeness(rival, other) > correlation + _CLOSER for rival in rest):
         return
     own, others = word_for(quantity, label(stream)), word_for(quantity, label(other))
     ahead = motion.lead(stream, other)
-    if correlation > _SAME and abs(ahead) < _AHEAD and not is_reference(other.name):
+    if correlation > _SAME and abs(ahead) < _AHEAD and not says("reference", other.name):
         return  # the same sensor in another unit
     if abs(ahead) < _AHEAD:
         smoother = motion.roughness(other) < motion.roughness(stream)
-        alike = own[1] == others[1] or not others[1] or is_reference(other.name)
+        alike = own[1] == others[1] or not others[1] or says("reference", other.name)
         text = "is smoother" if smoother else ""
         ahead = 1.0 if smoother and alike else -1.0 if not smoother and own[1] == others[1] and own[1] else 0.0
     else:
         text = f"is ahead of it by {abs(ahead):.1f} samples"
     if ahead > 0.0:
-        check = "" if is_reference(other.name) else _BY_COURSE
+        check = "" if says("reference", other.name) else _BY_COURSE
         channels.take(name, other, f"follows '{stream.name}' with r = {correlation:.3f} and {text}", check)
     elif (
         ahead < 0.0
         and correlation > _FOLLOWS
         and quantity != "torque"
-        and not is_reference(stream.name)
+        and not says("reference", stream.name)
         and not is_actual(stream.name)
         and others[0] >= own[0] > 0.0
         and not _of_different_parts(stream, other)
@@ -497,13 +496,30 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
 
 def _of_two_sides(one: Stream, other: Stream) -> bool:
     """Whether two names are those of different sides of a gear: `motor_position` and `load_position`."""
-    first, second = side_of_gear(one.name), side_of_gear(other.name)
+    first, second = _sides(one), _sides(other)
     return bool(first) and bool(second) and first != second
+
+
+def _sides(stream: Stream) -> set[str]:
+    """Return the words of a name for a side of a gear: `motor` of `motor_position`."""
+    return {word for word in words(stream.name) if says("gear_side", word)}
+
+
+def _own_words(name: str) -> set[str]:
+    """Return the words of a name that state neither a quantity nor whether it is measured: `hip` of `HipAngle`."""
+    kinds = (*MEASURED, "force", "label", "trigger")
+    return {
+        word
+        for word in words(name)
+        if len(word) > 2
+        and not any(word_for(quantity, word)[0] for quantity in kinds)
+        and not (says("reference", word) or is_actual(word) or says("version", word) or says("gear_side", word))
+    }
 
 
 def _of_different_parts(one: Stream, other: Stream) -> bool:
     """Whether each of two names has a word of its own that states no quantity: `leaf angle` and `handle angle`."""
-    first, second = without_kind(label(one)), without_kind(label(other))
+    first, second = _own_words(label(one)), _own_words(label(other))
     return bool(first - second) and bool(second - first)
 
 
@@ -518,7 +534,7 @@ def _named_for(channels: Channels, quantity: str, reference: bool = False) -> li
     """Return (strength, word, stream) of the free streams whose name best matches a quantity, the strongest first."""
     found = []
     for stream in channels.of_joints():
-        if is_reference(stream.name) != reference:
+        if bool(says("reference", stream.name)) != reference:
             continue
         strength, word = name_strength(quantity, stream)
         if strength:
@@ -534,7 +550,7 @@ def _unnamed_for(channels: Channels, quantity: str) -> list[Stream]:
     return [
         stream
         for stream in channels.of_joints()
-        if may_be(quantity, stream) and not _is_other(quantity, stream) and not is_of_body(stream.name)
+        if may_be(quantity, stream) and not _is_other(quantity, stream) and not says("inertial", stream.name)
     ]
 
 
@@ -546,7 +562,7 @@ def _best(streams: Iterable[Stream], score: Callable[[Stream], float]) -> tuple[
 def _is_other(quantity: str, stream: Stream) -> bool:
     """Whether the name of a stream indicates another quantity, or a load cell."""
     name = label(stream)
-    if is_something_else(stream.name) or _is_sensor_of_force(stream):
+    if what_else(stream.name) or _is_sensor_of_force(stream):
         return True
     if quantity != "force" and word_for("force", name)[0]:
         return True
@@ -556,8 +572,8 @@ def _is_other(quantity: str, stream: Stream) -> bool:
 
 def _is_taken(quantity: str, stream: Stream) -> bool:
     """Whether the name of a stream indicates a quantity other than this one, a force, or no channel."""
-    return _is_other(quantity, stream) or is_reference(stream.name)
+    return _is_other(quantity, stream) or bool(says("reference", stream.name))
 
 
 def _is_sensor_of_force(stream: Stream) -> bool:
-    return is_load_cell(label(stream)) or is_load_cell(stream.topic)
+    return bool(says("load_cell", label(stream)) or says("load_cell", stream.topic))

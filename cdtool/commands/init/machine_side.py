@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.commands.init.names.quantity_words import words
 from cdtool.commands.init.names.units_in_names import factor_of, si_of
+from cdtool.commands.init.names.words import words
 from cdtool.commands.init.speed_ratio import Ratio, motion_kind, rotation_unit, seems_to_turn, stated, whole_numbers
 from cdtool.commands.init.streams import Channels
 from cdtool.commands.init.table_clock import DraftedClock

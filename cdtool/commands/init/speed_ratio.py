@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.commands.init import motion_evidence as motion
-from cdtool.commands.init.names.quantity_words import is_twist, motion_of, words
 from cdtool.commands.init.names.units_in_names import factor_of, label, own_name, si_of, unit_in_name
+from cdtool.commands.init.names.words import motion_of, says
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
 from cdtool.commands.init.table_clock import DraftedClock
@@ -33,8 +33,6 @@ _FAR = 2.5
 _LIMITS = {"m": 30.0, "m/s": 20.0}
 _ROBOT_LIMITS = {"rad": 4.0 * math.pi, "rad/s": 25.0, "m": 30.0, "m/s": 20.0}
 _SI = {"length": "m", "angle": "rad"}
-_RPM = ("n", "rpm", "motor")
-_RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,7 @@ def seems_to_turn(channels: Channels) -> bool:
     if channels.joints > 1 or "torque" not in channels.found:
         return False
     drive = channels.found["torque"].stream
-    if not is_twist(label(drive)) or stated("torque", drive).si == "N":
+    if not says("twist", label(drive)) or stated("torque", drive).si == "N":
         return False
     if any(motion_kind(name, channels) for name in ("position", "speed")):
         return False
@@ -159,10 +157,8 @@ def ratio_of(channels: Channels, clock: DraftedClock | None, messages_si: bool) 
 
 def rotation_unit(stream: Stream) -> str:
     """Return the unit of a speed of rotation, by its name."""
-    parts = words(label(stream))
-    if any(part in _RPM or "drehzahl" in part or "motor" in part for part in parts):
-        return "rpm"
-    return "rad/s" if any(part in _RAD_S for part in parts) else ""
+    name = label(stream)
+    return "rpm" if says("rpm", name) else "rad/s" if says("rad_per_second", name) else ""
 
 
 def whole_numbers(stream: Stream) -> bool:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.commands.init.names.quantity_words import is_clock, is_counter, name_in_group, word_for, words
 from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
+from cdtool.commands.init.names.words import is_counter, name_in_group, says, word_for, words
 from cdtool.formats.channels.clock_guess import GuessedClock, guess_clock
 from cdtool.formats.columns import Column
 from cdtool.formats.source import Source
@@ -125,7 +125,7 @@ def _named(source: Source) -> GuessedClock | None:
         column = source.columns[name]
         known = column.values[np.isfinite(column.values)]
         counts = is_counter(name) or bool(np.mean(np.diff(known) == 1.0) > _BY_ONE) if len(known) > 1 else True
-        plain = all(is_clock(word) for word in words(name))
+        plain = all(says("clock", word) for word in words(name))
         return len(known) < len(column.values), counts, name.isdigit(), not _has_time_unit(column), not plain
 
     for name in sorted(names, key=rank):
@@ -151,7 +151,7 @@ def _is_measured(name: str) -> bool:
 
 def _has_clock_name(name: str) -> bool:
     own = name_in_group(name)
-    return is_clock(own) and not _is_measured(own)
+    return bool(says("clock", own)) and not _is_measured(own)
 
 
 def _has_time_unit(column: Column) -> bool:

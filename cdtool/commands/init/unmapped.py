@@ -8,8 +8,8 @@ import numpy as np
 
 from cdtool.commands.init import motion_evidence as motion
 from cdtool.commands.init.channel_guess import force_strength, name_strength
-from cdtool.commands.init.names.quantity_words import is_clock, is_reference, what_else
 from cdtool.commands.init.names.units_in_names import is_foreign, label
+from cdtool.commands.init.names.words import says, what_else
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
 from cdtool.recordings.recording import MEASURED
@@ -82,7 +82,7 @@ def _next_best(stream: Stream, channels: Channels) -> tuple[str, str]:
         return "", f"its unit is {stream.unit}"
     if not stream.moves:
         return "", "constant"
-    if is_clock(label(stream)) and not any(name_strength(quantity, stream)[0] for quantity in MEASURED):
+    if says("clock", label(stream)) and not any(name_strength(quantity, stream)[0] for quantity in MEASURED):
         return "", "a time, by its name"
     strength, word = force_strength(stream)
     if stream.width == 1 and strength and not name_strength("torque", stream)[0]:
@@ -91,7 +91,7 @@ def _next_best(stream: Stream, channels: Channels) -> tuple[str, str]:
     quantity = max(named, key=lambda name: named[name][0])
     strength, word = named[quantity]
     if strength:
-        set_value = is_reference(stream.name)
+        set_value = says("reference", stream.name)
         if set_value and quantity not in _REFERENCED:
             return "", f"a set value of the {quantity}, by its name"
         return (f"reference_{quantity}" if set_value else quantity), word if word == "its unit" else f"name ({word})"

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from cdtool.commands.init.names import lexicon
-from cdtool.commands.init.names.quantity_words import is_actual, is_reference, is_something_else, word_for, words
 from cdtool.commands.init.names.units_in_names import unit_in_name
+from cdtool.commands.init.names.words import is_actual, says, what_else, word_for, words
 from cdtool.formats.column_names import split_unit
 
 # Words and what is between them; a word in mixed case consists of several: `LeftHipAngle`.
@@ -124,10 +123,10 @@ def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
     quantities = {
         quantity for before, after in keys for quantity in _QUANTITIES if _indicates(quantity, f"{before} {after}")
     }
-    if {slot.lower() for slot in slots} <= set(lexicon.AXES) and "torque" not in quantities:
+    if all(says("space", slot) and len(words(slot)) == 1 for slot in slots) and "torque" not in quantities:
         return False
     # Of one quantity alone only names of joints are sure.
-    known = all(word in lexicon.LIMBS for core in _cores(slots) for word in words(core))
+    known = all(says("limb", word) for core in _cores(slots) for word in words(core))
     return len(quantities) >= 2 or (len(quantities) == 1 and known)
 
 
@@ -136,7 +135,7 @@ def _indicates(quantity: str, name: str) -> bool:
 
     A letter must stand alone: `hip.q`.
     """
-    if is_something_else(name):
+    if what_else(name):
         return False
     strengths = {item: word_for(item, name)[0] for item in _QUANTITIES}
     if any(strengths.values()):
@@ -147,8 +146,8 @@ def _indicates(quantity: str, name: str) -> bool:
 def _is_taken(slot: str) -> bool:
     """Whether a part of a name is a quantity, a set value, or a side of the gear rather than a joint."""
     parts = words(slot)
-    if parts and all(part in lexicon.SIDES for part in parts):
+    if parts and all(says("version", part) or says("gear_side", part) for part in parts):
         return True
-    if is_reference(slot) or is_actual(slot) or is_something_else(slot):
+    if says("reference", slot) or is_actual(slot) or what_else(slot):
         return True
     return any(word_for(quantity, slot)[0] >= 2.0 for quantity in (*_QUANTITIES, "acceleration", "force", "label"))

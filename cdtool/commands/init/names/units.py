@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.commands.init.machine_side import Side
-from cdtool.commands.init.names import lexicon
-from cdtool.commands.init.names.quantity_words import is_current, word_for, words
 from cdtool.commands.init.names.units_in_names import label
+from cdtool.commands.init.names.words import is_current, says, word_for
 from cdtool.commands.init.speed_ratio import Ratio, implausible, motion_kind, rotation_unit, stated, whole_numbers
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
@@ -210,11 +209,8 @@ def _of_torque(stream: Stream, accepted: tuple[str, ...], joints: int) -> Logged
         return _raw("A", accepted[0], joints, "its name")
     strength, word = word_for("torque", name)
     if strength > 1.0 and word not in ("pwm", "duty"):
-        whole = "".join(words(name))
         unit = (
-            accepted[-1]
-            if word == "drive force" or any(force in whole for force in lexicon.FORCES[:-1])
-            else accepted[0]
+            accepted[-1] if word == "drive force" or says("force_of_drive", name) not in ("", "effort") else accepted[0]
         )
         return Logged(unit, "its name", check=f"{_reach(stream)}: {others(unit)}?")
     return _raw("1", accepted[0], joints, "")

@@ -6,8 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from cdtool.commands.init.names import lexicon
-from cdtool.commands.init.names.quantity_words import is_clock, motion_of, word_for, words
+from cdtool.commands.init.names.words import motion_of, says, word_for, words
 from cdtool.formats.column_names import split_unit
 from cdtool.recordings.recording import CONTACT_PRESSURE, MEASURED
 from cdtool.recordings.units import find_unit
@@ -84,7 +83,7 @@ def label(stream: Stream) -> str:
     rest, tail, unit = _split(name)
     if not rest or not unit:
         return name
-    asked = [quantity for quantity in _QUANTITIES if word_for(quantity, rest)[0]] + ["time"] * is_clock(rest)
+    asked = [quantity for quantity in _QUANTITIES if word_for(quantity, rest)[0]] + ["time"] * bool(says("clock", rest))
     if any(unit_in_name(quantity, name) for quantity in asked) or (not asked and _stands_for_itself(rest, tail)):
         return rest
     return name
@@ -98,10 +97,9 @@ def unit_in_name(quantity: str, name: str) -> str:
     rest, _, unit = _split(name)
     if not unit or not _measures(quantity, unit):
         return ""
-    whole = "".join(words(rest))
-    if unit == "m" and (motion_of(rest) == "angle" or words(rest)[-1:] == ["q"]):
+    if unit == "m" and (motion_of(rest) == "angle" or words(rest)[-1:] == ("q",)):
         return ""
-    if unit == "N" and quantity == "torque" and not any(word in whole for word in lexicon.FORCES):
+    if unit == "N" and quantity == "torque" and not says("force_of_drive", rest):
         return ""
     if unit == "kgf" and quantity != "force":
         return ""
