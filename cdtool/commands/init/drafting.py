@@ -395,9 +395,7 @@ def _clock(clock: DraftedClock | None, ratio: Ratio | None, check: str) -> Clock
         if ratio.tick:
             text = f"counts, not a time: the rate is correct if position and speed are in {pair}"
             return Clock(name, why=f"{why}; rate: with {pair}", check=text, rate=1.0 / ratio.tick)
-        also = (
-            f"; {fits_as_well(ratio, clock_told=False)} as well" if ratio.fitting[1:] else "; no other fits the ratio"
-        )
+        also = f"; {fits_as_well(ratio, clock_told=False) or 'no other fits the ratio'}"
         why += f"; unit: steps of {clock.step:.4g} {first.clock}, with {pair}"
         return Clock(name, first.clock, why, f"the unit is not stated{also}")
     if clock.counts:

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.init.names.joint_names import families_by_name
-from cdtool.commands.init.stream import Stream
+from cdtool.commands.init.names.joint_names import MOST_JOINTS, families_by_name
+from cdtool.commands.init.stream import Stream, joined
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recordings.clock.lower_rate import sampled_rows
 
 _NUMBER = re.compile(r"\d+")
 _MOST = 1e100
-# `position[:]` with more elements than this is not a list of joints.
-_MOST_JOINTS = 64
 # Numbers with gaps are joints if at least so many families have the same.
 _SHARED = 3
 
@@ -126,7 +124,7 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
         first = next(iter(parts.values())).time
         alike = all(stream.time is first or np.array_equal(stream.time, first) for stream in parts.values())
         if (
-            2 <= len(numbers) <= _MOST_JOINTS
+            2 <= len(numbers) <= MOST_JOINTS
             and numbers[0] in (0, 1)
             and (
                 numbers == list(range(numbers[0], numbers[0] + len(numbers)))
@@ -146,10 +144,3 @@ def _named_families(singles: Mapping[str, Stream]) -> list[Stream]:
         for template, (joints, names) in found.items()
         if len({len(singles[name].time) for name in names}) == 1
     ]
-
-
-def joined(streams: list[Stream], name: str, joints: tuple[str, ...] = ()) -> Stream:
-    """Join streams of one column each, on one clock, to one of several columns."""
-    values = np.hstack([stream.values for stream in streams])
-    columns = tuple(stream.columns[0] for stream in streams)
-    return Stream(name, columns, streams[0].unit, streams[0].time, values, joints=joints)

@@ -18,9 +18,12 @@ _TABLES: Mapping[str, Mapping[str, list[str]]] = tomllib.loads(
 _LISTS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     table: {name: tuple(" ".join(lines).split()) for name, lines in part.items()} for table, part in _TABLES.items()
 }
+#: How strongly a word indicates a quantity: one that is enough anywhere, one that is bound to ends of words, a letter.
 _ANYWHERE, BOUND, _LETTER = 3.0, 2.0, 1.0
+QUANTITIES = ("torque", "speed", "position", "acceleration", "force")
 _PRESENT = ("current", "curr", "cur")
 _OF_EFFORTS = "an external or modelled effort"
+_TIME = "a time"
 _SPLIT = re.compile(r"[\W\d_]+")
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 # The last part of a path in quotes, as TDMS files have.
@@ -77,7 +80,7 @@ def what_else(name: str) -> str:
         and says("clock", channel)
         and not any(word_for(item, channel)[0] for item in _LISTS["quantity"])
     ):
-        return "a time"
+        return _TIME
     is_effort = any(word_for(quantity, name)[0] for quantity in ("torque", "force"))
     return next(
         (
