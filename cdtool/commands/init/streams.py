@@ -91,6 +91,11 @@ def streams_of(source: Source, table_time: FloatArray | None, clock: str | None,
     return [*_families(singles), *_named_families(singles), *singles.values()]
 
 
+def column_key(name: str) -> str | int:
+    """Return the name of a column, or its number in a table without a header."""
+    return int(name) if name.isdigit() else name
+
+
 def _of_topic(name: str, source: Source) -> Stream:
     column = source.columns[name]
     topic, _, field = name.partition(" ")
