@@ -160,7 +160,7 @@ def _best_pair(positions: list[Named], speeds: list[Named]) -> tuple[Named, Name
 
     def score(pair: tuple[Named, Named, float]) -> tuple[bool, float]:
         position, speed, correlation = pair
-        found = position.strength + speed.strength + _alike(position, speed)
+        found = position.strength + speed.strength
         found += is_actual(position.stream.name) + is_actual(speed.stream.name)
         if abs(correlation) > _FITS:  # of opposite sign if one of them is reversed
             found += _PHYSICS - 0.5 * (motion.integral_lead(position.stream, speed.stream) > motion.AHEAD)
@@ -169,15 +169,6 @@ def _best_pair(positions: list[Named], speeds: list[Named]) -> tuple[Named, Name
         return id(position.stream) not in derived, found
 
     return max(pairs, key=score, default=None)
-
-
-def _alike(one: Named, other: Named) -> float:
-    """Return the share of words that two names have in common, apart from the words for their quantities."""
-    first, second = (
-        {word for word in words(item.stream.name) if word not in item.word and item.word not in word}
-        for item in (one, other)
-    )
-    return len(first & second) / len(first | second) if first | second else 1.0
 
 
 def _take(channels: Channels, quantity: str, chosen: Named, rivals: Iterable[Named]) -> None:
@@ -213,8 +204,7 @@ def _drive(channels: Channels) -> None:
 
     def score(item: Named) -> float:
         physics = shares[id(item.stream)]
-        alike = max((_alike(item, Named(0.0, "", stream)) for stream in found.values()), default=0.0)
-        names = item.strength + alike + is_actual(item.stream.name) - 0.6 * is_current(label(item.stream))
+        names = item.strength + is_actual(item.stream.name) - 0.6 * is_current(label(item.stream))
         return names + _PHYSICS * (physics > _DRIVES_BY_LETTER) + physics
 
     if known:
