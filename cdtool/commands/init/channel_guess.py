@@ -26,8 +26,8 @@ from cdtool.recordings.units import find_unit
 
 # Above this correlation one column is treated as another's derivative; above the second one without any name.
 _FITS, _FITS_UNNAMED = 0.9, 0.98
-# Minimum share of a drive column's variance that inertia and friction explain; and of one whose name is a letter.
-_DRIVES, _DRIVES_BY_LETTER = 0.6, 0.3
+# Minimum share of a column's variance that inertia and friction explain if it has no name.
+_DRIVES = 0.6
 # The derivative of the speed, in its units, has this deviation from a slope of 1.
 _EQUAL = 0.02
 # From this number of joints on related blocks are better evidence than the circle of a tool.
@@ -35,8 +35,6 @@ _ROBOT = 3
 _MOST_PAIRS = 32
 # Above these correlations one stream is treated as another's set value; the second if its name agrees.
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
-# A set value that resembles another channel by this much more is not that of this one.
-_CLOSER = 0.2
 BY_VALUES = "guessed from its values only"
 # Below this correlation a letter alone (`a`, `s`, `n`) is no name of what the physics denies.
 _DENIES = 0.5
@@ -199,13 +197,9 @@ def _drive(channels: Channels) -> None:
     def share(item: Named) -> float:
         return motion.drive_fit(item.stream, rate, position) if rate is not None else 1.0
 
-    shares = {id(item.stream): share(item) for item in known}
-    known = [item for item in known if item.strength >= BOUND or shares[id(item.stream)] > _DRIVES_BY_LETTER]
-
     def score(item: Named) -> float:
-        physics = shares[id(item.stream)]
         names = item.strength + is_actual(item.stream.name) - 0.6 * is_current(label(item.stream))
-        return names + _PHYSICS * (physics > _DRIVES_BY_LETTER) + physics
+        return names + _PHYSICS * share(item)
 
     if known:
         _take(channels, "torque", max(known, key=score), known)
@@ -278,9 +272,7 @@ def _follower(channels: Channels, quantity: str, measured: Found) -> None:
     ]
     correlation, other = max(candidates, key=lambda item: item[0], default=(0.0, stream))
     is_set = bool(says("reference", other.name))
-    rivals = [channels.found[item].stream for item in _REFERENCED if item in channels.found and item != quantity]
-    closer = any(motion.likeness(rival, other) > correlation + _CLOSER for rival in rivals)
-    if closer or not (correlation > _FOLLOWS_BY_NAME if is_set else motion.same_values(stream, other)):
+    if not (correlation > _FOLLOWS_BY_NAME if is_set else motion.same_values(stream, other)):
         return
     own, its = word_for(quantity, label(stream))[1], word_for(quantity, label(other))[1]
     ahead, text = motion.order(stream, other)

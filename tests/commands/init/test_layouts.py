@@ -12,7 +12,7 @@ from cdtool.commands.init.drafting import init
 from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.machine_file import read_machine_file
 from tests.commands.init.drafts import write
-from tests.commands.init.layouts import LAYOUTS, SEALED, Layout, Truth
+from tests.commands.init.layouts import LAYOUTS, SEALED, VENDORS, Layout, Truth
 from tests.commands.init.layouts.score import score
 from tests.commands.init.layouts.variants import is_table, without_each_channel, without_names
 
@@ -21,7 +21,7 @@ REFUSED = {
     "ericc-lacet": "numbers above the rows have another decimal mark",
     "arduino-oscillator-sd": "the last name contains separators: ten names above eight cells",
 }
-SETS = {"public": LAYOUTS, **SEALED}
+SETS = {"public": LAYOUTS, "vendors": VENDORS, **SEALED}
 TABLES = [layout for layout in LAYOUTS if layout.name not in REFUSED and is_table(layout)]
 # Few small ones, for tests that run with every change.
 QUICK = [layout for layout in LAYOUTS if layout.name in ("german gate", "chinese servo", "odrive", "lift door")]

@@ -62,4 +62,6 @@ def read_layouts(name: str) -> tuple[Layout, ...]:
 
 
 LAYOUTS = read_layouts("public")
+#: By the author of the guesser after it was done, from public conventions of other makers.
+VENDORS = read_layouts("vendors")
 SEALED = {name: read_layouts(name) for name in ("sealed_1", "sealed_2", "sealed_3", "sealed_4")}

@@ -14,7 +14,7 @@ from tests.commands.init.layouts.score import Score, score
 def main(files: Sequence[str]) -> int:
     """Score the layouts of the TOML files with these names, as `public` and `sealed_4`; of all without one."""
     with TemporaryDirectory() as folder:
-        layouts = [layout for file in files or ("public", *SEALED) for layout in read_layouts(file)]
+        layouts = [layout for file in files or ("public", "vendors", *SEALED) for layout in read_layouts(file)]
         scores = [score(layout, Path(folder)) for layout in layouts]
     for item in scores:
         _show(item)
