@@ -36,18 +36,16 @@ class Found:
 class Channels:
     """The channels found so far, of a machine with `joints` joints, and the streams that are still free.
 
-    `streams` are all that the log contains; `families` are the columns that belong together.
+    `streams` are all that the log contains.
     """
 
     joints: int
     free: list[Stream]
     found: dict[str, Found] = dataclasses.field(default_factory=dict)
-    families: tuple[frozenset[str], ...] = dataclasses.field(init=False)
     streams: tuple[Stream, ...] = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
         self.streams = tuple(self.free)
-        self.families = tuple(frozenset(stream.columns) for stream in self.free if len(stream.columns) > 1)
 
     def take(self, channel: str, stream: Stream, why: str, check: str = "") -> None:
         """Record a guess; streams that share a column with it are no longer free."""
@@ -63,7 +61,8 @@ class Channels:
 
     def is_of_family(self, stream: Stream) -> bool:
         """Whether a single column belongs to a family of columns, free or not."""
-        return any(stream.columns[0] in members for members in self.families) if stream.columns else False
+        families = [other.columns for other in self.streams if len(other.columns) > 1]
+        return any(set(stream.columns) & set(family) for family in families)
 
     def of_joints(self) -> list[Stream]:
         """Return the free streams with one column per joint whose values change."""
