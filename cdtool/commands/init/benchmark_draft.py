@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from cdtool.base.errors import CdtoolError, RecordingError
 from cdtool.base.log_names import log_stem, log_suffix
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import relative_name
+from cdtool.commands.init.draft_text import toml
 from cdtool.commands.judging.runs import read_named
 from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.commands.judging.true_contacts import any_contacts
@@ -98,6 +98,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
     (True, ())
     """
     known: list[_Log] = []
+    named_free: list[Path] = []
     skipped: list[Skipped] = []
     first: Recording | None = None
     for path in logs:
@@ -107,23 +108,24 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
             skipped.append(Skipped(str(path), str(fault).removeprefix(f"{path}: ")))
             continue
         first = first or recording
-        known.append(_Log(path, _contacts(recording), _noise(recording)))
+        shows = any(channel in recording for channel in SHOWS_CONTACTS)
+        contacts = len(any_contacts(recording, ScoringRules())) if shows else None
+        if contacts is None and any(_FREE.search(name) for name in (log_stem(path), path.resolve().parent.name)):
+            named_free.append(path)  # without ground truth, its name is what shows that a log has no impact
+        known.append(_Log(path, 0 if path in named_free else contacts, _noise(recording)))
     if first is None:
         raise RecordingError(f"none of {counted(len(logs), 'log')} can be read; first reason: {skipped[0].reason}")
-    # Without ground truth, its name is what shows that a log has no impact.
-    named_free = [log for log in known if log.contacts is None and _is_named_free(log.path)]
-    known = [replace(log, contacts=0) if log in named_free else log for log in known]
-    impacts = [log for log in known if log.contacts]
-    free = [log for log in known if log.contacts == 0]
+    impacts = [log.path for log in known if log.contacts]
+    free = [log.path for log in known if log.contacts == 0]
     usable, others = _detectors(first, machine_file)
-    unknown = [log for log in known if log.contacts is None]
+    unknown = [log.path for log in known if log.contacts is None]
     beside: dict[str, str] = {}
     if not impacts and unknown:
         impacts, unknown = unknown, []
         beside["labels.csv"] = _label_file([*impacts, *named_free], folder)
     lines = [
         f"# Draft by cdtool init from {counted(len(known), 'log')}: check each line marked CHECK.",
-        f"machine = {json.dumps(relative_name(machine_file.path, folder), ensure_ascii=False)}",
+        f"machine = {toml(relative_name(machine_file.path, folder))}",
         f"detectors = {_listed(usable)}" + ("" if usable or others else _FORCE_ONLY),
         *([f"# With inertia and friction in the machine file also: {', '.join(others)}"] if others else []),
         *(_learning(impacts, free, folder, _is_plausible_travel(first)) if usable or others else []),
@@ -133,17 +135,6 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         *(["", f"# CHECK: {counted(len(named_free), 'log')} impact-free by their names"] if named_free else []),
     ]
     return BenchmarkDraft("\n".join(lines) + "\n", beside, tuple(skipped), bool(usable))
-
-
-def _is_named_free(log: Path) -> bool:
-    """Return whether the name of a log or of its folder says that it has no impact, as ohne_kontakt."""
-    return any(_FREE.search(name) for name in (log_stem(log), log.resolve().parent.name))
-
-
-def _contacts(recording: Recording) -> int | None:
-    if not any(channel in recording for channel in SHOWS_CONTACTS):
-        return None
-    return len(any_contacts(recording, ScoringRules()))
 
 
 def _noise(recording: Recording) -> float:
@@ -179,15 +170,15 @@ def _is_plausible_travel(recording: Recording) -> bool:
     return len(known) > 0 and float(np.ptp(known)) < MOST_PLACES * Signature.position_step
 
 
-def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_position: bool) -> list[str]:
+def _learning(impacts: Sequence[Path], free: Sequence[Path], folder: Path, by_position: bool) -> list[str]:
     """Return how limits are learned: from impact-free logs, from what is before the contacts, or run by run."""
     if len(free) >= ENOUGH_RUNS:
         enough = len(free) - len(free) // _HOLDOUT >= ENOUGH_RUNS
         held = free[_HOLDOUT - 1 :: _HOLDOUT] if enough else []
         learned = [log for log in free if log not in held]
         lines = [] if by_position else ['threshold = "limit"  # without a plausible position']
-        lines += ["", "[learn]", f"logs = {_paths(learned, folder)}"]
-        return [*lines, "", "[holdout]", f"logs = {_paths(held, folder)}"] if held else lines
+        lines += ["", "[learn]", f"logs = {_listed(patterns(learned, folder))}"]
+        return [*lines, "", "[holdout]", f"logs = {_listed(patterns(held, folder))}"] if held else lines
     why = f"# {counted(len(free), 'impact-free log')}: a signature needs {ENOUGH_RUNS}."
     both = [*free, *impacts]
     if len(both) >= _ENOUGH_IMPACTS:
@@ -201,38 +192,33 @@ def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_po
             "[learn]",
             'until = "onset"',
             '# from = "0.5s"  # without the beginning of each log, here and in each group of impacts',
-            f"logs = {_paths(both, folder)}",
+            f"logs = {_listed(patterns(both, folder))}",
         ]
     return [f"{why} Limits are those of each run's own first seconds in motion.", 'threshold = "baseline"']
 
 
-def _groups(impacts: Sequence[_Log], folder: Path) -> list[str]:
+def _groups(impacts: Sequence[Path], folder: Path) -> list[str]:
     """Return the groups of impacts: by folder, or in a single folder by the names of the files."""
-    folders = {log.path.parent for log in impacts}
+    folders = {log.parent for log in impacts}
     by_folder = 1 < len(folders) < len(impacts)
-    groups: dict[str, list[_Log]] = {}
+    groups: dict[str, list[Path]] = {}
     for log in impacts:
-        place = log.path.resolve().parent.name
+        parent = log.resolve().parent
         if len(folders) == len(impacts) > 1:  # a folder for each log: their names, or else the folder around them
-            place = _NUMBER.sub("", place) or log.path.resolve().parent.parent.name
-            groups.setdefault(re.sub(r"\W+", "_", place).strip("_") or "impacts", []).append(log)
-            continue
-        name = place if by_folder else _NUMBER.sub("", log_stem(log.path)) or place
+            name = _NUMBER.sub("", parent.name) or parent.parent.name
+        else:
+            name = parent.name if by_folder else _NUMBER.sub("", log_stem(log)) or parent.name
         groups.setdefault(re.sub(r"\W+", "_", name).strip("_") or "impacts", []).append(log)
     lines = []
     for name, members in groups.items():
-        safe = name if name != "holdout" else "holdout_impacts"
+        name = "holdout_impacts" if name == "holdout" else name
+        key = name if _BARE_KEY.fullmatch(name) else toml(name)
         lines += [
             "",
-            f"[impacts.{_key(safe)}]  # CHECK: one obstacle and one speed per group",
-            f"logs = {_paths(members, folder)}",
+            f"[impacts.{key}]  # CHECK: one obstacle and one speed per group",
+            f"logs = {_listed(patterns(members, folder))}",
         ]
     return lines
-
-
-def _key(name: str) -> str:
-    """Return a name as a key of a TOML file: with a letter such as "ü" it is quoted."""
-    return name if _BARE_KEY.fullmatch(name) else json.dumps(name, ensure_ascii=False)
 
 
 def _onset(known: Sequence[_Log], beside: Mapping[str, str]) -> list[str]:
@@ -249,22 +235,17 @@ def _onset(known: Sequence[_Log], beside: Mapping[str, str]) -> list[str]:
     return ["", "[onset]", f"above_n = {rounded}  # {why}; CHECK: below the force that counts as a contact"]
 
 
-def _comments(unknown: Sequence[_Log], folder: Path) -> list[str]:
+def _comments(unknown: Sequence[Path], folder: Path) -> list[str]:
     if not unknown:
         return []
     return ["", "# Not used: without load cell, label or event it is unknown whether they contain an impact:"] + [
-        f"#   {relative_name(log.path, folder)}" for log in unknown
+        f"#   {relative_name(log, folder)}" for log in unknown
     ]
 
 
-def _label_file(logs: Sequence[_Log], folder: Path) -> str:
-    rows = [f"{relative_name(log.path, folder)},,," for log in logs]
+def _label_file(logs: Sequence[Path], folder: Path) -> str:
+    rows = [f"{relative_name(log, folder)},,," for log in logs]
     return "\n".join(["recording,start_s,end_s,uncertainty_s", *rows]) + "\n"
-
-
-def _paths(logs: Sequence[_Log], folder: Path) -> str:
-    """Return a TOML array of the logs' patterns."""
-    return _listed(patterns([log.path for log in logs], folder))
 
 
 def patterns(logs: Sequence[Path], folder: Path) -> list[str]:
@@ -302,8 +283,7 @@ def patterns(logs: Sequence[Path], folder: Path) -> list[str]:
     return found
 
 
-def _listed(texts: Iterable[str]) -> str:
+def _listed(texts: Sequence[str]) -> str:
     """Return a TOML array; one entry per line if it is long."""
-    quoted = [json.dumps(text, ensure_ascii=False) for text in texts]
-    line = f"[{', '.join(quoted)}]"
-    return line if len(line) < 100 else "[\n" + "".join(f"    {text},\n" for text in quoted) + "]"
+    line = toml(list(texts))
+    return line if len(line) < 100 else "[\n" + "".join(f"    {toml(text)},\n" for text in texts) + "]"

@@ -9,7 +9,6 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.init.stream import Stream
-from cdtool.commands.init.streams import Channels
 
 # The default of the machine file [Hz], and the lowest corner that is proposed.
 _DEFAULT, _LOWEST = 50.0, 1.0
@@ -27,74 +26,49 @@ class LowPassGuess:
     why: str
 
 
-def propose_low_pass(channels: Channels, in_seconds: float) -> LowPassGuess | None:
-    """Return a low-pass for the derived speed; None if a speed is logged or the default suffices.
+def propose_low_pass(position: Stream, in_seconds: float) -> LowPassGuess | None:
+    """Return a low-pass for the derived speed; None if the default suffices.
 
     White noise of the position with deviation s, sampled with period T, has after differentiation and an ideal low-pass
-    at f the deviation s sqrt(8 pi^2 T f^3 / 3): f is where this is 1 % of the largest speed.
+    at f the deviation s sqrt(8 pi^2 T f^3 / 3): f is where this is 1 % of the largest speed. The noise is that of the
+    position's resolution, and of the stamps' jitter at the usual speed.
 
     Parameters
     ----------
-    channels : Channels
-        The channels found.
+    position : Stream
+        The position.
     in_seconds : float
-        Unit of the streams' times [s]; 0 without a clock.
+        Unit of its times [s].
     """
-    if "speed" in channels.found or "position" not in channels.found or in_seconds <= 0.0:
-        return None
-    stream = channels.found["position"].stream
-    time = stream.time * in_seconds
+    time = position.time * in_seconds
     steps = np.diff(time)
     period = float(np.median(steps)) if len(steps) > 10 else 0.0
     if period <= 0.0:
         return None
-    corners = [
-        corner for column in stream.values.T if (corner := _corner(time, column, _jitter(steps, period), period))
-    ]
-    if not corners:
-        return None
-    lowest = min(min(corners), _OF_RATE / period)
+    usual = steps[np.abs(steps - period) < period]  # without gaps
+    jitter = float(np.std(usual)) / math.sqrt(2.0) if len(usual) > 2 else 0.0
+    resolutions, lowest = [0.0], _OF_RATE / period
+    for column in position.values.T:
+        known = np.isfinite(column)
+        x, t = column[known], time[known]
+        span = max(1, len(x) // 200)
+        rates = (x[span:] - x[:-span]) / (t[span:] - t[:-span]) if len(x) >= 20 else np.zeros(1)
+        resolutions.append(_resolution(x))
+        noise = math.hypot(resolutions[-1] / math.sqrt(12.0), float(np.sqrt(np.mean(rates**2))) * jitter)
+        if noise and rates.any():
+            top = float(np.max(np.abs(rates)))
+            lowest = min(lowest, (3.0 * (_NOISE * top / noise) ** 2 / (8.0 * math.pi**2 * period)) ** (1.0 / 3.0))
     if lowest >= _DEFAULT:
         return None
-    rounded = max(_LOWEST, float(f"{lowest:.2g}"))
-    resolution = _resolution(stream)
-    text = f"the speed is derived from positions in steps of {resolution:.3g}, every {1e3 * period:.3g} ms"
-    jitter = _jitter(steps, period)
+    text = f"the speed is derived from positions in steps of {max(resolutions):.3g}, every {1e3 * period:.3g} ms"
     if jitter > 0.02 * period:
         text += f" with a jitter of {1e3 * jitter:.2g} ms"
-    return LowPassGuess(
-        rounded, f"{text}: up to this frequency its noise is below {100 * _NOISE:g} % of its largest value"
-    )
+    why = f"{text}: up to this frequency its noise is below {100 * _NOISE:g} % of its largest value"
+    return LowPassGuess(max(_LOWEST, float(f"{lowest:.2g}")), why)
 
 
-def _jitter(steps: FloatArray, period: float) -> float:
-    """Return the deviation of a stamp [s], without gaps."""
-    usual = steps[np.abs(steps - period) < period]
-    return float(np.std(usual)) / math.sqrt(2.0) if len(usual) > 2 else 0.0
-
-
-def _corner(time: FloatArray, position: FloatArray, jitter: float, period: float) -> float:
-    known = np.isfinite(position)
-    if np.count_nonzero(known) < 20:
-        return 0.0
-    x, t = position[known], time[known]
-    span = max(1, len(x) // 200)
-    rates = (x[span:] - x[:-span]) / (t[span:] - t[:-span])
-    top, usual = float(np.max(np.abs(rates))), float(np.sqrt(np.mean(rates**2)))
-    if not top > 0.0:
-        return 0.0
-    noise = math.hypot(_step(x) / math.sqrt(12.0), usual * jitter)
-    if noise == 0.0:
-        return 0.0
-    return float((3.0 * (_NOISE * top) ** 2 / (8.0 * math.pi**2 * period * noise**2)) ** (1.0 / 3.0))
-
-
-def _step(values: FloatArray) -> float:
-    """Return the resolution of values: the smallest step between them, above rounding errors."""
+def _resolution(values: FloatArray) -> float:
+    """Return the smallest step between values, above rounding errors."""
     steps = np.abs(np.diff(values))
-    steps = steps[steps > 1e-9 * float(np.max(np.abs(values)))]
+    steps = steps[steps > 1e-9 * np.max(np.abs(values), initial=0.0)]
     return float(np.min(steps)) if len(steps) else 0.0
-
-
-def _resolution(stream: Stream) -> float:
-    return max(_step(column[np.isfinite(column)]) for column in stream.values.T if np.isfinite(column).any())

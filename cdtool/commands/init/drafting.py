@@ -17,14 +17,14 @@ from cdtool.base.remote.remote_path import location
 from cdtool.base.settings import Place
 from cdtool.commands.init.benchmark_draft import draft_benchmark
 from cdtool.commands.init.channel_guess import guess_channels
+from cdtool.commands.init.clock_draft import Clock, draft_clock
 from cdtool.commands.init.derived_speed import propose_low_pass
-from cdtool.commands.init.draft_text import Clock, Draft, UnreadWord, draft_text
+from cdtool.commands.init.draft_text import Draft, UnreadWord, draft_text
 from cdtool.commands.init.machine_side import side_of
-from cdtool.commands.init.names.units import Evidence, fits_as_well, is_si
-from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
-from cdtool.commands.init.speed_ratio import Ratio, ratio_of
+from cdtool.commands.init.names.units import Evidence, is_si
+from cdtool.commands.init.speed_ratio import ratio_of
 from cdtool.commands.init.streams import Channels, streams_of
-from cdtool.commands.init.table_clock import DraftedClock, split_stamp, table_clock
+from cdtool.commands.init.table_clock import split_stamp, table_clock
 from cdtool.commands.init.unmapped import Unmapped, unmapped_columns
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.information import info
@@ -42,8 +42,6 @@ from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.truth.force_vector import with_scalar_force
 from cdtool.truth.onset import OnsetRule
 
-# Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
-_SLOWEST = 2.0
 # Contradictions that a change of sign cures, and those of a channel that is another quantity.
 _REVERSED, _ANOTHER = ("friction", "sign"), ("place", "course", "still", "joints", "other joint")
 # So many words in columns of numbers may stand for missing values.
@@ -326,14 +324,20 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     ratio = ratio_of(channels, clock, messages_si) if topics or own or clock is not None else None
     unit = ratio.fitting[0].clock if ratio is not None and ratio.fitting else clock.unit if clock is not None else ""
     side = side_of(channels, ratio, clock, messages_si)
-    joints, why = _joints(path, channels, topics)
-    doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
-    assumed = next((item.sentence for item in source.findings if item.kind == "clock_unit_assumed"), "")
-    time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
-    if stamp and time.column == stamp[0]:
-        time = replace(time, why="seconds and nanoseconds of one stamp, by their names", nanoseconds=stamp[1])
+    if own or topics:
+        assumed = next((item.sentence for item in source.findings if item.kind == "clock_unit_assumed"), "")
+        time = Clock({"column": "time", "unit": "s"}, "the file's own clock", assumed, 1.0)
+    else:
+        time = draft_clock(channels, clock, ratio, side.gear is not None)
+    if stamp and time.keys.get("column") == stamp[0]:
+        keys = {**time.keys, "nanoseconds": stamp[1]}
+        time = replace(time, keys=keys, why="seconds and nanoseconds of one stamp, by their names")
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
-    left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
+    position = channels.found.get("position")
+    derived = position is not None and "speed" not in channels.found
+    low_pass = propose_low_pass(position.stream, time.in_seconds) if position is not None and derived else None
+    joints, why = _joints(path, channels, topics)
+    left = unmapped_columns(channels)
     return Draft(
         log_stem(log), log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words
     )
@@ -349,17 +353,6 @@ def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:
     return tuple(found.values())
 
 
-def _in_seconds(time: Clock, clock: DraftedClock | None, own: bool) -> float:
-    """Return the unit [s] of the streams' times as the draft has it; 0 if its clock is only a placeholder."""
-    if own:
-        return 1.0
-    if clock is None or time.column is None:
-        return 0.0
-    if time.rate is not None:
-        return 0.0 if clock.counts and "placeholder" in time.check else 1.0 / (time.rate * clock.assumed)
-    return factor_of(time.unit) / clock.assumed
-
-
 def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ...], str]:
     if channels.joints == 1:
         return ("axis",), ""
@@ -372,45 +365,3 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
     if len(named) == channels.joints:
         return named, "names from the columns"
     return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
-
-
-def _doubt(channels: Channels, clock: DraftedClock | None, ratio: Ratio | None) -> str:
-    """Return the doubt about a clock's unit that is only written: another fits the ratio, or the rate is too low."""
-    if clock is None or not clock.written:
-        return ""
-    rate = 1.0 / (clock.step * factor_of(clock.unit))
-    slow = f"steps of {clock.step:.4g} {clock.unit} are {rate:.3g} Hz" if rate < _SLOWEST else ""
-    if ratio is None or ratio.fitting:
-        return slow
-    other = ratio_of(channels, replace(clock, told=""), messages_si=False)
-    if other is None or not other.fitting or other.tick:
-        return slow
-    first = other.fitting[0]
-    return f"{first.clock} with {first.position}, {first.speed} fits the ratio, {clock.unit} does not"
-
-
-def _clock(clock: DraftedClock | None, ratio: Ratio | None, check: str) -> Clock:
-    if clock is None:
-        return Clock(why="no column looks like a clock: give the rate, or a column with its unit")
-    name: str | int = int(clock.column) if clock.column.isdigit() else clock.column
-    if clock.told:
-        return Clock(name, clock.unit, clock.told, check)
-    why = "its name or its steps"
-    if (named := unit_in_name("time", clock.column)) and not clock.counts:
-        why += f", although its name ends with {named}"
-    if ratio is not None and ratio.fitting:
-        first = ratio.fitting[0]
-        pair = f"{first.position} and {first.speed}"
-        if ratio.tick:
-            text = f"counts, not a time: the rate is correct if position and speed are in {pair}"
-            return Clock(name, why=f"{why}; rate: with {pair}", check=text, rate=1.0 / ratio.tick)
-        also = (
-            f"; {fits_as_well(ratio, clock_told=False)} as well" if ratio.fitting[1:] else "; no other fits the ratio"
-        )
-        why += f"; unit: steps of {clock.step:.4g} {first.clock}, with {pair}"
-        return Clock(name, first.clock, why, f"the unit is not stated{also}")
-    if clock.counts:
-        text = "counts, not a time: 1000 steps per second is a placeholder; give the rate"
-        return Clock(name, why=why, check=text, rate=1000.0 / clock.step)
-    rates = ", ".join(f"{1.0 / (clock.step * factor_of(unit)):.6g} Hz in {unit}" for unit in clock.units())
-    return Clock(name, clock.unit, why, f"the unit is not stated: steps of {clock.step:.4g} are {rates}")

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.commands.init import motion_evidence as motion
-from cdtool.commands.init.names.quantity_words import is_twist, motion_of, words
 from cdtool.commands.init.names.units_in_names import factor_of, label, own_name, si_of, unit_in_name
+from cdtool.commands.init.names.words import motion_of, says
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
 from cdtool.commands.init.table_clock import DraftedClock
@@ -31,10 +31,8 @@ _NEAR, _SURE = 0.02, 0.01
 _FAR = 2.5
 # Largest positions and speeds of axes, and of the joints of robots.
 _LIMITS = {"m": 30.0, "m/s": 20.0}
-_ROBOT_LIMITS = {"rad": 4.0 * math.pi, "rad/s": 25.0, "m": 30.0, "m/s": 20.0}
-_SI = {"length": "m", "angle": "rad"}
-_RPM = ("n", "rpm", "motor")
-_RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
+_ROBOT_LIMITS = {"rad": 4.0 * math.pi, "rad/s": 25.0, **_LIMITS}
+_KINDS = {"m": "length", "m/s": "length", "rad": "angle", "rad/s": "angle", "": ""}
 
 
 @dataclass(frozen=True)
@@ -52,17 +50,17 @@ class Stated:
 
 @dataclass(frozen=True)
 class Combination:
-    """Units that fit together, how unlikely they are, and the relative deviation of the ratio from theirs.
-
-    `named`: unit or name of the position indicate an angle or a travel, as these units do. Empty clock: stated.
-    """
+    """Units of clock, position and speed, and how unlikely they are together. Empty clock: stated, or a counter."""
 
     clock: str
     position: str
     speed: str
     unlikely: float
-    off: float
-    named: bool
+
+    @property
+    def ratio(self) -> float:
+        """Return the position's unit over the speed's, in seconds."""
+        return factor_of(self.position) / factor_of(self.speed)
 
 
 @dataclass(frozen=True)
@@ -85,15 +83,19 @@ class Ratio:
             return self.raw * self.assumed / self.tick
         return self.raw * self.assumed / factor_of(clock) if clock else self.raw
 
-    @property
-    def certain(self) -> bool:
+    def off(self, units: Combination) -> float:
+        """Return the relative deviation of the ratio from that of units."""
+        return abs(self.per_second(units.clock) * units.ratio - 1.0)
+
+    def certain(self, channels: Channels) -> bool:
         """Whether only one combination fits, well, and the names indicate the same.
 
         Without the names a gear might have that ratio: 1 m per turn is that of turns and 1/min. The rate of a counter
         follows from the ratio: it fits any units.
         """
         first = self.fitting[0]
-        return not self.tick and len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
+        named = motion_kind("position", channels) == _KINDS[si_of(first.position)]
+        return named and not self.tick and len(self.fitting) == 1 and self.off(first) < _SURE and first.unlikely < 1.0
 
 
 def stated(channel: str, stream: Stream) -> Stated:
@@ -109,10 +111,7 @@ def motion_kind(channel: str, channels: Channels) -> str:
     if channel not in channels.found:
         return ""
     stream = channels.found[channel].stream
-    si = stated(channel, stream).si
-    if si:
-        return {"m": "length", "m/s": "length", "rad": "angle", "rad/s": "angle"}.get(si, "raw")
-    return motion_of(label(stream))
+    return _KINDS.get(stated(channel, stream).si, "raw") or motion_of(label(stream))
 
 
 def seems_to_turn(channels: Channels) -> bool:
@@ -120,12 +119,11 @@ def seems_to_turn(channels: Channels) -> bool:
     if channels.joints > 1 or "torque" not in channels.found:
         return False
     drive = channels.found["torque"].stream
-    if not is_twist(label(drive)) or stated("torque", drive).si == "N":
+    if not says("twist", label(drive)) or stated("torque", drive).si == "N":
         return False
     if any(motion_kind(name, channels) for name in ("position", "speed")):
         return False
-    position = channels.found.get("position")
-    return position is None or float(np.nanmax(np.abs(position.stream.values))) < 4.0 * math.pi
+    return "position" not in channels.found or channels.found["position"].stream.reach < 4.0 * math.pi
 
 
 def ratio_of(channels: Channels, clock: DraftedClock | None, messages_si: bool) -> Ratio | None:
@@ -135,95 +133,70 @@ def ratio_of(channels: Channels, clock: DraftedClock | None, messages_si: bool) 
     """
     if not {"position", "speed"} <= channels.found.keys():
         return None
-    position, speed = (channels.found[name].stream for name in ("position", "speed"))
-    fit = motion.integral_fit(position, speed)
+    fit = motion.integral_fit(channels.found["position"].stream, channels.found["speed"].stream)
     if not math.isfinite(fit.slope) or fit.slope == 0.0:
         return None
-    bare = Ratio(fit.slope, clock.assumed if clock is not None else 1.0, fit.correlation)
-    pairs = _pairs(channels, messages_si)
-    if clock is not None and clock.counts and not clock.told:
-        bare = replace(bare, tick=_tick(channels, bare, pairs))
-        clocks: tuple[str, ...] = ("",) if bare.tick else ()
-    else:
-        clocks = clock.units() if clock is not None else ("",)
-    found = [
-        made
+    ratio = Ratio(fit.slope, clock.assumed if clock is not None else 1.0, fit.correlation)
+    counts = clock is not None and clock.counts and not clock.told
+    clocks = ("",) if clock is None or counts else clock.units()
+    units = [
+        Combination(unit, *pair, _unlikely(channels, pair) + 0.05 * rank + _rare(clock, unit))
+        for rank, pair in enumerate(_PAIRS[:2] if messages_si else _pairs(channels))
         for unit in clocks
-        for rank, pair in enumerate(pairs)
-        if (made := _combination(channels, clock, unit, pair, rank, bare)) is not None
     ]
-    found.sort(key=lambda item: item.unlikely)
-    likely = tuple(item for item in found if item.unlikely < found[0].unlikely + _FAR)
-    return replace(bare, fitting=likely)
+    units.sort(key=lambda item: item.unlikely)
+    if counts:
+        ratio = replace(ratio, tick=max(0.0, ratio.raw * ratio.assumed * units[0].ratio) if units else 0.0)
+    fitting = [item for item in units if ratio.off(item) <= _NEAR and (ratio.tick or not counts)]
+    return replace(ratio, fitting=tuple(item for item in fitting if item.unlikely < fitting[0].unlikely + _FAR))
 
 
 def rotation_unit(stream: Stream) -> str:
     """Return the unit of a speed of rotation, by its name."""
-    parts = words(label(stream))
-    if any(part in _RPM or "drehzahl" in part or "motor" in part for part in parts):
-        return "rpm"
-    return "rad/s" if any(part in _RAD_S for part in parts) else ""
+    name = label(stream)
+    return "rpm" if says("rpm", name) else "rad/s" if says("rad_per_second", name) else ""
 
 
 def whole_numbers(stream: Stream) -> bool:
     """Whether the values are counts: all integers, and many different ones."""
-    seen = stream.values[np.isfinite(stream.values)]
-    return bool(np.array_equal(seen, np.rint(seen))) and len(np.unique(seen)) > 50
-
-
-def _pairs(channels: Channels, messages_si: bool) -> list[tuple[str, str]]:
-    """Return possible units of position and speed: the header's if stated, a name's together with the usual ones."""
-    if messages_si:
-        return list(_PAIRS[:2])
-    position, speed = (stated(name, channels.found[name].stream) for name in ("position", "speed"))
-    known = [(position.unit if position.by == "log" else p, speed.unit if speed.by == "log" else s) for p, s in _PAIRS]
-    named = [(position.unit or p, speed.unit or s) for p, s in known]
-    kinds = {motion_kind(name, channels) for name in ("position", "speed")}
-    told = kinds & {"length", "angle"} if not {"length", "angle"} <= kinds or (position.si and speed.si) else set()
-    return [
-        pair
-        for pair in dict.fromkeys((*known, *named))
-        if si_of(pair[1]) == f"{si_of(pair[0])}/s"
-        and all(si_of(pair[0]) == {"length": "m", "angle": "rad"}[x] for x in told)
-    ]
-
-
-def _tick(channels: Channels, bare: Ratio, pairs: list[tuple[str, str]]) -> float:
-    """Return the step [s] of a counter for which the likeliest units fit."""
-    ticks = [bare.raw * bare.assumed * factor_of(position) / factor_of(speed) for position, speed in pairs]
-    made = [
-        _combination(channels, None, "", pair, rank, replace(bare, tick=tick))
-        for rank, (pair, tick) in enumerate(zip(pairs, ticks, strict=True))
-        if tick > 0.0
-    ]
-    likely = [(item.unlikely, tick) for item, tick in zip(made, ticks, strict=False) if item is not None]
-    return min(likely)[1] if likely else 0.0
-
-
-def _combination(
-    channels: Channels, clock: DraftedClock | None, unit: str, pair: tuple[str, str], rank: int, bare: Ratio
-) -> Combination | None:
-    off = abs(bare.per_second(unit) * factor_of(pair[0]) / factor_of(pair[1]) - 1.0)
-    if off > _NEAR:
-        return None
-    unlikely = 0.05 * rank + (clock.unlikely(unit) if clock is not None and unit and not clock.told else 0.0)
-    kind = "length" if si_of(pair[0]) == "m" else "angle"
-    if kind == "length" and not pair[1].startswith(f"{pair[0]}/"):
-        unlikely += 0.5  # m with mm/s
-    # If no word indicates otherwise, one joint slides and several rotate.
-    unlikely += 0.5 * (kind != ("angle" if channels.joints > 1 or seems_to_turn(channels) else "length"))
-    for channel, logged in zip(("position", "speed"), pair, strict=True):
-        stream = channels.found[channel].stream
-        told = stated(channel, stream)
-        unlikely += 1.0 * (not told.by and implausible(logged, stream, channels.joints))
-        if told.by == "name":
-            unlikely += 2.0 * (find_unit(told.unit) != find_unit(logged))
-        elif not told.by and channel == "speed" and (usual := rotation_unit(stream)):
-            unlikely += 1.0 * (usual != logged)
-    return Combination(unit, *pair, unlikely, off, motion_kind("position", channels) == kind)
+    return bool(np.array_equal(stream.known, np.rint(stream.known))) and len(np.unique(stream.known)) > 50
 
 
 def implausible(unit: str, stream: Stream, joints: int) -> bool:
     """Whether values in this unit are beyond what machines reach: a travel of 50 m, a robot's joint at 90 rad."""
-    limit = _ROBOT_LIMITS.get(unit) if joints > 1 and unit in _ROBOT_LIMITS else _LIMITS.get(unit)
-    return limit is not None and float(np.nanmax(np.abs(stream.values))) > limit
+    return stream.reach > (_ROBOT_LIMITS if joints > 1 else _LIMITS).get(unit, math.inf)
+
+
+def _pairs(channels: Channels) -> list[tuple[str, str]]:
+    """Return possible units of position and speed: the header's if stated, a name's together with the usual ones."""
+    position, speed = (stated(name, channels.found[name].stream) for name in ("position", "speed"))
+    known = [(position.unit if position.by == "log" else p, speed.unit if speed.by == "log" else s) for p, s in _PAIRS]
+    named = [(position.unit or p, speed.unit or s) for p, s in known]
+    kinds = {motion_kind(name, channels) for name in ("position", "speed")} & {"length", "angle"}
+    told = kinds if len(kinds) == 1 or (position.si and speed.si) else set()
+    return [
+        (p, s) for p, s in dict.fromkeys((*known, *named)) if si_of(s) == f"{si_of(p)}/s" and told <= {_KINDS[si_of(p)]}
+    ]
+
+
+def _rare(clock: DraftedClock | None, unit: str) -> float:
+    return clock.unlikely(unit) if clock is not None and unit and not clock.told else 0.0
+
+
+def _unlikely(channels: Channels, pair: tuple[str, str]) -> float:
+    """Return how unlikely units of position and speed are, by what names, kinds of machine and values say."""
+    kind = _KINDS[si_of(pair[0])]
+    # m with mm/s; per minute is as usual
+    mixed = kind == "length" and all(abs(factor_of(pair[0]) / factor_of(pair[1]) / t - 1.0) > 1e-9 for t in (1.0, 60.0))
+    # If no word indicates otherwise, one joint slides and several rotate.
+    usual = "angle" if channels.joints > 1 or seems_to_turn(channels) else "length"
+    unlikely = 0.5 * mixed + 0.5 * (kind != usual)
+    for channel, logged in zip(("position", "speed"), pair, strict=True):
+        stream = channels.found[channel].stream
+        told = stated(channel, stream)
+        if told.by == "name":
+            unlikely += 2.0 * (find_unit(told.unit) != find_unit(logged))
+        elif not told.by:
+            named = rotation_unit(stream) if channel == "speed" else ""
+            unlikely += implausible(logged, stream, channels.joints) + (bool(named) and named != logged)
+    return unlikely

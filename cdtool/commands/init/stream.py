@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,9 +31,33 @@ class Stream:
         return int(self.values.shape[1])
 
     @property
+    def known(self) -> FloatArray:
+        """Return its finite values."""
+        return self.values[np.isfinite(self.values)]
+
+    @property
     def moves(self) -> bool:
         """Whether any value changes; False without values."""
         return any(np.ptp(part[np.isfinite(part)], axis=0) > 0.0 for part in self.values.T if np.isfinite(part).any())
+
+    @property
+    def reach(self) -> float:
+        """Return its largest absolute value."""
+        return float(np.nanmax(np.abs(self.values)))
+
+    def at(self, clock: FloatArray) -> FloatArray:
+        """Return its values at other times, by linear interpolation."""
+        if len(self.time) == len(clock) and np.array_equal(self.time, clock):
+            return self.values
+        return np.column_stack([np.interp(clock, self.time, column) for column in self.values.T])
+
+    def with_values(self, values: FloatArray) -> Stream:
+        """Return other values at the same times, without a unit."""
+        return replace(self, unit=None, values=values)
+
+    def elements(self) -> list[Stream]:
+        """Return a stream for each element of a list in messages; itself if it is none."""
+        return [self.element(i) for i in range(self.width)] if self.field.endswith("[:]") else [self]
 
     def element(self, index: int) -> Stream:
         """Return one of its columns."""
@@ -43,3 +67,10 @@ class Stream:
             return Stream(f"{self.topic} {field}", (), self.unit, self.time, values, self.topic, field)
         column = self.columns[index]
         return Stream(column, (column,), self.unit, self.time, values)
+
+
+def joined(streams: list[Stream], name: str, joints: tuple[str, ...] = ()) -> Stream:
+    """Join streams of one column each, on one clock, to one of several columns."""
+    values = np.hstack([stream.values for stream in streams])
+    columns = tuple(stream.columns[0] for stream in streams)
+    return Stream(name, columns, streams[0].unit, streams[0].time, values, joints=joints)

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.init.names.joint_names import families_by_name
-from cdtool.commands.init.stream import Stream
+from cdtool.commands.init.names.joint_names import MOST_JOINTS, families_by_name
+from cdtool.commands.init.stream import Stream, joined
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recordings.clock.lower_rate import sampled_rows
 
 _NUMBER = re.compile(r"\d+")
 _MOST = 1e100
-# `position[:]` with more elements than this is not a list of joints.
-_MOST_JOINTS = 64
 # Numbers with gaps are joints if at least so many families have the same.
 _SHARED = 3
 
@@ -38,18 +36,16 @@ class Found:
 class Channels:
     """The channels found so far, of a machine with `joints` joints, and the streams that are still free.
 
-    `streams` are all that the log contains; `families` are the columns that belong together.
+    `streams` are all that the log contains.
     """
 
     joints: int
     free: list[Stream]
     found: dict[str, Found] = dataclasses.field(default_factory=dict)
-    families: tuple[frozenset[str], ...] = dataclasses.field(init=False)
     streams: tuple[Stream, ...] = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
         self.streams = tuple(self.free)
-        self.families = tuple(frozenset(stream.columns) for stream in self.free if len(stream.columns) > 1)
 
     def take(self, channel: str, stream: Stream, why: str, check: str = "") -> None:
         """Record a guess; streams that share a column with it are no longer free."""
@@ -65,7 +61,8 @@ class Channels:
 
     def is_of_family(self, stream: Stream) -> bool:
         """Whether a single column belongs to a family of columns, free or not."""
-        return any(stream.columns[0] in members for members in self.families) if stream.columns else False
+        families = [other.columns for other in self.streams if len(other.columns) > 1]
+        return any(set(stream.columns) & set(family) for family in families)
 
     def of_joints(self) -> list[Stream]:
         """Return the free streams with one column per joint whose values change."""
@@ -91,6 +88,11 @@ def streams_of(source: Source, table_time: FloatArray | None, clock: str | None,
             time, column = time[rows], dataclasses.replace(column, values=column.values[rows])
         singles[name] = Stream(name, (name,), column.unit, time, _possible(column.values)[:, np.newaxis])
     return [*_families(singles), *_named_families(singles), *singles.values()]
+
+
+def column_key(name: str) -> str | int:
+    """Return the name of a column, or its number in a table without a header."""
+    return int(name) if name.isdigit() else name
 
 
 def _of_topic(name: str, source: Source) -> Stream:
@@ -126,7 +128,7 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
         first = next(iter(parts.values())).time
         alike = all(stream.time is first or np.array_equal(stream.time, first) for stream in parts.values())
         if (
-            2 <= len(numbers) <= _MOST_JOINTS
+            2 <= len(numbers) <= MOST_JOINTS
             and numbers[0] in (0, 1)
             and (
                 numbers == list(range(numbers[0], numbers[0] + len(numbers)))
@@ -146,10 +148,3 @@ def _named_families(singles: Mapping[str, Stream]) -> list[Stream]:
         for template, (joints, names) in found.items()
         if len({len(singles[name].time) for name in names}) == 1
     ]
-
-
-def joined(streams: list[Stream], name: str, joints: tuple[str, ...] = ()) -> Stream:
-    """Join streams of one column each, on one clock, to one of several columns."""
-    values = np.hstack([stream.values for stream in streams])
-    columns = tuple(stream.columns[0] for stream in streams)
-    return Stream(name, columns, streams[0].unit, streams[0].time, values, joints=joints)

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.commands.init.names.quantity_words import is_clock, is_counter, name_in_group, word_for, words
 from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
+from cdtool.commands.init.names.words import is_counter, name_in_group, says, word_for, words
 from cdtool.formats.channels.clock_guess import GuessedClock, guess_clock
 from cdtool.formats.columns import Column
 from cdtool.formats.source import Source
-from cdtool.recordings.clock.plausible_unit import contradicted_by_epoch
 from cdtool.recordings.recording import MEASURED
 from cdtool.recordings.units import find_unit
 
@@ -26,6 +25,7 @@ _STRONG = 2.0
 _WRAPS, _NEAR_POWER = 2, 0.02
 # Above this share of steps of exactly 1 a column counts samples, whatever its name.
 _BY_ONE = 0.9
+_DAY = 86400.0
 _RARE = 2.0  # minutes are this much less likely than an unusual rate
 # Above this rate [Hz] samples are timed by hardware: a jitter of more than this share of the step is unlikely.
 _TIMED_BY_HARDWARE, _JITTERS, _JITTERY = 2e3, 0.02, 1.5
@@ -69,27 +69,23 @@ def table_clock(source: Source) -> tuple[DraftedClock, GuessedClock] | None:
     found = _named(source) or _unnamed(source)
     if found is None:
         return None
-    column = source.columns[found.column]
-    values = column.values[np.isfinite(column.values)]
-    steps = np.diff(values)
+    column, guess = source.columns[found.column], found.findings[0].numbers
+    steps = np.diff(column.values[np.isfinite(column.values)])
     step = float(np.median(steps))
     jitter = float(np.median(np.abs(steps - step))) / abs(step) if step else 0.0
-    assumed, taken_off = _assumed(column, found)
-    unit = min(_UNITS, key=lambda name: abs(np.log(assumed / factor_of(name))))
     # Numbers that rise by one without a name are those of the rows; the rate follows from position and speed.
     is_row = not re.search(r"[^\W\d_]", found.column) and bool((steps == 1.0).all())
-    counts = is_counter(found.column) or is_row
-    clock = DraftedClock(found.column, step, assumed, unit, "", counts, jitter=jitter)
-    stated = find_unit(column.unit) if column.unit else None
-    against = ""
-    if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):
-        against, stated = f", although its header states {column.unit}", None
-    if stated is not None and stated.si == "s":
-        return replace(clock, unit=str(column.unit), told="the header, which states the unit", written=True), found
-    if taken_off:
+    unit, days = guess["unit"], guess["unit"] == "days"
+    assumed = _DAY if days else factor_of(unit)
+    clock = DraftedClock(found.column, step, assumed, unit, "", is_counter(found.column) or is_row, jitter=jitter)
+    if guess["evidence"] == "header":
+        return replace(clock, told="the header, which states the unit", written=True), found
+    if guess["evidence"] != "steps":
+        start = f"{guess['start']:.9g} days of Excel" if days else f"{guess['start']:.0f} after 1970"
+        against = any(item.kind == "header_unit_implausible" for item in found.findings)
+        told = f"its start, {start}" + (f", although its header states {column.unit}" if against else "")
         # The reader of a table converts days to seconds.
-        days = assumed > 2.0 * factor_of("min")
-        return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
+        return replace(clock, unit="s" if days else unit, told=told), found
     named = unit_in_name("time", found.column)
     if named and clock.unlikely(named) < 2 * _RARE:
         return replace(clock, unit=named, told="the unit in its name", written=True), found
@@ -125,7 +121,7 @@ def _named(source: Source) -> GuessedClock | None:
         column = source.columns[name]
         known = column.values[np.isfinite(column.values)]
         counts = is_counter(name) or bool(np.mean(np.diff(known) == 1.0) > _BY_ONE) if len(known) > 1 else True
-        plain = all(is_clock(word) for word in words(name))
+        plain = all(says("clock", word) for word in words(name))
         return len(known) < len(column.values), counts, name.isdigit(), not _has_time_unit(column), not plain
 
     for name in sorted(names, key=rank):
@@ -151,7 +147,7 @@ def _is_measured(name: str) -> bool:
 
 def _has_clock_name(name: str) -> bool:
     own = name_in_group(name)
-    return is_clock(own) and not _is_measured(own)
+    return bool(says("clock", own)) and not _is_measured(own)
 
 
 def _has_time_unit(column: Column) -> bool:
@@ -169,16 +165,3 @@ def _wraps(column: Column) -> bool:
     turns = np.log10(float(np.median(steps[steps > 0.0])) - back) if (steps > 0.0).any() else np.zeros(1)
     powers = np.rint(turns)
     return bool(np.all(np.abs(turns - powers) < _NEAR_POWER) and np.ptp(powers) == 0.0 and powers[0] > 2.0)
-
-
-def _assumed(column: Column, found: GuessedClock) -> tuple[float, bool]:
-    """Return the seconds per unit of the stamps, as guessed, and whether the start was subtracted."""
-    known = column.values[np.isfinite(column.values)]
-    steps = np.diff(known)
-    steps = steps[steps > 0.0]  # the median, so that a wrong stamp does not matter
-    factor = float(np.median(np.diff(found.time)) / np.median(steps)) if len(steps) and len(found.time) > 1 else 1.0
-    return abs(factor) or 1.0, found.time[0] == 0.0 and bool(np.median(known) > 0.0 and known[0] != 0.0)
-
-
-def _since(start: float, days: bool) -> str:
-    return f"its start, {start:.9g} days of Excel" if days else f"its start, {start:.0f} after 1970"

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cdtool.commands.init import motion_evidence as motion
-from cdtool.commands.init.channel_guess import force_strength, name_strength
-from cdtool.commands.init.names.quantity_words import is_clock, is_reference, what_else
+from cdtool.commands.init.name_evidence import named, named_force
 from cdtool.commands.init.names.units_in_names import is_foreign, label
+from cdtool.commands.init.names.words import says, what_else
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
 from cdtool.recordings.recording import MEASURED
 
 _FOLLOWS = 0.97
-_REFERENCED = ("position", "speed", "torque")
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,7 @@ def unmapped_columns(channels: Channels) -> tuple[Unmapped, ...]:
 
 
 def _described(stream: Stream, channels: Channels) -> Unmapped:
-    known = stream.values[np.isfinite(stream.values)]
+    known = stream.known
     low, high = (float(known.min()), float(known.max())) if len(known) else (float("nan"), float("nan"))
     guess, why = _next_best(stream, channels) if len(known) else ("", "no values")
     return Unmapped(stream.columns, stream.topic, stream.field, guess, why, low, high)
@@ -82,27 +79,19 @@ def _next_best(stream: Stream, channels: Channels) -> tuple[str, str]:
         return "", f"its unit is {stream.unit}"
     if not stream.moves:
         return "", "constant"
-    if is_clock(label(stream)) and not any(name_strength(quantity, stream)[0] for quantity in MEASURED):
+    known = {quantity: named(quantity, stream) for quantity in MEASURED}
+    quantity, best = max(known.items(), key=lambda item: item[1].strength)
+    if says("clock", label(stream)) and not best.strength:
         return "", "a time, by its name"
-    strength, word = force_strength(stream)
-    if stream.width == 1 and strength and not name_strength("torque", stream)[0]:
-        return "force", word if word == "its unit" else f"name ({word})"
-    named = {quantity: name_strength(quantity, stream) for quantity in MEASURED}
-    quantity = max(named, key=lambda name: named[name][0])
-    strength, word = named[quantity]
-    if strength:
-        set_value = is_reference(stream.name)
-        if set_value and quantity not in _REFERENCED:
-            return "", f"a set value of the {quantity}, by its name"
-        return (f"reference_{quantity}" if set_value else quantity), word if word == "its unit" else f"name ({word})"
-    return _by_values(stream, channels)
-
-
-def _by_values(stream: Stream, channels: Channels) -> tuple[str, str]:
+    force = named_force(stream)
+    if stream.width == 1 and force.strength and not known["torque"].strength:
+        return "force", force.why
+    if best.strength:
+        return f"reference_{quantity}" if says("reference", stream.name) else quantity, best.why
     alike = [
-        (abs(motion.likeness(channels.found[name].stream, stream)), name)
-        for name in _REFERENCED
-        if name in channels.found and channels.found[name].stream.width == stream.width
+        (abs(motion.likeness(found.stream, stream)), name)
+        for name, found in channels.found.items()
+        if name in ("position", "speed", "torque") and found.stream.width == stream.width
     ]
     correlation, quantity = max(alike, default=(0.0, ""))
     if correlation > _FOLLOWS:

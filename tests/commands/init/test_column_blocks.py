@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.commands.init.column_blocks import find_blocks
+from cdtool.commands.init.channel_guess import guess_channels
 from cdtool.commands.init.stream import Stream
 from tests.commands.init.layouts.motion import arm_motion, stroke_motion
 
@@ -25,9 +25,9 @@ def blocks_of(order, at_rest=(), joints=3, seed=4):
     }  # fmt: skip
     columns = np.hstack([values[name] for name in order])
     streams = [Stream(str(k), (str(k),), None, m.time, columns[:, k : k + 1]) for k in range(columns.shape[1])]
-    found = find_blocks(streams)
-    assert found is not None and found.joints == joints
-    firsts = {channel: int(stream.columns[0]) for channel, stream in found.streams.items()}
+    found = guess_channels(streams, topics=False)
+    assert found.joints == joints
+    firsts = {channel: int(item.stream.columns[0]) for channel, item in found.found.items()}
     assert all(first % joints == 0 for first in firsts.values())
     return {channel: order[first // joints] for channel, first in firsts.items()}
 
@@ -74,12 +74,12 @@ def test_one_axis_is_found_and_its_load_cell_is_no_drive():
     m = stroke_motion(generator, rate=200.0)
     columns = [m.position[:, 0], m.noisy(m.speed, generator)[:, 0], m.push + generator.normal(0.0, 0.5, len(m.time))]
     streams = [Stream(str(k), (str(k),), None, m.time, column[:, np.newaxis]) for k, column in enumerate(columns)]
-    found = find_blocks(streams)
-    assert found is not None and found.joints == 1 and "torque" not in found.streams
-    assert found.streams["position"].columns == ("0",) and found.streams["speed"].columns == ("1",)
+    found = guess_channels(streams, topics=False).found
+    assert "torque" not in found and found["force"].stream.columns == ("2",)
+    assert found["position"].stream.columns == ("0",) and found["speed"].stream.columns == ("1",)
 
 
 def test_noise_has_no_blocks():
     generator, time = np.random.default_rng(3), np.arange(1000) * 1e-2
     streams = [Stream(str(k), (str(k),), None, time, generator.normal(0.0, 1.0, (1000, 1))) for k in range(12)]
-    assert find_blocks(streams) is None
+    assert not guess_channels(streams, topics=False).found

@@ -5,16 +5,10 @@ from __future__ import annotations
 import pytest
 
 from cdtool.commands.init.names.joint_names import families_by_name
-from cdtool.commands.init.names.quantity_words import (
-    is_actual,
-    is_clock,
-    is_current,
-    is_reference,
-    is_something_else,
-    word_for,
-)
 from cdtool.commands.init.names.units_in_names import unit_in_name
+from cdtool.commands.init.names.words import is_actual, is_current, says, what_else, word_for
 from cdtool.recordings.recording import MEASURED
+from cdtool.recordings.units import find_unit
 
 
 def quantity_of(name):
@@ -70,12 +64,12 @@ def test_a_motor_current_is_one(name):
     ],
 )
 def test_set_values_are_recognised(name):
-    assert is_reference(name)
+    assert says("reference", name)
 
 
 @pytest.mark.parametrize("name", ["i_d", "motor_id", "actual_q_0", "settings", "speed"])
 def test_other_values_are_no_set_values(name):
-    assert not is_reference(name)
+    assert not says("reference", name)
 
 
 @pytest.mark.parametrize(
@@ -85,17 +79,17 @@ def test_other_values_are_no_set_values(name):
      "M1_CURRENT_FEEDRATE"],
 )  # fmt: skip
 def test_other_quantities_than_those_of_a_joint_are_recognised(name):
-    assert is_something_else(name)
+    assert what_else(name)
 
 
 @pytest.mark.parametrize("name", ["upper_arm/position", "robot_state/q_0", "external_axis_position", "lower_leg_speed"])
 def test_names_of_links_and_messages_do_not_exclude_a_channel(name):
-    assert not is_something_else(name)
+    assert not what_else(name)
 
 
 @pytest.mark.parametrize("name", ["Tempo", "temps_ms", "tiempo", "时间", "時間[s]", "tm_ms", "duration"])
 def test_clocks_are_recognised_in_seven_languages(name):
-    assert is_clock(name)
+    assert says("clock", name)
 
 
 def test_joints_are_found_by_the_part_of_the_names_that_differs():
@@ -155,4 +149,4 @@ def test_joints_of_a_body_are_joints_by_one_quantity_alone():
     ],
 )
 def test_units_that_are_written_out_end_a_name_in_mixed_case(name, quantity, unit):
-    assert unit_in_name(quantity, name) == unit
+    assert find_unit(unit_in_name(quantity, name)) == find_unit(unit)

@@ -5,22 +5,27 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-import numpy as np
-
 from cdtool.commands.init.machine_side import Side
-from cdtool.commands.init.names import lexicon
-from cdtool.commands.init.names.quantity_words import is_current, word_for, words
-from cdtool.commands.init.names.units_in_names import label
-from cdtool.commands.init.speed_ratio import Ratio, implausible, motion_kind, rotation_unit, stated, whole_numbers
-from cdtool.commands.init.stream import Stream
+from cdtool.commands.init.names.units_in_names import alike, factor_of, label, si_of
+from cdtool.commands.init.names.words import BOUND, is_current, says, word_for
+from cdtool.commands.init.speed_ratio import (
+    Combination,
+    Ratio,
+    Stated,
+    implausible,
+    motion_kind,
+    rotation_unit,
+    stated,
+    whole_numbers,
+)
 from cdtool.commands.init.streams import Channels
-from cdtool.recordings.units import find_unit
+from cdtool.recordings.units import RAW_UNITS, find_unit
 
-_RAW = ("A", "V", "1", "count")
 # Message types with SI units by the ROS convention (REP 103).
 _SI_PACKAGES = ("sensor_msgs", "geometry_msgs", "nav_msgs", "control_msgs", "trajectory_msgs")
 _MOTION = ("position", "speed")
 _MASS = re.compile(r"(kg|lbs?|lbm|oz|kilogramm?e?|pounds?|ounces?)\b(?![- ]?(f|kraft))", re.IGNORECASE)
+_IN_SMALLER = {"rad": "deg", "rad/s": "deg/s", "m": "mm", "m/s": "mm/s"}
 
 
 @dataclass(frozen=True)
@@ -49,31 +54,26 @@ class Evidence:
 
     def logged(self, channel: str) -> Logged:
         """Return unit and scale of a channel; the scale of a raw channel, and all without evidence, must be checked."""
-        stream, accepted = self.channels.found[channel].stream, self.side.accepted(channel)
+        stream = self.channels.found[channel].stream
         quantity = channel.removeprefix("reference_")
         told = stated(channel, stream)
         if told.by == "log" and not (quantity == "position" and told.si == "count"):
-            return self._told(channel, told.unit, told.si, accepted)
-        if is_si(self.message_types.get(stream.topic, "")):
-            why = f"messages of type {self.message_types[stream.topic]} are in SI units"
-            return Logged("", why, check=self._contradicted(channel))
+            return self._told(channel, told)
+        if is_si(message_type := self.message_types.get(stream.topic, "")):
+            return Logged("", f"messages of type {message_type} are in SI units", check=self._contradicted(channel))
         if channel != quantity and quantity in self.channels.found and not told.unit and not self._differs(channel):
             same = self.logged(quantity)
-            return Logged(
-                same.unit or accepted[0],
-                f"as the measured {quantity}",
-                same.scale,
-                same.check or "not stated: does it have the same unit?",
-            )
-        if quantity in _MOTION:
-            return self._of_motion(channel)
-        if told.unit:
-            return self._named(told.unit, told.si, accepted)
-        if quantity == "torque":
-            return _of_torque(stream, accepted, self.channels.joints)
-        largest = float(np.nanmax(np.abs(stream.values)))
-        why = f"the header says '{stream.unit}', which is not a unit" if stream.unit else "the unit is not stated"
-        return Logged(accepted[0], "", check=f"{why}; values reach {largest:.3g}: {others(accepted[0])}?")
+            check = same.check or "not stated: does it have the same unit?"
+            return Logged(same.unit or self.side.accepted(channel)[0], f"as the measured {quantity}", same.scale, check)
+        if channel in _MOTION and self.side.gear is not None:
+            unit = getattr(self.side.gear, channel)
+            why = "from its name" if told.unit else ""
+            return Logged(unit, why, check=f"not certain: {alike(unit)}? The transmission ratio depends on it")
+        if channel in _MOTION and self.ratio is not None and self.ratio.fitting and told.si not in RAW_UNITS:
+            return self._fitting(channel, self.ratio, self.ratio.fitting[0])
+        if quantity == "position" and (told.si == "count" or (not told.unit and self._counts(channel))):
+            return self._counted(channel, told.unit or "count")
+        return self._told(channel, told) if told.unit else self._assumed(channel)
 
     def _differs(self, channel: str) -> bool:
         """Whether one is a current and the other a torque: a set torque next to a measured current."""
@@ -81,103 +81,87 @@ class Evidence:
         names = [label(self.channels.found[name].stream) for name in (channel, quantity)]
         return quantity == "torque" and is_current(names[0]) != is_current(names[1])
 
-    def _told(self, channel: str, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
+    def _told(self, channel: str, told: Stated) -> Logged:
+        accepted = self.side.accepted(channel)
         if self.channels.found[channel].stream.name.isdigit():  # a table without names states no unit
-            return Logged(unit, "by the circle")
-        if si in accepted:
-            weight = "a mass: is it its weight, 1 kg = 9.81 N?" if _MASS.search(unit) else ""
-            return Logged(unit, "stated in the log", check=weight or self._contradicted(channel))
-        if si in _RAW:
-            return _raw(unit, accepted[0], self.channels.joints, "stated in the log")
-        return Logged(unit, "stated in the log", check=f"with this type and these coordinates it is {accepted[0]}")
+            return Logged(told.unit, "by the circle")
+        why = "stated in the log" if told.by == "log" else "from its name"
+        if told.si in RAW_UNITS:
+            return self._raw(told.unit, accepted[0], why)
+        check = self._contradicted(channel) if told.by == "log" else "known only from its name"
+        if told.si not in accepted:
+            check = f"with this type and these coordinates it is {accepted[0]}"
+        elif told.by == "log" and _MASS.search(told.unit):
+            check = "a mass: is it its weight, 1 kg = 9.81 N?"
+        return Logged(told.unit, why, check=check)
 
-    def _named(self, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
-        if si in _RAW:
-            return _raw(unit, accepted[0], self.channels.joints, "from its name")
-        check = "" if si in accepted else f"with this type and these coordinates it is {accepted[0]}"
-        return Logged(unit, "from its name", check=check or "known only from its name")
-
-    def _of_motion(self, channel: str) -> Logged:
-        quantity = channel.removeprefix("reference_")
-        stream, accepted = self.channels.found[channel].stream, self.side.accepted(channel)
-        told = stated(channel, stream)
-        if channel == quantity and self.side.gear is not None:
-            unit = self.side.gear.position if quantity == "position" else self.side.gear.speed
-            why = "from its name" if told.unit else "" if quantity == "position" else "its name"
-            return Logged(unit, why, check=f"not certain: {others(unit)}? The transmission ratio depends on it")
-        if channel == quantity and self.ratio is not None and self.ratio.fitting and told.si not in _RAW:
-            return self._fitting(quantity)
-        if quantity == "position" and (told.si == "count" or self._counts(channel)):
-            return self._counted(channel, told.unit or "count")
-        if told.unit:
-            return self._named(told.unit, told.si, accepted)
-        usual = self._usual(quantity, stream, accepted)
-        return Logged(usual, "", check=f"not stated: {others(usual)}?")
-
-    def _fitting(self, quantity: str) -> Logged:
-        assert self.ratio is not None
-        first, *rest = self.ratio.fitting
+    def _fitting(self, quantity: str, ratio: Ratio, first: Combination) -> Logged:
         clock = f" (clock in {first.clock})" if first.clock and not self.clock_told else ""
-        per_second = self.ratio.per_second(first.clock)
-        text = f"the position's derivative is {per_second:.4g} of the speed{clock}: {first.position} and {first.speed}"
-        agreed = all(
-            find_unit(stated(name, self.channels.found[name].stream).unit) == find_unit(unit)
-            for name, unit in (("position", first.position), ("speed", first.speed))
+        derivative = f"the position's derivative is {ratio.per_second(first.clock):.4g} of the speed"
+        agreed = self.clock_told and all(
+            find_unit(stated(name, self.channels.found[name].stream).unit) == find_unit(getattr(first, name))
+            for name in _MOTION
         )
         check = ""
-        if not (self.ratio.certain or (agreed and self.clock_told)):
-            check = f"not certain; {self._rest(len(rest) > 0)}"
-        return Logged(getattr(first, quantity), text, check=check)
-
-    def _rest(self, several: bool) -> str:
-        assert self.ratio is not None
-        if not several:
-            off = 100 * self.ratio.fitting[0].off
-            return "a gear may also have this ratio" if off < 1.0 else f"the ratio is {off:.1f} % off"
-        return f"{fits_as_well(self.ratio, self.clock_told)} as well"
+        if not agreed and not ratio.certain(self.channels):
+            off = 100 * ratio.off(first)
+            alone = "a gear may also have this ratio" if off < 1.0 else f"the ratio is {off:.1f} % off"
+            check = f"not certain; {fits_as_well(ratio, self.clock_told) or alone}"
+        return Logged(getattr(first, quantity), f"{derivative}{clock}: {first.position} and {first.speed}", check=check)
 
     def _counts(self, channel: str) -> bool:
         """Whether no unit explains a position: an encoder's counts."""
-        stream = self.channels.found[channel].stream
         own = self.ratio is not None and channel == "position"
-        return not stated(channel, stream).unit and (own or whole_numbers(stream))
+        return own or whole_numbers(self.channels.found[channel].stream)
 
     def _counted(self, channel: str, unit: str) -> Logged:
-        accepted, joints = self.side.accepted(channel)[0], self.channels.joints
+        accepted = self.side.accepted(channel)[0]
         if self.ratio is None or self.ratio.tick:  # a counter's rate is itself only a guess
-            return _raw(unit, accepted, joints, "whole numbers" if unit == "count" else "")
+            return self._raw(unit, accepted, "whole numbers" if unit == "count" else "")
         speed = self.logged("speed")
-        known = find_unit(speed.unit)
-        si, factor = (known.si, known.factor) if known is not None else ("rad/s", 1.0)
-        si = self.side.accepted("speed")[0] if si in _RAW else si
-        factor *= speed.scale[0] if speed.scale else 1.0
+        si = si_of(speed.unit or "rad/s")
+        factor = factor_of(speed.unit) * (speed.scale[0] if speed.scale else 1.0)
         slope = self.ratio.per_second(self.clock_unit)
-        scale = (float(f"{factor / slope:.5g}"),) * joints
-        per = f"{si.removesuffix('/s')} per count, from the ratio {slope:.4g} to the speed in {speed.unit or si}"
-        return Logged(unit, per, scale, check="correct only if the speed's unit, its scale and the clock are")
+        length = (self.side.accepted("speed")[0] if si in RAW_UNITS else si).removesuffix("/s")
+        why = f"{length} per count, from the ratio {slope:.4g} to the speed in {speed.unit or si}"
+        scale = (float(f"{factor / slope:.5g}"),) * self.channels.joints
+        return Logged(unit, why, scale, check="correct only if the speed's unit, its scale and the clock are")
 
-    def _usual(self, quantity: str, stream: Stream, accepted: tuple[str, ...]) -> str:
-        if quantity == "speed" and "rad/s" in accepted and (usual := rotation_unit(stream)):
-            return usual
-        unit = accepted[0]
-        if quantity == "position" and len(accepted) > 1 and motion_kind("position", self.channels) == "length":
-            unit = accepted[1]
+    def _assumed(self, channel: str) -> Logged:
+        """Return the usual unit of a channel whose unit nothing states."""
+        stream, accepted = self.channels.found[channel].stream, self.side.accepted(channel)
+        quantity, name = channel.removeprefix("reference_"), label(stream)
+        unit, why = accepted[0], ""
+        if quantity == "torque":
+            strength, word = word_for("torque", name)
+            if is_current(name) or strength < BOUND or word in ("pwm", "duty"):
+                return self._raw("A", unit, "its name") if is_current(name) else self._raw("1", unit, "")
+            is_force = word == "drive force" or says("force_of_drive", name) not in ("", "effort")
+            unit, why = accepted[-1] if is_force else unit, "its name"
+        elif quantity == "speed" and "rad/s" in accepted:
+            unit = rotation_unit(stream) or unit
+        elif quantity == "position" and motion_kind("position", self.channels) == "length":
+            unit = accepted[-1]
         if implausible(unit, stream, self.channels.joints):
-            return {"rad": "deg", "rad/s": "deg/s", "m": "mm", "m/s": "mm/s"}[unit]
-        return unit
+            unit = _IN_SMALLER[unit]
+        text = f"the header says '{stream.unit}', which is not a unit" if stream.unit else "not stated"
+        return Logged(unit, why, check=f"{text}; values reach {_digits(stream.reach)}: {alike(unit)}?")
+
+    def _raw(self, unit: str, target: str, why: str) -> Logged:
+        per = f"{target} at 100 %" if unit == "%" else f"{target} per {si_of(unit) or unit}"
+        return Logged(unit, why, (1.0,) * self.channels.joints, f"the scale 1 is a placeholder: {per}")
 
     def _contradicted(self, channel: str) -> str:
         """Return the contradiction between the stated units of position and speed, or an empty text."""
         if channel not in _MOTION or self.ratio is None or self.ratio.fitting or self.side.gear is not None:
             return ""
-        streams = [self.channels.found[name].stream for name in _MOTION]
-        if all(is_si(self.message_types.get(stream.topic, "")) for stream in streams):
+        streams = {name: self.channels.found[name].stream for name in _MOTION}
+        if all(is_si(self.message_types.get(stream.topic, "")) for stream in streams.values()):
             return f"the position's derivative is {self.ratio.raw:.4g} of the speed: it must be 1 in SI units"
-        known = [find_unit(stated(name, stream).unit) for name, stream in zip(_MOTION, streams, strict=True)]
-        factors = [unit.factor for unit in known if unit is not None and unit.si not in _RAW]
-        if len(factors) < 2:
+        position, speed = (stated(name, stream) for name, stream in streams.items())
+        if {position.si, speed.si} & {"", *RAW_UNITS}:
             return ""
-        slope = self.ratio.per_second(self.clock_unit) * factors[0] / factors[1]
+        slope = self.ratio.per_second(self.clock_unit) * factor_of(position.unit) / factor_of(speed.unit)
         return f"with these units the position's derivative is {slope:.4g} of the speed, not 1"
 
 
@@ -187,45 +171,13 @@ def is_si(message_type: str) -> bool:
 
 
 def fits_as_well(ratio: Ratio, clock_told: bool) -> str:
-    """Return the other combinations that fit: "s with m, mm/s; ms with mm, mm/s fit"."""
+    """Return the other combinations that fit: "s with m, mm/s; ms with mm, mm/s fit as well"; empty without any."""
     texts = [
         f"{'' if clock_told or not item.clock else f'{item.clock} with '}{item.position}, {item.speed}"
         for item in ratio.fitting[1:]
     ]
-    return f"{'; '.join(texts)} {'fit' if len(texts) > 1 else 'fits'}"
+    return f"{'; '.join(texts)} {'fit' if len(texts) > 1 else 'fits'} as well" if texts else ""
 
 
-def others(unit: str) -> str:
-    """Return a unit and the units it may be instead."""
-    alike = {
-        "N": "N or kN", "N m": "N m or mN m", "m/s2": "m/s2 or g", "rad": "rad or deg", "rad/s": "rad/s or deg/s",
-        "m": "m or mm", "mm": "mm or m", "m/s": "m/s or mm/s", "rad/s2": "rad/s2 or deg/s2", "rpm": "rpm or rad/s",
-    }  # fmt: skip
-    return alike.get(unit, unit)
-
-
-def _of_torque(stream: Stream, accepted: tuple[str, ...], joints: int) -> Logged:
-    name = label(stream)
-    if is_current(name):
-        return _raw("A", accepted[0], joints, "its name")
-    strength, word = word_for("torque", name)
-    if strength > 1.0 and word not in ("pwm", "duty"):
-        whole = "".join(words(name))
-        unit = (
-            accepted[-1]
-            if word == "drive force" or any(force in whole for force in lexicon.FORCES[:-1])
-            else accepted[0]
-        )
-        return Logged(unit, "its name", check=f"{_reach(stream)}: {others(unit)}?")
-    return _raw("1", accepted[0], joints, "")
-
-
-def _raw(unit: str, target: str, joints: int, why: str) -> Logged:
-    known = find_unit(unit)
-    per = f"{target} at 100 %" if unit == "%" else f"{target} per {known.si if known else unit}"
-    return Logged(unit, why, (1.0,) * joints, f"the scale 1 is a placeholder: {per}")
-
-
-def _reach(stream: Stream) -> str:
-    largest = float(np.nanmax(np.abs(stream.values)))
-    return f"values reach {largest:.0f}" if 1000.0 <= largest < 1e7 else f"values reach {largest:.3g}"
+def _digits(value: float) -> str:
+    return f"{value:.0f}" if 1000.0 <= value < 1e7 else f"{value:.3g}"

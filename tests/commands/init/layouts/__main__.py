@@ -1,29 +1,21 @@
-"""Print the score of `cdtool init` on the public layouts: `python -m tests.commands.init.layouts [NAME...]`."""
+"""Print the score of `cdtool init` on layouts: `python -m tests.commands.init.layouts [FILE...]`, `public` or all."""
 
 from __future__ import annotations
 
-import importlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.commands.init.layouts import LAYOUTS, Layout
+from tests.commands.init.layouts import SEALED, read_layouts
 from tests.commands.init.layouts.score import Score, score
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Score the layouts with these names, or all; `module:NAME` scores the layouts of another module."""
-    layouts: Sequence[Layout] = LAYOUTS
-    names = []
-    for argument in arguments:
-        module, _, attribute = argument.partition(":")
-        if attribute:
-            layouts = getattr(importlib.import_module(module), attribute)
-        else:
-            names.append(argument)
+def main(files: Sequence[str]) -> int:
+    """Score the layouts of the TOML files with these names, as `public` and `sealed_4`; of all without one."""
     with TemporaryDirectory() as folder:
-        scores = [score(layout, Path(folder)) for layout in layouts if not names or layout.name in names]
+        layouts = [layout for file in files or ("public", "vendors", *SEALED) for layout in read_layouts(file)]
+        scores = [score(layout, Path(folder)) for layout in layouts]
     for item in scores:
         _show(item)
     right, expected = sum(len(item.right) for item in scores), sum(len(item.expected) for item in scores)

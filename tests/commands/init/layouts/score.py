@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
 
-import numpy as np
-
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.init.drafting import init
 from cdtool.formats.channels.reading import choose_format
 from cdtool.recordings.units import find_unit
-from tests.commands.init.layouts.layout import Layout, Truth
+from tests.commands.init.layouts import Layout, Truth
 
 _TYPES = {"linear axis": ("linear_axis",), "rotary axis": ("rotary_axis",), "robot": ("rotary_axis", "linear_axis")}
 
@@ -57,21 +55,19 @@ class Score:
 
 
 def score(layout: Layout, folder: Path, *, audited: bool = False) -> Score:
-    """Write a log of the layout, draft its machine file and compare the draft with the truth.
+    """Draft the machine file of a layout's log in a folder and compare the draft with the truth.
 
     The audit of the clocks takes half of the time and changes no draft; it is left out unless `audited`.
     """
-    log = folder / f"{layout.name.replace(' ', '_').replace('&', '')}{layout.suffix}"
-    layout.write(log, np.random.default_rng(7))
     known = {name: _known(item, layout.accept.get(name, ())) for name, item in layout.truth.items()}
     expected = sorted({item.truth.channel for item in known.values() if item.required})
     try:
         with nullcontext() if audited else patch("cdtool.truth.synchronisation.audit.audit", return_value=()):
-            text = init(log, folder / "machine.toml", force=True).text
+            text = init(layout.log, folder / "machine.toml", force=True).text
         values = tomllib.loads(text)
         channels = values["channels"].get("mcap", values["channels"])
         if not _drafted_columns(channels) <= known.keys():  # else the file need not be read once more
-            known = _by_file_names(known, choose_format(log).columns(log).names)
+            known = _by_file_names(known, choose_format(layout.log).columns(layout.log).names)
     except CdtoolError as fault:
         return Score(layout.name, tuple(expected), (), tuple(expected), (), (), (), str(fault))
     order = _joint_order(channels, known)

@@ -137,7 +137,7 @@ def test_header_units_that_the_ratio_contradicts_are_marked(tmp_path):
 def test_a_ratio_near_that_of_units_does_not_match_them(tmp_path):
     run = stroke()
     counts = np.round(run.travel * 1.024e4)
-    draft = drafted_columns(tmp_path, {"t": run.time, "speed_percent": run.speed * 10.0, "pos_counts": counts})
+    draft = drafted_columns(tmp_path, {"t": run.time, "speed_percent": run.speed * 10.0, "pos_count": counts})
     assert (draft.unit("position"), draft.unit("speed")) == ("count", "%")
     assert draft.checked("position") and draft.checked("speed")
 
