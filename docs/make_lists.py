@@ -108,7 +108,7 @@ def files() -> Mapping[Path, str]:
 
 
 def _with_keys(page: Path) -> str:
-    """Return a page with its tables of keys made anew."""
+    """Return a page with its tables of keys made again."""
 
     def made(found: re.Match[str]) -> str:
         return f"{found[1]}\n{_KEYS}{''.join(_key_lines(found[2]))}\n{_END}"

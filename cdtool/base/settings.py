@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from difflib import get_close_matches
 from enum import Enum
 from functools import cache
 from types import NoneType, UnionType
@@ -224,12 +225,14 @@ def _is_scalar(hint: Any) -> bool:
 class Place:
     """Where in a file values stand, and the mistakes that were found in the file so far.
 
-    `by_option`: full keys that an option gave. `root`: the model of the whole file, to say where a key belongs.
+    `misspelt`: full keys that unknown ones are probably meant to be. `by_option`: full keys that an option gave.
+    `root`: the model of the whole file, to say where a key belongs.
     """
 
     where: str
     prefix: str = ""
     mistakes: list[ConfigurationError] = field(default_factory=list)
+    misspelt: list[str] = field(default_factory=list)
     by_option: frozenset[str] = frozenset()
     root: type[Any] | None = None
 
@@ -245,6 +248,11 @@ class Place:
         models = {key.name: bare_type(part) for key in tables.values() for part in alternatives(key.hint)}
         homes = [table for table, model in models.items() if is_model(model) and name in keys_of(model)]
         return homes[0] if len(homes) == 1 and self.prefix != f"{homes[0]}." else ""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the whole file could be read: no line of it is broken."""
+        return all(mistake.key for mistake in self.mistakes)
 
     def below(self, name: str) -> Place:
         """Return the place of the table `name` in this one."""
@@ -268,8 +276,10 @@ class Place:
         self._add(self.fault(name, problem, hint))
 
     def _add(self, mistake: ConfigurationError) -> None:
-        """Remember a mistake, unless it only follows from one about the same key or a part of it."""
+        """Remember a mistake, unless it only follows from one about the same key, misspelt, or a part of it."""
         key = mistake.key
+        if key in self.misspelt:
+            return
         if not key or not any(f"{known.key}.".replace("[", ".").startswith(f"{key}.") for known in self.mistakes):
             self.mistakes.append(mistake)
 
@@ -321,11 +331,13 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
     for name, value in values.items():
         if name not in keys:
             home = place.home_of(name)
+            meant = get_close_matches(name, keys.keys() - values.keys(), n=1)
+            place.misspelt.extend(f"{place.prefix}{key}" for key in meant)
             place.note(name, "unknown key", f"it belongs in [{home}]" if home else nearest(name, keys))
         elif (found := _value(keys[name], keys[name].hint, name, value, place)) is not _WRONG:
             given[keys[name].attribute] = found
     for name, key in keys.items():
-        if key.required and name not in values:
+        if key.required and name not in values and place.is_whole:
             place.note(name, "is missing", key.allowed)
     if any(key.required and key.attribute not in given for key in keys.values()):
         return None

@@ -151,6 +151,8 @@ def read_machine_file(path: str | Path) -> MachineFile:
 def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:
     """Return the machine of [machine], with the mistakes in `place`; None if it cannot be made."""
     table = values.get("machine")
+    if table is None and not place.is_whole:
+        return None
     if not isinstance(table, dict):
         problem = "is missing" if table is None else f"is {value_in_words(table)}"
         raise place.fault("machine", problem, "add a table [machine]")

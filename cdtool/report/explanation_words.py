@@ -39,7 +39,7 @@ def words(item: Explanation) -> list[str]:
     list of str
         First the headline: what happened and when. Then one entry per subject: how the limit was crossed or how near
         the joints came to it, glitches of sensors, and the channels in the order in which they left their normal
-        course.
+        band.
 
     Examples
     --------
@@ -143,7 +143,7 @@ def _departed(item: Explanation) -> list[str]:
     end = item.alarm.time if item.alarm else math.inf
     sooner, later = [found for found in left if found.time <= end], [found for found in left if found.time > end]
     course = "previous" if item.absent else "normal"
-    lines = [f"No single channel had clearly left its {course} course{' by then' if later else ''}."]
+    lines = [f"No single channel had clearly left its {course} band{' by then' if later else ''}."]
     if sooner:
         lines = [f"Moved first: {_in_order(sooner, item)}.", *_commands(sooner, item), *_first_input(sooner, item)]
     if later:

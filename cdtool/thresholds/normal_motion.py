@@ -82,7 +82,7 @@ class NormalMotion:
         Each (n, J), positions from the start of the motion; NaN before the motion and where too few runs were. Raises
         RecordingError without speed and position.
         """
-        return recording.derived(("normal course", channel), lambda: self._compared(recording, channel), self)
+        return recording.derived(("normal band", channel), lambda: self._compared(recording, channel), self)
 
     def _compared(self, recording: Recording, channel: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         curve, signal = self.channels[channel], _signal(recording, channel, self.motion)

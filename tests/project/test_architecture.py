@@ -92,5 +92,5 @@ def test_the_python_api_names_functions_that_exist_and_every_command_has_one():
     members = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
     # A command with subcommands has several functions.
     commands = {name.replace("-", "_") for name, command in members if not hasattr(command, "commands")}
-    # `report` writes files from the results of `benchmark`; `list` shows the registries.
-    assert commands - {"report", "list"} <= set(cdtool.__all__)
+    # `report` writes files from the results of `benchmark`; `list` shows the registries, `schema` the models.
+    assert commands - {"report", "list", "schema"} <= set(cdtool.__all__)

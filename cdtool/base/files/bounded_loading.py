@@ -68,7 +68,12 @@ _NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
 
 
 class ContentError(ValueError):
-    """The contents of a file are not as required; the text is the reason, on one line, without the file's name."""
+    """The contents of a file are not as required; the text is the reason, on one line, without the file's name.
+
+    `line` is the one that is not TOML, counted from 1, if the rest of the text may be.
+    """
+
+    line: int | None = None
 
 
 def read_bytes(
@@ -129,7 +134,10 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
-        raise ContentError(str(fault)) from fault
+        found = ContentError(str(fault))
+        line = re.search(r"at line (\d+)", str(fault))  # of tomllib, which has no attribute for it before Python 3.14
+        found.line = int(line[1]) if line else None
+        raise found from fault
     except (ValueError, RecursionError) as fault:
         raise ContentError(f"{fault}") from fault
     for key, number in _integers(values, ""):
@@ -151,8 +159,8 @@ def read_toml(path: Path, what: str, place: Place | None = None) -> dict[str, An
         try:
             return parse_toml("\n".join(lines) + "\n")
         except ContentError as fault:
-            error, line = _not_toml(path, text, what, fault), _line_of(fault, lines)
-            if place is None or line is None or _other_kind(text):
+            error, line = _not_toml(path, text, what, fault), (fault.line or 0) - 1
+            if place is None or _other_kind(text) or not 0 <= line < len(lines) or not lines[line].strip():
                 raise error from fault
             place.mistakes.append(error)
             broken_header = lines[line].lstrip().startswith("[")
@@ -161,12 +169,6 @@ def read_toml(path: Path, what: str, place: Place | None = None) -> dict[str, An
                 line += 1
                 lines[line] = ""
     raise place.mistakes[-1] if place else ConfigurationError(f"{path}: not valid TOML")
-
-
-def _line_of(fault: ContentError, lines: list[str]) -> int | None:
-    """Return the index of the line that an error of tomllib names; None if it names another place, such as the end."""
-    found = re.search(r"at line (\d+)", str(fault))
-    return int(found[1]) - 1 if found and int(found[1]) <= len(lines) and lines[int(found[1]) - 1].strip() else None
 
 
 def _other_kind(text: str) -> str:

@@ -56,7 +56,7 @@ class Stream:
         return replace(self, unit=None, values=values)
 
     def elements(self) -> list[Stream]:
-        """Return a stream for each element of a list in messages; itself if it is none."""
+        """Return a stream for each element of a list in messages; itself if it is not one."""
         return [self.element(i) for i in range(self.width)] if self.field.endswith("[:]") else [self]
 
     def element(self, index: int) -> Stream:

@@ -503,7 +503,7 @@ def _digest(file: Path, settings: Mapping[str, Any]) -> str:
 
 def _detectors(table: BenchmarkTable, place: Place, machine_file: MachineFile, wanted: _Wanted) -> tuple[str, ...]:
     """Return the full names of a file's detectors, or else of those given; a force rig's recordings may need none."""
-    # An empty list says that there are none; with learning, those of the command are meant then.
+    # An empty list means no detector; with learning it leaves the choice to the command.
     is_open = wanted.learning or table.detectors is None
     given: Sequence[str | Detector] = table.detectors or (wanted.detectors if is_open else ())
     if wanted.learning and not given:
@@ -533,7 +533,7 @@ def _budget(table: BenchmarkTable, place: Place) -> Budget | None:
 
 def _learned(table: BenchmarkTable, place: Place, found: LogsOf, needed: bool) -> dict[Path, LogSection]:
     if table.learn is None:
-        if needed:
+        if needed and place.is_whole:
             raise place.fault("learn", "is missing", "add a table [learn]")
         return {}
     return found.sections(table.learn, place.below("learn"))
@@ -584,7 +584,7 @@ def _groups(
     """Return the groups of impacts, the hold-out and those of changed conditions, and the sections of their logs."""
     force, below = table.force, place.below("force")
     profiles: dict[str, ForceProfile] = place.tried({}, read_force_limits, _force_limits(force, found.base))
-    profile = place.tried(None, _profile, profiles, force, below, "profile", force.profile)
+    profile = place.tried(None, _profile, profiles, force, below, "profile", force.profile) if profiles else None
     groups: dict[str, ImpactGroup] = {}
     sections: dict[Path, LogSection] = {}
     for name, group in table.impacts.items():
@@ -594,7 +594,7 @@ def _groups(
             place.below("impacts").note(name, "is not a valid group name", hint)
         logs: dict[Path, LogSection] = place.tried({}, found.sections, group, own)
         limits = profile
-        if group.force_profile is not None:
+        if group.force_profile is not None and profiles:
             limits = place.tried(None, _profile, profiles, force, own, "force_profile", group.force_profile)
         sections |= logs
         groups[name] = ImpactGroup(tuple(logs), group.window_s or table.window_s, limits)
@@ -602,7 +602,7 @@ def _groups(
         logs = place.tried({}, found.sections, table.holdout, place.below(HOLDOUT))
         sections |= logs
         groups[HOLDOUT] = ImpactGroup(tuple(logs), table.window_s, is_impact_free=True)
-    if force.limits and not any(group.force for group in groups.values()):
+    if force.limits and profiles and not any(group.force for group in groups.values()):
         below.note("limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}")
     if not groups and table.inject is None:
         place.note("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")

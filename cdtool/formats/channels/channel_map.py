@@ -367,7 +367,7 @@ def _column_time(table: ClockTable | None, above: Place) -> TimeSource:
 
 @dataclass(frozen=True)
 class _Sources:
-    """Makes the sources of a log's channels, for these joints, with their accepted SI units."""
+    """The sources of a log's channels, for these joints, with their accepted SI units."""
 
     joints: tuple[str, ...]
     accepted: AcceptedUnits

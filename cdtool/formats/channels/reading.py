@@ -194,12 +194,12 @@ def _with_files_beside(recording: Recording, path: Path, machine_file: MachineFi
         only = machine_file.with_map(replace(channels, sources=(source,), beside=()))
         return read_as_logged(path, only, unread).recording["trigger"]
 
-    def read_beside(file: Path, mapped: ChannelMap) -> Recording:
+    def read_own_file(file: Path, mapped: ChannelMap) -> Recording:
         source, resolved = mapped_source(file, machine_file.with_map(mapped))
         with naming(file):
             return assemble_recording(source, resolved, machine_file.machine, file_digest(file)).recording
 
-    return add_files_beside(recording, path, channels, read_beside, read_trigger)
+    return add_files_beside(recording, path, channels, read_own_file, read_trigger)
 
 
 def _parts_of(folder: Path, unread: Unread) -> tuple[Sequence[Path], Sequence[Finding]]:

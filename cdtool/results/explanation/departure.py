@@ -1,7 +1,7 @@
-"""When each channel left its normal course for the first time, and by how much.
+"""When each channel left its normal band for the first time, and by how much.
 
 A diagnosis after the event, for people: it uses the recording before and after the event; no detector, no threshold and
-no latency depends on it. The normal course is that of impact-free runs at the same location of the stroke or, without
+no latency depends on it. The normal band is that of impact-free runs at the same location of the stroke or, without
 any, the straight line through the log's own half second before. Times are seconds on the recording's own clock. Load
 cell and labels are not used.
 """
@@ -24,7 +24,7 @@ from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, NormalMotion, l
 #: Commands to the machine. The reference torque is not one: it is a controller's output and responds to a contact.
 COMMANDS = ("reference_position", "reference_speed")
 
-#: Spreads from the normal course at which a channel has left it: noise does so in 1 of 10^8 samples.
+#: Spreads from the normal band at which a channel has left it: noise does so in 1 of 10^8 samples.
 LEFT = 6.0
 #: Consecutive samples that must be outside on one side: a spike of one or two is not a movement.
 LASTING = 3
@@ -46,7 +46,7 @@ RESOLUTION = 0.02
 STAYED = "no departure"
 #: It was outside when the search began.
 OUTSIDE = "outside since before"
-#: Too few samples of it, or of its normal course, are known.
+#: Too few samples of it, or of its normal band, are known.
 UNKNOWN = "nothing to compare with"
 # The channel that physically responds first.
 _ORDER = ("acceleration", "speed", "torque", "position", *REFERENCES)
@@ -54,7 +54,7 @@ _ORDER = ("acceleration", "speed", "torque", "position", *REFERENCES)
 
 @dataclass(frozen=True)
 class Departure:
-    """When and to which side a channel of a joint left its normal course: `time` [s]; NaN if not, with the reason.
+    """When and to which side a channel of a joint left its normal band: `time` [s]; NaN if not, with the reason.
 
     Its `value` where it is farthest off, with normal `mean` and `spread` there, in `unit`; NaN if unknown.
     """
@@ -73,7 +73,7 @@ class Departure:
 def departures(
     recording: Recording, normal: NormalMotion | None, joint: str, leading: str, begin: float, end: float
 ) -> tuple[Departure, ...]:
-    """Return the channels in the order in which they left their normal course.
+    """Return the channels in the order in which they left their normal band.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _departure(
         return at(farthest, reason=OUTSIDE, direction="up" if sign > 0 else "down")
     near = np.flatnonzero(~(sign * off[:first] > 0.5 * LEFT))
     half, left = time[start + (int(near[-1]) + 1 if len(near) else 0)], time[start + first]
-    # The line through half of the limit and the limit meets the normal course where the departure began.
+    # The line through half of the limit and the limit meets the normal band where the departure began.
     began = float(half - min(left - half, RESOLUTION))
     return at(farthest, time=began, direction="up" if sign > 0 else "down")
 

@@ -1,4 +1,4 @@
-"""Why each alarm was raised and each contact missed: joint, limit, margin over time, what left its normal course."""
+"""Why each alarm was raised and each contact missed: joint, limit, margin over time, what left its normal band."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Explanation:
     near each joint came, the nearest first.
 
     Both: `moments` are the margin over time of `joint`, `departed` the channels in the order in which they left their
-    normal course, `glitches` those of the sensors; `inputs` names the channels that the detector reads. `runs`: number
+    normal band, `glitches` those of the sensors; `inputs` names the channels that the detector reads. `runs`: number
     of impact-free runs that the channels were compared with; without any, `absent` is the reason, and the log's own
     past was used.
     """
@@ -102,7 +102,7 @@ def explain_operation(
     activation : Activation
         The activation that raised the alarms.
     inputs : sequence of str
-        Channels that the detector needs: the explanation states which of them left its normal course first.
+        Channels that the detector needs: the explanation states which of them left its normal band first.
     normals : NormalMotions
         The normal motion of impact-free runs. Without any, each channel is compared with its own past.
 
@@ -154,7 +154,7 @@ class Explainer:
 
     @cached_property
     def normal(self) -> NormalMotion | Absence:
-        """Return the normal motion to compare the operation with, or why there is none."""
+        """Return the normal motion to compare the operation with, or why it is missing."""
         operation = self.detection.operation
         return self.normals.of(operation.recording, operation.motion)
 
@@ -214,7 +214,7 @@ class Explainer:
         return self.activation.samples(self.detection.statistic.period)
 
     def _explained(self, joint: str, contact: Contact | None, span: tuple[float, float], **parts: Any) -> Explanation:
-        """Add what left its normal course, and the glitches, around the time from exit to alarm, or the onset [s]."""
+        """Add what left its normal band, and the glitches, around the time from exit to alarm, or the onset [s]."""
         operation, (left, until) = self.detection.operation, span
         recording = operation.recording.without_ground_truth()
         normal = self.normal if isinstance(self.normal, NormalMotion) else None

@@ -58,7 +58,7 @@ def glitches(
     """Return the glitches of some channels that began from `begin` to `end` [s], in order of time.
 
     Spikes and frozen values only of a sensor that no other one confirms: none of those in `departed` left its normal
-    course. A contact shows in several.
+    band. A contact shows in several.
     """
     moved = {(item.channel, item.joint) for item in departed if item.time == item.time and item.channel not in COMMANDS}
     found: list[Glitch] = []

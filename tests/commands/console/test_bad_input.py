@@ -46,8 +46,8 @@ def detect(gate_folder: Path, feekf_signature: Path) -> Callable[..., Outcome]:
             ("word.csv", "line 3", "fast"),
         ),
         ("cut.mcap", b"\x89MCAP0\r\n" + bytes(40), ("cut.mcap",)),
-        ("fake.mcap", b"not an mcap file at all", ("fake.mcap", "not a")),
-        ("fake.mat", b"not a mat file at all", ("fake.mat", "not a")),
+        ("fake.mcap", b"not an mcap file at all", ("fake.mcap", "no row of numbers")),
+        ("fake.mat", b"not a mat file at all", ("fake.mat", "no row of numbers")),
         ("odd.xyz", b"\x00\x01\x02\x03" * 50, ("odd.xyz", "not a")),
     ],
 )

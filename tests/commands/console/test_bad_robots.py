@@ -88,7 +88,7 @@ def test_an_invalid_urdf_is_reported_with_its_file(log, tmp_path):
 def test_an_unknown_key_and_a_name_that_no_joint_has_are_named(log, tmp_path):
     assert "did you mean drive_inertia" in refused(log, described(tmp_path, more="drive_inertias = 1.0\n"))
     told = refused(log, described(tmp_path, more='joint_map = { shoulder = "pan" }\n'))
-    assert "machine.joint_map.shoulder: is no joint of the log" in told
+    assert "machine.joint_map.shoulder: is not a joint of the log" in told
 
 
 def states(folder: Path, names: tuple[str, ...], order: list[int]) -> Path:

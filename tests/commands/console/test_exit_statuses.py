@@ -262,6 +262,8 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("list", 0): lambda _: cdtool("list", "machines"),
     ("list", 2): lambda _: cdtool("list", "nothing"),
     ("list", 3): _broken_plugin,
+    ("schema", 0): lambda _: cdtool("schema", "machine"),
+    ("schema", 2): lambda _: cdtool("schema", "machines"),
 }
 
 

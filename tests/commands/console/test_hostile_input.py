@@ -401,11 +401,11 @@ def test_names_that_are_no_utf_8_are_shown_and_refused_in_one_line(tmp_path):
 
 def test_an_error_line_is_cut_at_300_characters_and_the_cut_is_marked(tmp_path):
     word = "\x1b[31m" + "long" * 500
-    text = MACHINE.replace('type = "linear_axis"', f"type = {json.dumps(word)}")
+    text = MACHINE.replace('column = "t"', f"column = {json.dumps(word)}")
     done = cdtool("info", LOG, "-m", written(tmp_path / "machine.toml", text))
     assert done.status == 2 and done.err.count("\n") == 1
     assert len(done.err) == LONGEST_LINE + 1 and "…" in done.err and "\x1b" not in done.err
-    assert "machine.toml: machine.type" in done.err and "known: " in done.err  # names the file and the next step
+    assert "no column" in done.err and "columns: " in done.err  # names the problem and the next step
 
 
 def test_left_out_lines_are_cut_as_well(tmp_path):

@@ -75,7 +75,7 @@ def test_detect_and_explain_use_the_first_seconds_with_warm_up(gate_folder):
     ("arguments", "words"),
     [
         (("--warm-up", "1"), "a warm-up requires a detector"),
-        (("--warm-up", "0", "-d", "gm"), "warm-up is 0"),
+        (("--warm-up", "0", "-d", "gm"), "warm_up is 0"),
         (("--warm-up", "1", "--limit", "40", "-d", "gm"), "one of --signature FILE, --limit VALUE, --warm-up SECONDS"),
         (("-d", "gm"), "give a signature, a limit or a warm-up"),
     ],

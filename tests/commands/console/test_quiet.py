@@ -16,7 +16,7 @@ from tests.command import Outcome, cdtool
 from tests.synthetic.builds import build_results
 
 # What these print is what they are asked for: nothing would be left of it.
-ONLY_A_TABLE = {"info", "explain", "list", "plan", "store", "study", "signature show", "protocol"}
+ONLY_A_TABLE = {"info", "explain", "list", "plan", "schema", "store", "study", "signature show", "protocol"}
 _HEADINGS = re.compile(r"^ *(detector|group|recording|stiffness|key|class|run) {2,}\w", re.MULTILINE)
 
 

@@ -12,6 +12,7 @@ from cdtool.base.errors import OutputError, RecordingError, UsageError
 from cdtool.base.files.writing import replaced
 from cdtool.commands.convert.converting import convert
 from cdtool.commands.judging.runs import read
+from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.reading import survey
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.written_files import WRITERS
@@ -119,8 +120,7 @@ def test_every_file_states_its_origin(suffix, tmp_path):
     log, machine = gate(tmp_path)
     path = Path(convert(log, tmp_path / f"out{suffix}", machine=machine).files[0])
     told = PROVENANCE[suffix](path)
-    original = logged(log, machine)
-    assert told["cdtool.source"] == "run.csv" and told["cdtool.sha256"] == original.digest
+    assert told["cdtool.source"] == "run.csv" and told["cdtool.sha256"] == file_digest(Path(log))
     assert told["cdtool.machine"] == "gate" and len(told["cdtool.machine_fingerprint"]) == 64
     assert told["cdtool.version"]
 

@@ -184,7 +184,7 @@ def test_an_arm_is_explained_joint_by_joint():
         ("stiff/01.csv", ("-d", "gm", "--limit", "many"), ("--limit", "many")),
         ("stiff/01.csv", ("-d", "gmm", "--limit", "3"), ("gmm", "did you mean gm")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--plot", "why.gif"), ("why.gif", ".svg")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "from 1 to")),
+        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "at least 1")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
         ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
         # The figure's folder is checked before the log.

@@ -1,4 +1,4 @@
-"""--set KEY=VALUE: the same results as the key in the file, stated in them, and computed anew with a store."""
+"""--set KEY=VALUE: the same results as the key in the file, stated in them, and computed again with a store."""
 
 from __future__ import annotations
 

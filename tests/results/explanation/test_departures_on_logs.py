@@ -86,7 +86,7 @@ def glitch(recording: Recording, height: float, start: float = 4.0, length: floa
     return changed(recording, "speed", added)
 
 
-def test_a_joint_that_is_stopped_has_left_its_normal_course(arm):
+def test_a_joint_that_is_stopped_has_left_its_normal_band(arm):
     item = explained("arm/trial_1", log("arm/trial_1", "stiff/01.csv"), arm, 6.0)
     assert item.runs > 5 and item.absent is None and item.glitches == ()
     by_channel = {found.channel: found for found in item.departed if found.joint == "arm"}

@@ -75,7 +75,7 @@ class ControllerSettings:
     units: tuple[str, str] = ("N", "m")
     #: The largest delay between error and command [samples]: drives answer within a few of their periods.
     largest_delay: int = 8
-    #: A parameter with a larger relative standard error is not identifiable: it says nothing of a simulated contact.
+    #: A parameter with a larger relative standard error is not identifiable: it does not describe a simulated contact.
     largest_relative_error: float = 0.3
     #: A section with fewer samples does not show an integral.
     fewest_samples: int = 100
