@@ -31,7 +31,7 @@ from cdtool.machines.planar_arm import PlanarArmTable
 from cdtool.machines.rotary_axis import RotaryAxisTable
 from cdtool.machines.urdf_robot import UrdfRobotTable
 from cdtool.thresholds.signature import Signature
-from cdtool.truth.force.limits import ForceProfile
+from cdtool.truth.force.limits import ForceProfile, ForceStep, PressureLimit
 
 DOCS = Path(__file__).resolve().parent
 _BEGIN, _END = "<!-- made by docs/make_lists.py -->\n", "<!-- end -->\n"
@@ -56,9 +56,11 @@ _MODELS: Mapping[str, Any] = {
     "obstacle": ObstacleTable,
     "onset": OnsetTable,
     "planar_arm": PlanarArmTable,
+    "pressure": PressureLimit,
     "profile": ForceProfile,
     "rotary_axis": RotaryAxisTable,
     "signature": Signature,
+    "step": ForceStep,
     "urdf_robot": UrdfRobotTable,
 }
 _SHORT = (

@@ -326,7 +326,7 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
     A wrong value is replaced by its default, so that what depends on it can still be checked. A single value stands for
     a list with one. None if a key that must be given is missing or wrong, or if the values do not fit together.
     """
-    keys = keys_of(model)
+    keys, known = keys_of(model), len(place.mistakes)
     given = {}
     for name, value in values.items():
         if name not in keys:
@@ -344,7 +344,8 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
     try:
         return model(**given, **filled_in)
     except CdtoolError as fault:
-        place.mistakes.append(place.whole(fault))
+        if len(place.mistakes) == known:  # else it may only follow from a value that was replaced
+            place.mistakes.append(place.whole(fault))
         return None
 
 

@@ -36,6 +36,7 @@ SHOWN_BY = {
     # They declare the options of these commands.
     "options": {"detect"},
     "settings": {"learn-signature"},
+    "settings_table": {"benchmark"},
     "log_options": {"detect"},
 }
 # Names of a user's own in examples.

@@ -405,7 +405,7 @@ def test_an_error_line_is_cut_at_300_characters_and_the_cut_is_marked(tmp_path):
     done = cdtool("info", LOG, "-m", written(tmp_path / "machine.toml", text))
     assert done.status == 2 and done.err.count("\n") == 1
     assert len(done.err) == LONGEST_LINE + 1 and "…" in done.err and "\x1b" not in done.err
-    assert "no column" in done.err and "columns: " in done.err  # names the problem and the next step
+    assert "no column" in done.err and "known: " in done.err  # names the problem and the next step
 
 
 def test_left_out_lines_are_cut_as_well(tmp_path):

@@ -178,7 +178,9 @@ def test_the_same_input_gives_the_same_bytes(tmp_path, suffix):
 
 
 def hostile(name: str) -> tuple[ForcePanel, ForceProfile]:
-    profile = replace(GAP, title=name, source=name, steps=tuple(replace(step, name=name) for step in GAP.steps))
+    profile = replace(
+        GAP, title=name, source=name, steps=tuple(replace(step, name=f"{name}{i}") for i, step in enumerate(GAP.steps))
+    )
     return ForcePanel(name, (curve(name, 900.0, alarms={name: 0.02}, profile=profile),)), profile
 
 

@@ -184,7 +184,7 @@ def test_a_file_of_the_user_replaces_the_shipped_one(tmp_path):
         ("from_s = 0.5", "from_s = 0.0", r"door: steps begin at 0, 0 s", "increase"),
         ("at_most_n = 80", "at_most_n = 0", r"door.steps\[2\].at_most_n", "above 0"),
         ("at_most_n = 80", "at_most_n = inf", r"door.steps\[2\].at_most_n", "above 0"),
-        ("at_most_n = 80", "at_most = 80", r"door.steps\[2\].at_most_n: is missing", "number"),
+        ("at_most_n = 80", "at_most = 80", r"door.steps\[2\].at_most: unknown key", "did you mean at_most_n"),
         ('"clamped"', '"impact"', r"door: steps name 'impact' twice", "different"),
         ('"clamped" }', '"clamped", unit = "N" }', r"door.steps\[2\].unit: unknown key", "at_most_n"),
         ("[door]", "limit = 3\n[door]", "limit: is 3", "table"),
