@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from cdtool.commands.init import motion_evidence as motion
 from cdtool.commands.init.column_blocks import of_blocks, on_circle
 from cdtool.commands.init.confirmation import confirm
-from cdtool.commands.init.name_evidence import BY_UNIT, Named, full_name, is_other, named, named_force, sides
+from cdtool.commands.init.names.name_evidence import BY_UNIT, Named, full_name, is_other, named, named_force, sides
 from cdtool.commands.init.names.units_in_names import label, may_be, pressure_unit
 from cdtool.commands.init.names.words import (
     BOUND,

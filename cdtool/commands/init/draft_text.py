@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.findings import Finding
-from cdtool.commands.init.clock_draft import Clock
 from cdtool.commands.init.derived_speed import LowPassGuess
 from cdtool.commands.init.machine_side import Side
 from cdtool.commands.init.names.units import Evidence
@@ -25,6 +24,16 @@ _GROUND_TRUTH = {
     "force": "ground truth only: is it the load cell of the test?",
     CONTACT_PRESSURE: "ground truth only: is it the pressure of the contact, not of oil or air?",
 }
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The keys of `time`, the reason, what to check, and the unit of the streams' times [s]; 0 for a placeholder."""
+
+    keys: Mapping[str, object]
+    why: str
+    check: str = ""
+    in_seconds: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,14 @@ from cdtool.base.remote.remote_path import location
 from cdtool.base.settings import Place
 from cdtool.commands.init.benchmark_draft import draft_benchmark
 from cdtool.commands.init.channel_guess import guess_channels
-from cdtool.commands.init.clock_draft import Clock, draft_clock
 from cdtool.commands.init.derived_speed import propose_low_pass
-from cdtool.commands.init.draft_text import Draft, UnreadWord, draft_text
+from cdtool.commands.init.draft_text import Clock, Draft, UnreadWord, draft_text
 from cdtool.commands.init.machine_side import side_of
-from cdtool.commands.init.names.units import Evidence, is_si
-from cdtool.commands.init.speed_ratio import ratio_of
-from cdtool.commands.init.streams import Channels, streams_of
-from cdtool.commands.init.table_clock import split_stamp, table_clock
+from cdtool.commands.init.names.units import Evidence, fits_as_well, is_si
+from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
+from cdtool.commands.init.speed_ratio import Ratio, ratio_of
+from cdtool.commands.init.streams import Channels, column_key, streams_of
+from cdtool.commands.init.table_clock import DraftedClock, split_stamp, table_clock
 from cdtool.commands.init.unmapped import Unmapped, unmapped_columns
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.information import info
@@ -42,6 +42,8 @@ from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.truth.force_vector import with_scalar_force
 from cdtool.truth.onset import OnsetRule
 
+# Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
+_SLOWEST = 2.0
 # Contradictions that a change of sign cures, and those of a channel that is another quantity.
 _REVERSED, _ANOTHER = ("friction", "sign"), ("place", "course", "still", "joints", "other joint")
 # So many words in columns of numbers may stand for missing values.
@@ -328,7 +330,7 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
         assumed = next((item.sentence for item in source.findings if item.kind == "clock_unit_assumed"), "")
         time = Clock({"column": "time", "unit": "s"}, "the file's own clock", assumed, 1.0)
     else:
-        time = draft_clock(channels, clock, ratio, side.gear is not None)
+        time = _clock(channels, clock, ratio, side.gear is not None)
     if stamp and time.keys.get("column") == stamp[0]:
         keys = {**time.keys, "nanoseconds": stamp[1]}
         time = replace(time, keys=keys, why="seconds and nanoseconds of one stamp, by their names")
@@ -365,3 +367,48 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
     if len(named) == channels.joints:
         return named, "names from the columns"
     return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
+
+
+def _clock(channels: Channels, clock: DraftedClock | None, ratio: Ratio | None, geared: bool) -> Clock:
+    """Return the clock of a table; `geared`: position and speed are of two sides of a gear."""
+    if clock is None:
+        text = "a placeholder: no column looks like a clock: give the rate, or a column with its unit"
+        return Clock({"rate_hz": 1000.0}, "", text)
+    why, check, rate, unit = "its name or its steps", "", 0.0, clock.unit
+    if (named := unit_in_name("time", clock.column)) and not clock.counts:
+        why += f", although its name ends with {named}"
+    if clock.told:
+        why, check = clock.told, "" if geared else _doubt(channels, clock, ratio)
+    elif ratio is not None and ratio.fitting:
+        first = ratio.fitting[0]
+        pair = f"{first.position} and {first.speed}"
+        if ratio.tick:
+            why, rate = f"{why}; rate: with {pair}", 1.0 / ratio.tick
+            check = f"counts, not a time: the rate is correct if position and speed are in {pair}"
+        else:
+            why, unit = f"{why}; unit: steps of {clock.step:.4g} {first.clock}, with {pair}", first.clock
+            check = f"the unit is not stated; {fits_as_well(ratio, False) or 'no other fits the ratio'}"
+    elif clock.counts:
+        rate = 1000.0 / clock.step
+        check = "counts, not a time: 1000 steps per second is a placeholder; give the rate"
+    else:
+        rates = ", ".join(f"{1.0 / (clock.step * factor_of(unit)):.6g} Hz in {unit}" for unit in clock.units())
+        check = f"the unit is not stated: steps of {clock.step:.4g} are {rates}"
+    keys = {"column": column_key(clock.column)}
+    if rate:
+        seconds = ratio.tick if ratio is not None else 0.0
+        return Clock({**keys, "rate_hz": float(f"{rate:.5g}")}, why, check, seconds / clock.assumed)
+    return Clock({**keys, "unit": unit}, why, check, factor_of(unit) / clock.assumed)
+
+
+def _doubt(channels: Channels, clock: DraftedClock, ratio: Ratio | None) -> str:
+    """Return the doubt about a clock's unit that is only written: another fits the ratio, or the rate is too low."""
+    rate = 1.0 / (clock.step * factor_of(clock.unit))
+    if not clock.written:
+        return ""
+    if ratio is not None and not ratio.fitting:
+        other = ratio_of(channels, replace(clock, told=""), messages_si=False)
+        if other is not None and other.fitting and not other.tick:
+            first = other.fitting[0]
+            return f"{first.clock} with {first.position}, {first.speed} fits the ratio, {clock.unit} does not"
+    return f"steps of {clock.step:.4g} {clock.unit} are {rate:.3g} Hz" if rate < _SLOWEST else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cdtool.commands.init import motion_evidence as motion
-from cdtool.commands.init.name_evidence import named, named_force
+from cdtool.commands.init.names.name_evidence import named, named_force
 from cdtool.commands.init.names.units_in_names import is_foreign, label
 from cdtool.commands.init.names.words import says, what_else
 from cdtool.commands.init.stream import Stream
