@@ -59,7 +59,8 @@ class MistakesError(ConfigurationError):
     """Several mistakes of a file: `mistakes`, in its order."""
 
     def __init__(self, mistakes: Sequence[ConfigurationError]) -> None:
-        super().__init__("\n".join(map(str, mistakes)))
+        channels = [item.channel for item in mistakes if item.channel]
+        super().__init__("\n".join(map(str, mistakes)), channel=channels[0] if channels else "")
         self.mistakes = tuple(mistakes)
 
 

@@ -40,16 +40,19 @@ CountFromZero = Annotated[int, Meta(ge=0)]
 NOT_A_KEY = Meta(extra={"key": None})
 
 
-def setting(meaning: str, *, key: str = "", unit: str = "", infinite: bool = False, hint: str = "") -> Meta:
+def setting(
+    meaning: str, *, key: str = "", unit: str = "", infinite: bool = False, empty: bool = False, hint: str = ""
+) -> Meta:
     """Return the annotation of a field: what it means, its key in a file if that is not its name, and its unit.
 
-    `infinite`: inf is allowed, for a limit that is not there. `hint`: what to give in place of a wrong value, where
-    type and bounds do not say it.
+    `infinite`: inf is allowed, for a limit that is not there. `empty`: so is an empty list. `hint`: what to give in
+    place of a wrong value, where type and bounds do not say it.
 
     >>> from typing import Annotated
     >>> Hold = Annotated[NotNegative, setting("how long the force stays above", key="hold_s", unit="s")]
     """
-    return Meta(description=meaning, extra={"key": key, "unit": unit, "infinite": infinite, "hint": hint})
+    extra = {"key": key, "unit": unit, "infinite": infinite, "empty": empty, "hint": hint}
+    return Meta(description=meaning, extra=extra)
 
 
 @dataclass(frozen=True)
@@ -360,7 +363,8 @@ def _value(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
         return _table(key, tables[0], value, place.below(name))
     lists = [kind for kind in kinds if get_origin(kind) in (tuple, list)]
     of_tables = bool(lists) and is_model(bare_type(get_args(lists[0])[0]))
-    if lists and (isinstance(value, list) or (len(lists) == len(parts) and not of_tables)):
+    stands_alone = not of_tables and not any(map(_is_scalar, parts))
+    if lists and (isinstance(value, list) or stands_alone):
         return _list(key, lists[0], name, value, place)
     found, problem, allowed = _scalar(key, hint, value)
     if problem and of_tables:
@@ -398,6 +402,9 @@ def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
     kinds = [part for part in get_args(hint) if part is not Ellipsis]
     single = not isinstance(value, list)
     items = [value] if single else value
+    if not items and _is_scalar(kinds[0]) and not key.extra.get("empty"):
+        place.note(name, "is empty", key.allowed)
+        return _WRONG
     if Ellipsis not in get_args(hint) and get_origin(hint) is tuple and len(items) != len(kinds):
         place.note(name, f"has {len(items)} values", key.allowed)
         return _WRONG
@@ -412,15 +419,15 @@ def check(values: Any) -> None:
     For `__post_init__` of a model that is also made in Python.
     """
     for key in keys_of(type(values)).values():
-        value = getattr(values, key.attribute)
-        if isinstance(value, dict) or is_model(type(value)):
+        value, parts = getattr(values, key.attribute), alternatives(key.hint)
+        if any(is_model(bare_type(part)) or get_origin(bare_type(part)) is dict for part in parts):
             continue
-        lists = [bare_type(part) for part in alternatives(key.hint) if get_origin(bare_type(part)) is tuple]
-        hint = get_args(lists[0])[0] if lists and isinstance(value, tuple) else key.hint
-        for item in value if isinstance(value, tuple) else (value,):
+        lists = [bare_type(part) for part in parts if get_origin(bare_type(part)) is tuple]
+        is_list = bool(lists) and hasattr(value, "__len__") and not isinstance(value, str | dict)
+        for item in value if is_list else (value,):
             if item is None and NoneType in get_args(bare_type(key.hint)):
                 continue
-            # A number of numpy is one of Python.
-            _, problem, allowed = _scalar(key, hint, getattr(item, "item", lambda item=item: item)())
+            number = item.item() if getattr(item, "shape", None) == () else item  # of numpy
+            _, problem, allowed = _scalar(key, get_args(lists[0])[0] if is_list else key.hint, number)
             if problem:
                 raise UsageError(f"{key.attribute} {problem}", allowed)

@@ -161,6 +161,8 @@ def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:
             hint = "set it there, or give detect --operations motion"
             raise at.fault("operations", "is a key of the benchmark file", hint)
     kind = table.get("type")
+    if kind is None and not place.is_whole:
+        return None
     known = MACHINES.names_for(kind)
     if kind not in known:
         problem = "is missing" if kind is None else f"is {value_in_words(kind)}"

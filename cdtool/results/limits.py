@@ -81,7 +81,7 @@ def limit_rules(
     """
     full = {name: name for name, _ in detectors} | {short: name for name, short in detectors} | {ALL: ALL}
     rules = []
-    for key, bounds in limits.items():
+    for key, bounds in limits.items() if place.is_whole else ():
         detector, _, rest = key.partition(".")
         group, _, figure = rest.rpartition(".")  # the name of a group may contain dots
         group = group or ALL

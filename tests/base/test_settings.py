@@ -176,3 +176,23 @@ def test_a_broken_line_is_one_mistake_and_the_rest_of_the_file_is_read(tmp_path)
     lines = [str(mistake) for mistake in place.mistakes]
     assert ["at line 2" in lines[0], "at line 3" in lines[1]] == [True, True]
     assert [line.split(": ")[1] for line in lines[2:]] == ["mass_kg", "groups.a.rate_hz"]
+
+
+@pytest.mark.parametrize("key", ["names", "limits"])
+def test_an_empty_list_is_refused_unless_the_field_allows_it(key):
+    (found,) = mistakes(**{key: []})
+    assert f"m.toml: {key}: is empty" in found
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"mass": {}}, {"mass": (1.0,)}, {"mass": np.array([1.0, 2.0])}, {"side": {}}, {"limits": {}}, {"limits": "x"}],
+)
+def test_python_values_of_another_kind_are_refused(given):
+    with pytest.raises(UsageError, match=next(iter(given))):
+        Outer(**given)
+
+
+@pytest.mark.parametrize("limits", [[1.0, 2.0], np.array([1.0, 2.0]), (1, 2)])
+def test_python_lists_and_arrays_stand_for_tuples(limits):
+    assert list(Outer(limits=limits).limits) == [1.0, 2.0]

@@ -120,7 +120,7 @@ class LogsOf:
             for path in find_logs([str(pattern)], self.base, place.key("logs"), runs=self.runs):
                 if found.setdefault(path, section) != section:
                     raise place.fault("logs", f"names {path} with two different parts", "name each log once")
-        if not found:
+        if not found and place.is_whole:
             raise place.fault("logs", "is empty", "name at least one log")
         return {path: found[path] for path in self._without_files_beside(list(found))}
 

@@ -11,6 +11,7 @@ from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.files.bounded_loading import read_bytes, read_toml
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import Place, read, setting
+from cdtool.base.value_words import value_in_words
 from cdtool.commands.protocol.assessment.plan import MeasuringPoint, TestPlan
 from cdtool.truth.force.limits import ForceProfile, profile_of, read_force_limits
 
@@ -85,7 +86,9 @@ def read_protocol_file(path: str | Path) -> ProtocolFile:
     file = location(path)
     place = Place(str(file))
     values = read_toml(file, "a protocol file", place)
-    if not isinstance(values.get(TABLE), dict):
+    if TABLE in values and not isinstance(values[TABLE], dict):
+        raise place.fault(TABLE, f"is {value_in_words(values[TABLE])}", f"add a table [{TABLE}]")
+    if TABLE not in values:
         raise ConfigurationError(f"{file}: has no table [protocol]", "draft one: cdtool protocol init BENCHMARK")
     is_benchmark = "machine" in values
     for name in values:

@@ -159,7 +159,7 @@ class BenchmarkTable(JudgingTable):
     machine: Annotated[str, setting("the machine file")]
     detectors: Annotated[
         tuple[str, ...] | None,
-        setting("full or short names, each once, or all; required unless the command names them"),
+        setting("full or short names, each once, or all; required unless the command names them", empty=True),
     ] = None
     learn: Annotated[LearnTable | None, setting("impact-free logs to learn from")] = None
     holdout: Annotated[

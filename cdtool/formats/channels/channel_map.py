@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from cdtool.base.errors import nearest
+from cdtool.base.errors import ConfigurationError, nearest
 from cdtool.base.log_names import log_stem
 from cdtool.base.settings import CountFromZero, NotNegative, Place, Positive, Text, read, setting
 from cdtool.base.value_words import value_in_words
@@ -378,7 +379,7 @@ class _Sources:
         found = []
         for name in given:
             if name in CHANNELS and (channel := getattr(table, name)) is not None:
-                with place.noting():
+                with place.noting(), _about(name):
                     found.append(self.source(name, channel, given[name], place.below(name)))
         return found
 
@@ -449,6 +450,16 @@ class _Sources:
                 place.note(name, "unknown key", nearest(name, allowed))
         if table.kind == "duty" and channel != "torque":
             place.note("kind", "'duty' is only for the torque channel", "remove it")
+
+
+@contextmanager
+def _about(channel: str) -> Iterator[None]:
+    """State the channel in an error that is raised inside, for code that can do without one."""
+    try:
+        yield
+    except ConfigurationError as fault:
+        fault.channel = channel
+        raise
 
 
 def _kinds(given: Mapping[str, str], place: Place) -> tuple[tuple[float, str], ...]:

@@ -12,7 +12,7 @@ from cdtool.base.settings import Place, read
 from cdtool.base.value_words import value_in_words
 from cdtool.machines.axis import Axis
 from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
-from cdtool.machines.joint_machine import JointMachine, PerJoint, per_joint
+from cdtool.machines.joint_machine import JointMachine, PerJoint, PerJointNotNegative, per_joint
 
 # What [machine] gives, so that it must not be repeated in [model.drive].
 _FROM_MACHINE = ("load_mass",)
@@ -38,6 +38,7 @@ class Bristle:
                 )
 
 
+_SIGNED = ("offset",)  # all others are at least 0
 _PARTS: dict[str, type[Any]] = {
     "drive": ElasticDrive,
     "friction": Friction,
@@ -49,8 +50,12 @@ _PARTS: dict[str, type[Any]] = {
 _NUMBERS = {
     name: tuple(item.name for item in fields(part) if item.name not in _NOT_KEYS) for name, part in _PARTS.items()
 }
+_RIGID: list[Any] = [("rigid", bool, False)]
 _SECTIONS = {
-    name: make_dataclass(name, [(key, PerJoint, ()) for key in keys] + [("rigid", bool, False)] * (name == "drive"))
+    name: make_dataclass(
+        name,
+        [(key, PerJoint if key in _SIGNED else PerJointNotNegative, ()) for key in keys] + _RIGID * (name == "drive"),
+    )
     for name, keys in _NUMBERS.items()
 }
 

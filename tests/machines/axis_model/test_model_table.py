@@ -82,6 +82,8 @@ accelerometer_hz = 25
         ("[model.drive]\nload_mass = 1", "model.drive.load_mass: unknown key"),
         ("[model.motor]\nx = 1", "model.motor: unknown key"),
         ('[model.controller]\nperiod = "a"', "model.controller.period: is 'a'"),
+        ("[model.drive]\nstiffness = -1", r"model\.drive\.stiffness: is -1"),
+        ("[model.friction]\ncoulomb_forward = -1", r"model\.friction\.coulomb_forward: is -1"),
     ],
 )
 def test_a_wrong_key_is_named(tmp_path: Path, more: str, message: str) -> None:
@@ -94,8 +96,6 @@ def test_a_wrong_key_is_named(tmp_path: Path, more: str, message: str) -> None:
     [
         ("[model.controller]\nspeed_gain = 4300", "model.controller.period is missing"),
         ("[model.drive]\nmotor_mass = 100", "are both given"),
-        ("[model.drive]\nstiffness = -1", "stiffness is -1"),
-        ("[model.friction]\ncoulomb_forward = -1", "coulomb_forward is -1"),
     ],
 )
 def test_values_that_make_no_model_are_refused(tmp_path: Path, more: str, message: str) -> None:
