@@ -58,10 +58,17 @@ class ConfigurationError(CdtoolError):
 class MistakesError(ConfigurationError):
     """Several mistakes of a file: `mistakes`, in its order."""
 
-    def __init__(self, mistakes: Sequence[ConfigurationError]) -> None:
-        channels = [item.channel for item in mistakes if item.channel]
-        super().__init__("\n".join(map(str, mistakes)), channel=channels[0] if channels else "")
-        self.mistakes = tuple(mistakes)
+    mistakes: tuple[ConfigurationError, ...] = ()
+
+    @classmethod
+    def of(cls, mistakes: Sequence[ConfigurationError]) -> ConfigurationError:
+        """Return the mistakes as one error; a single one is itself."""
+        if len(mistakes) == 1:
+            return mistakes[0]
+        channel = next((item.channel for item in mistakes if item.channel), "")
+        found = cls("\n".join(map(str, mistakes)), channel=channel)
+        found.mistakes = tuple(mistakes)
+        return found
 
 
 class RecordingError(CdtoolError):

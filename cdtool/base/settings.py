@@ -228,7 +228,7 @@ def _is_scalar(hint: Any) -> bool:
 class Place:
     """Where in a file values stand, and the mistakes that were found in the file so far.
 
-    `misspelt`: full keys that unknown ones are probably meant to be. `by_option`: full keys that an option gave.
+    `misspelt`: full keys that unknown ones are probably meant to be. `by_option`: the option that gave a full key.
     `root`: the model of the whole file, to say where a key belongs.
     """
 
@@ -236,13 +236,15 @@ class Place:
     prefix: str = ""
     mistakes: list[ConfigurationError] = field(default_factory=list)
     misspelt: list[str] = field(default_factory=list)
-    by_option: frozenset[str] = frozenset()
+    by_option: Mapping[str, str] = field(default_factory=dict)
     root: type[Any] | None = None
 
     def key(self, name: str) -> str:
-        """Return file and full key, for an error message; for one of `by_option`, the option that gave it."""
+        """Return file and full key, for an error message; or the option that gave it."""
         full = f"{self.prefix}{name}"
-        given = any(f"{option}.".startswith(f"{full}.") for option in self.by_option)
+        if full in self.by_option:
+            return self.by_option[full]
+        given = any(key.startswith(f"{full}.") for key in self.by_option)
         return f"--set {full}" if given else f"{self.where}: {full}"
 
     def home_of(self, name: str) -> str:
@@ -315,7 +317,7 @@ class Place:
     def finish(self) -> None:
         """Raise the mistakes that were found, all at once."""
         if self.mistakes:
-            raise self.mistakes[0] if len(self.mistakes) == 1 else MistakesError(self.mistakes)
+            raise MistakesError.of(self.mistakes)
 
 
 _WRONG: Any = object()

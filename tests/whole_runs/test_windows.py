@@ -6,6 +6,7 @@ import errno
 import io
 import re
 import sys
+from contextlib import closing
 from pathlib import Path, PureWindowsPath
 
 import pytest
@@ -203,5 +204,5 @@ def test_a_large_record_is_read_in_as_many_calls_as_the_system_needs(monkeypatch
     monkeypatch.setattr(file_bytes, "_MOST_AT_ONCE", 1000)
     content = bytes(range(256)) * 40
     (tmp_path / "a.mcap").write_bytes(content)
-    with file_bytes.FileBytes(tmp_path / "a.mcap") as file:
+    with closing(file_bytes.FileBytes(tmp_path / "a.mcap")) as file:
         assert bytes(file.read(5, 9000)) == content[5:9005]

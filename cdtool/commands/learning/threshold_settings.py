@@ -16,6 +16,7 @@ from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 
 _DEFAULT = "signature"
+_OPTIONS = {"alignment": "align"}  # of the command line, where their names differ from those of the settings
 
 
 def threshold_of(
@@ -69,9 +70,11 @@ def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], defau
     Raises ConfigurationError for an unknown name or key, or a wrong value.
     """
     settings = given_settings(given)
-    place = Place("--set")
+    options = {key: f"--{_OPTIONS.get(key, key.replace('_', '-'))}" for key in signature}
     if name == _DEFAULT:
+        options = {key: option for key, option in options.items() if key not in settings}
         signature, settings = {**signature, **settings}, {}
+    place = Place("--set", by_option=options)
     own = read(Signature, signature, place) or Signature()
     rule = threshold_of({"name": name, **settings}, own, default_sides, place)
     place.finish()

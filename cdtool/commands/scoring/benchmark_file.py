@@ -378,7 +378,7 @@ def read_benchmark_file(
     `also_known`. `settings` take the place of keys of the file, as "activation.debounce".
     """
     file = location(path)
-    place = Place(str(file), by_option=frozenset(settings or ()), root=BenchmarkTable)
+    place = Place(str(file), by_option={key: f"--set {key}" for key in settings or ()}, root=BenchmarkTable)
     values = read_toml(file, "a benchmark file", place)
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
