@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
-from cdtool.base.arrays import FloatArray
+from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.detectors.detection import WHOLE_MACHINE
 from cdtool.recordings.recording import REFERENCES, Recording
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, NormalMotion, levels_of
@@ -170,7 +169,7 @@ def _departure(
             channel, value=float(value[start + k]), mean=float(mean[start + k]), spread=float(spread[start + k]), **more
         )
 
-    outside = [np.flatnonzero(sliding_window_view(sign * off > LEFT, LASTING).all(axis=1))[:1] for sign in (1.0, -1.0)]
+    outside = [np.flatnonzero(_lasts(sign * off > LEFT))[:1] for sign in (1.0, -1.0)]
     firsts = [(int(found[0]), sign) for found, sign in zip(outside, (1.0, -1.0), strict=True) if len(found)]
     if not firsts:
         return at(int(np.nanargmax(np.abs(off))), reason=STAYED)
@@ -183,6 +182,13 @@ def _departure(
     # The line through half of the limit and the limit meets the normal band where the departure began.
     began = float(half - min(left - half, RESOLUTION))
     return at(farthest, time=began, direction="up" if sign > 0 else "down")
+
+
+def _lasts(outside: BoolArray) -> BoolArray:
+    """Return where `LASTING` consecutive samples (n,), of at least so many, begin that are all outside."""
+    count = np.concatenate(([0], np.cumsum(outside)))
+    lasts: BoolArray = count[LASTING:] - count[:-LASTING] == LASTING
+    return lasts
 
 
 def _in_order(found: Sequence[Departure], joint: str) -> tuple[Departure, ...]:
