@@ -37,6 +37,7 @@ SHOWN_BY = {
     "options": {"detect"},
     "settings": {"learn-signature"},
     "settings_table": {"benchmark"},
+    "benchmark_file": {"benchmark"},
     "log_options": {"detect"},
 }
 # Names of a user's own in examples.

@@ -64,6 +64,8 @@ PARSED_ELSEWHERE = {
     "cdtool/commands/protocol/document/words.py": "a file of the package",
     "cdtool/commands/init/command.py": "one value of an option",
     "cdtool/base/findings/kinds.py": "a file of the package",
+    "cdtool/commands/init/names/units_in_names.py": "the table of units that ships with cdtool",
+    "cdtool/commands/init/names/words.py": "the table of words that ships with cdtool",
 }
 
 
