@@ -56,8 +56,10 @@ class Csv:
             dialect = find_dialect(path, pins or (TablePins() if wanted is None else wanted.pins))
             if wanted is not None:
                 return _read_wanted(dialect, wanted)
-            pieces = split_by_clock(read_table(dialect, dialect.names))
-            return join_pieces(pieces_by_own_clock(dialect, Clocks.by_names(dialect), pieces, None), sort=False)
+            table, clocks = read_table(dialect, dialect.names), Clocks.by_names(dialect)
+            if len(clocks.groups) < 2:  # joined from pieces, a large table would be in memory twice
+                return table
+            return join_pieces(pieces_by_own_clock(dialect, clocks, split_by_clock(table), None), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
