@@ -97,7 +97,7 @@ def test_a_log_without_one_axis_has_no_force(tmp_path):
     ("force", "expected"),
     [
         ('{ columns = ["a", "b", "c", "d"], unit = "N" }', "names 4 axes"),
-        ('{ columns = [], unit = "N" }', "names 0 axes"),
+        ('{ columns = [], unit = "N" }', "columns: is empty"),
         ('{ columns = ["a", "a"], unit = "N" }', "an axis twice"),
         ('{ columns = ["a", "b"], unit = "N", direction = "z" }', "is 'z'"),
         ('{ columns = ["a", "b"], unit = "N", direction = [1.0] }', "has 1 values"),
