@@ -85,31 +85,59 @@ def join_pieces(pieces: Pieces, sort: bool) -> Source:
     run = PieceRun(pieces)
     times: dict[str, list[FloatArray]] = {}
     counts: dict[str, int] = {}
-    parts: dict[str, tuple[str, list[tuple[int, FloatArray]]]] = {}
+    parts: dict[str, tuple[str, _Grown]] = {}
     for piece in run:
         first = counts.get(piece.clock, 0)
         counts[piece.clock] = first + piece.rows
         if piece.time is not None:
             times.setdefault(piece.clock, []).append(piece.time)
         for name, values in piece.values.items():
-            parts.setdefault(name, (piece.clock, []))[1].append((first, values))
+            parts.setdefault(name, (piece.clock, _Grown()))[1].add(first, values)
     clocks = {clock: _in_order(np.concatenate(arrays), sort) for clock, arrays in times.items()}
     columns: dict[str, Column] = {}
     for name, column in run.source.columns.items():
-        clock, arrays = parts.pop(name, ("", []))  # popped, so that at most one column exists twice in memory
-        values = _assemble(arrays, counts.get(clock, 0), column.values.shape[1:])
+        clock, grown = parts.pop(name, ("", _Grown()))
+        values = grown.up_to(counts.get(clock, 0), column.values.shape[1:])
         time, order = clocks.get(clock, (None, None))
         columns[name] = replace(column, values=values if order is None else values[order], time=time)
     return replace(run.source, columns=columns)
 
 
-def _assemble(parts: list[tuple[int, FloatArray]], rows: int, shape: tuple[int, ...]) -> FloatArray:
-    if len(parts) == 1 and len(parts[0][1]) == rows:  # without a copy
-        return parts[0][1]
-    values = np.full((rows, *shape), np.nan)
-    for first, part in parts:
-        values[first : first + len(part)] = part
-    return values
+class _Grown:
+    """One array that grows with its pieces: a list of pieces would be in memory beside the array made of it."""
+
+    def __init__(self) -> None:
+        self._values: FloatArray | None = None
+        self._filled = 0
+
+    def add(self, first: int, part: FloatArray) -> None:
+        """Append a piece that begins at row `first`; rows before it that no piece had are missing."""
+        after = first + len(part)
+        if self._values is None and first == 0:
+            self._values = part  # the only one of a small file, without a copy
+        else:
+            values = self._room(after, part.shape[1:])
+            values[self._filled : first] = np.nan
+            values[first:after] = part
+        self._filled = after
+
+    def _room(self, rows: int, shape: tuple[int, ...]) -> FloatArray:
+        if self._values is None or not self._values.flags.owndata or not self._values.flags.writeable:
+            values = np.empty((rows + rows // 8, *shape))
+            if self._values is not None:
+                values[: self._filled] = self._values
+            self._values = values
+        elif len(self._values) < rows:
+            self._values.resize((rows + rows // 8, *shape), refcheck=False)
+        return self._values
+
+    def up_to(self, rows: int, shape: tuple[int, ...]) -> FloatArray:
+        """Return `rows` values (rows, *shape); those that no piece had are missing."""
+        if self._values is not None and len(self._values) == rows == self._filled:
+            return self._values
+        values = self._room(rows, shape)
+        values[self._filled :] = np.nan
+        return values[:rows]
 
 
 def _in_order(time: FloatArray, sort: bool) -> tuple[FloatArray, np.ndarray[tuple[int], np.dtype[np.intp]] | None]:
