@@ -1,6 +1,6 @@
 """Settings that people write: each is one annotated field of a model, with type, bounds, unit, default and meaning.
 
-A model is a dataclass or a `msgspec.Struct`. Its fields are the keys of a table in a TOML file: they give the check of
+A model is a dataclass. Its fields are the keys of a table in a TOML file: they give the check of
 each value, the error with what is allowed, and the JSON schema. A field of a type that no TOML value has is not a key.
 """
 
@@ -99,18 +99,16 @@ def _keys_of(model: Hashable) -> Mapping[str, Key]:
 
 def _fields_of(model: Any) -> list[tuple[str, bool, str]]:
     """Return the names of a model's fields, whether each must be given, and its meaning if its metadata has it."""
-    if is_dataclass(model):
-        return [
-            (item.name, item.default is MISSING and item.default_factory is MISSING, item.metadata.get("meaning", ""))
-            for item in fields(model)
-            if item.init
-        ]
-    return [(item.name, item.required, "") for item in msgspec.structs.fields(model)]
+    return [
+        (item.name, item.default is MISSING and item.default_factory is MISSING, item.metadata.get("meaning", ""))
+        for item in fields(model)
+        if item.init
+    ]
 
 
 def is_model(hint: Any) -> bool:
     """Whether a type is a table with keys of its own."""
-    return is_dataclass(hint) or (isinstance(hint, type) and issubclass(hint, msgspec.Struct))
+    return is_dataclass(hint)
 
 
 def _is_written(hint: Any) -> bool:

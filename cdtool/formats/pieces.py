@@ -109,6 +109,7 @@ class _Grown:
     def __init__(self) -> None:
         self._values: FloatArray | None = None
         self._filled = 0
+        self._is_own = False
 
     def add(self, first: int, part: FloatArray) -> None:
         """Append a piece that begins at row `first`; rows before it that no piece had are missing."""
@@ -122,11 +123,11 @@ class _Grown:
         self._filled = after
 
     def _room(self, rows: int, shape: tuple[int, ...]) -> FloatArray:
-        if self._values is None or not self._values.flags.owndata or not self._values.flags.writeable:
+        if self._values is None or not self._is_own:  # a piece's array may be its time, or be seen elsewhere
             values = np.empty((rows + rows // 8, *shape))
             if self._values is not None:
                 values[: self._filled] = self._values
-            self._values = values
+            self._values, self._is_own = values, True
         elif len(self._values) < rows:
             self._values.resize((rows + rows // 8, *shape), refcheck=False)
         return self._values

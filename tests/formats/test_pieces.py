@@ -155,3 +155,18 @@ def test_columns_in_memory_are_one_piece_per_clock():
     assert [sorted(piece.values) for piece in run] == [["a", "b"], ["c"]]
     assert same(source, join_pieces(split_by_clock(source), sort=False))
     assert all(len(column.values) == 0 for column in run.source.columns.values())
+
+
+def test_a_piece_whose_values_are_its_time_keeps_both():
+    """The column grows in an array of its own: a piece's array may be seen elsewhere."""
+
+    def pieces():
+        for first in range(0, 300_000, 100_000):
+            time = np.arange(first, first + 100_000, dtype=np.float64)
+            yield Piece("0", time, {"t": time}, len(time))
+        return Source(Path("a"), "csv", {"t": Column("t", np.empty(0), np.empty(0), "s")})
+
+    column = join_pieces(pieces(), sort=False).columns["t"]
+    assert column.time is not None
+    np.testing.assert_array_equal(column.values, np.arange(300_000.0))
+    np.testing.assert_array_equal(column.time, np.arange(300_000.0))
