@@ -113,6 +113,8 @@ class _Grown:
 
     def add(self, first: int, part: FloatArray) -> None:
         """Append a piece that begins at row `first`; rows before it that no piece had are missing."""
+        if self._values is not None and part.shape[1:] != self._values.shape[1:]:
+            return  # an array whose length changes: its source leaves it out, with a finding
         after = first + len(part)
         if self._values is None and first == 0:
             self._values = part  # the only one of a small file, without a copy
