@@ -30,7 +30,6 @@ class Csv:
 
     name: ClassVar[str] = "csv"
     suffixes: ClassVar[tuple[str, ...]] = (".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".lvm")
-    sniffs_any_text: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
         """Return whether the file starts with text other than markup, and is not of another format of text."""
