@@ -1,18 +1,18 @@
 """Write docs/robustness.md: how every detector with every threshold performs when a simulated machine has changed.
 
     python docs/make_robustness.py                       # simulate and score everything: about 20 minutes on two cores
-    python docs/make_robustness.py --page                # only write the page again, from docs/robustness.json
+    python docs/make_robustness.py --page                # only page and picture again, from docs/robustness.csv
     python docs/make_robustness.py --machines gate --seeds 1 --runs 4 --impacts 2 -o try
 
 Each seed of a machine: runs to learn from and recordings of the machine as it is, and of each change; a benchmark file
-with [conditions] for each threshold. Results of all seeds are added up in robustness.json, from which the page is made:
-every sentence about the results follows from them by a rule in this file.
+with [conditions] for each threshold. Results of all seeds are added up in robustness.csv, from which page and picture
+are made: every sentence about the results follows from them by a rule in this file.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import csv
 import math
 import sys
 import tempfile
@@ -20,18 +20,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from cdtool import benchmark, simulate_arm, simulate_gate
 from cdtool.base.plain_text import counted
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.detectors import DETECTORS
+from cdtool.report.plots.figures import drawing, new_figure, save
 from cdtool.results.changed_conditions import OnMachine, condition_rows
 from cdtool.statistics.rates import binomial_share
 from cdtool.thresholds import THRESHOLDS
 
 DOCS = Path(__file__).resolve().parent
-PAGE, RESULTS, COMMAND = "robustness.md", "robustness.json", "python docs/make_robustness.py"
+PAGE, RESULTS, PICTURE = "robustness.md", "robustness.csv", "images/robustness.png"
+COMMAND = "python docs/make_robustness.py"
 FIRST_SEED = 701
 LEARNED_RUNS = 30
 GROUPS = ("stiff", "soft")
@@ -59,8 +60,6 @@ LEARNED_SPEEDS = {"slow": 0.8, "nominal": 1.0, "fast": 1.2}
 # The largest shares of alarming runs, and of runs, contacts and further samples that are not assessable, with which a
 # combination of a detector and a threshold tolerates a change.
 MOST_ALARMING, MOST_NOT_ASSESSABLE = 0.05, 0.1
-# A threshold that is so many times slower as learned, in stiff or soft contacts, is not named as one that helps.
-MOST_SLOWER = 2.0
 PAIRS = {
     "friction ±20 %": ("friction +20 %", "friction -20 %"),
     "speed ±10 %": ("speed +10 %", "speed -10 %"),
@@ -68,6 +67,10 @@ PAIRS = {
 }
 SPEEDS = (*PAIRS["speed ±10 %"], *PAIRS["speed ±20 %"])
 _MOST_NAMED = 4
+# Tolerated, not tolerated, hardly assessable: pale enough for black numbers, apart for colour-blind readers.
+_COLOURS = ("#A8DDB5", "#F4B183", "#E3E3E3")
+COUNTS = ("seeds", "runs", "assessable", "alarming", "contacts", "not_assessable", "missed")
+KEYS = ("machine", "detector", "threshold", "state")
 
 CONDITION = """
 [conditions."{change}"]
@@ -114,20 +117,22 @@ class Cell:
                 self.detected[group] += summary.detected
                 self.latency_sum[group] += summary.detected * summary.mean_ms
 
-    def to_list(self) -> list[float]:
-        """Return the values as they are in robustness.json."""
-        counts = [self.alarming, self.assessable, self.runs, self.contacts, self.missed, self.not_assessable]
-        counts += [self.seeds, *self.detected.values()]
-        return [*counts, *(round(total, 1) for total in self.latency_sum.values()), round(self.unassessed, 3)]
+    @property
+    def row(self) -> dict[str, float]:
+        """Return the values as they are in robustness.csv."""
+        means = {f"{group}_ms": round(self.mean(group), 3) for group in GROUPS}
+        counts = {name: getattr(self, name) for name in COUNTS}
+        detected = {f"{group}_detected": count for group, count in self.detected.items()}
+        return {**counts, **detected, **means, "unassessed_samples": round(self.unassessed / self.seeds, 4)}
 
     @classmethod
-    def of_list(cls, values: Sequence[float]) -> Cell:
-        """Return the cell of these values."""
-        *counts, stiff, soft, stiff_sum, soft_sum, unassessed = values
-        detected = dict(zip(GROUPS, (int(stiff), int(soft)), strict=True))
-        latencies = dict(zip(GROUPS, (stiff_sum, soft_sum), strict=True))
-        alarming, assessable, runs, contacts, missed, not_assessable, seeds = map(int, counts)
-        return cls(alarming, assessable, runs, contacts, missed, not_assessable, seeds, unassessed, detected, latencies)
+    def of_row(cls, row: Mapping[str, str]) -> Cell:
+        """Return the cell of a row of robustness.csv."""
+        counts = {name: int(row[name]) for name in COUNTS}
+        detected = {group: int(row[f"{group}_detected"]) for group in GROUPS}
+        sums = {group: count * float(row[f"{group}_ms"]) if count else 0.0 for group, count in detected.items()}
+        unassessed = counts["seeds"] * float(row["unassessed_samples"])
+        return cls(**counts, unassessed=unassessed, detected=detected, latency_sum=sums)
 
     def mean(self, group: str) -> float:
         """Return the mean latency [ms] of the detected contacts; NaN without any."""
@@ -174,6 +179,12 @@ class Simulated:
     seeds: int
     runs: int
     impacts: int
+
+    @classmethod
+    def of_cells(cls, cells: Cells) -> Simulated:
+        """Return the results with the numbers that any of their cells has."""
+        cell = next(states[UNCHANGED] for rules in cells.values() for states in rules.values())
+        return cls(cells, cell.seeds, cell.runs // cell.seeds, cell.contacts // cell.seeds // len(GROUPS))
 
     @property
     def all_runs(self) -> int:
@@ -269,41 +280,43 @@ def simulated_cells(
     return {name: cells[name] for name in DETECTORS.names() if name in cells}
 
 
-def to_json(machines: Mapping[str, Simulated]) -> str:
-    """Return robustness.json: a line per detector and threshold, with a list of values for each state."""
-    lines = []
-    for machine, simulated in machines.items():
-        for detector, rules in simulated.cells.items():
-            for threshold, states in rules.items():
-                values = [states[state].to_list() if state in states else None for state in STATES]
-                lines.append(json.dumps([machine, detector, threshold, values], separators=(",", ":")))
-    numbers = {name: [item.seeds, item.runs, item.impacts] for name, item in machines.items()}
-    head = json.dumps({"seeds_runs_impacts": numbers, "states": STATES, "groups": GROUPS}, ensure_ascii=False)
-    return f'{{"made": {head},\n"cells": [\n' + ",\n".join(lines) + "\n]}\n"
+def write_results(path: Path, machines: Mapping[str, Simulated]) -> None:
+    """Write robustness.csv: a row per machine, detector, threshold and state."""
+    rows = [
+        dict(zip(KEYS, (machine, detector, threshold, state), strict=True)) | cell.row
+        for machine, simulated in machines.items()
+        for detector, rules in simulated.cells.items()
+        for threshold, states in rules.items()
+        for state, cell in states.items()
+    ]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
-def of_json(text: str) -> dict[str, Simulated]:
-    """Return the results of each machine in robustness.json."""
-    read: dict[str, Any] = json.loads(text)
+def read_results(path: Path) -> dict[str, Simulated]:
+    """Return the results of each machine in robustness.csv."""
     machines: dict[str, Cells] = {}
-    for machine, detector, threshold, values in read["cells"]:
-        states = zip(read["made"]["states"], values, strict=True)
-        by_state = {state: Cell.of_list(row) for state, row in states if row is not None}
-        machines.setdefault(machine, {}).setdefault(detector, {})[threshold] = by_state
-    numbers = read["made"]["seeds_runs_impacts"]
-    return {name: Simulated(cells, *numbers[name]) for name, cells in machines.items()}
+    with path.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            machine, detector, threshold, state = (row[key] for key in KEYS)
+            of_detector = machines.setdefault(machine, {}).setdefault(detector, {})
+            of_detector.setdefault(threshold, {})[state] = Cell.of_row(row)
+    return {name: Simulated.of_cells(cells) for name, cells in machines.items()}
 
 
 HEAD = """# When the machine has changed
 
 A threshold is learned from a machine on some day. Later its friction is higher because it is cold, its speed is set to
 another value, a sensor drifts. This page shows how every registered detector then performs with every threshold: which
-runs without a contact alarm, how late contacts are detected, what is missed and what cannot be assessed. All of it is
-written by a command:
+runs without a contact alarm, how late contacts are detected, what is missed and what cannot be assessed. Every detector
+with every threshold in every state of both machines is a row of [robustness.csv](robustness.csv), which a spreadsheet
+opens. All of it is written by a command:
 
 ```sh
 {commands}
-python docs/make_robustness.py --page   # only this page again, from robustness.json
+python docs/make_robustness.py --page   # only page and picture again, from robustness.csv
 ```
 
 * Machines: the simulated [sliding gate](simulators.md) and the simulated arm that is hit on its first link. {learned}
@@ -322,6 +335,12 @@ the impact-free runs alarm, no contact is missed, and hardly anything is not ass
 of the runs and of the contacts, and of the samples at most {not_assessable:.0f} % more than before. The fastest one has
 the smallest geometric mean of the two mean latencies. Where many runs alarm, a latency means little: an alarm may be
 there by chance, and one that is active when a contact begins does not detect it.
+
+![Detectors and changes, with three settings of the signature: share of alarming runs, green if tolerated]({picture})
+
+Share of the assessable impact-free runs that alarm [%] if any does, with the default signature and its two options.
+Green: the change is tolerated. Orange: it is not; without a number, contacts are missed, then or already as learned.
+Grey: hardly assessable.
 
 """
 LEARNED_FROM = {
@@ -354,11 +373,6 @@ another name, or `adaptive_level` in `[signature]`, and run it again.
   [`cdtool tune`](tuning.md) at a budget sets other limits; other runs may then alarm.
 * The numbers are those of few runs: {few} of {count} alarming has a 95 % interval of {low:.1f} to {high:.0f} %.
 """
-LEGEND = """Upper table: share of the assessable impact-free runs that alarm [%]; * more than a tenth of the runs or of
-the contacts is not assessable, or of the samples a tenth more than as learned. Lower table: mean latency, stiff/soft
-[ms]; in brackets the missed contacts, of {contacts}; * more than a tenth of them is not assessable. “n.a.”: not
-assessable.
-"""
 
 
 def page_text(machines: Mapping[str, Simulated]) -> str:
@@ -374,13 +388,11 @@ def page_text(machines: Mapping[str, Simulated]) -> str:
             f"* `{name}` is the signature with `{option}`{LEARNED_FROM.get(name, '')}, see [Signature](signature.md)."
             for name, option in OPTIONS.items()
         ),
+        picture=PICTURE,
         alarming=100 * MOST_ALARMING,
         not_assessable=100 * MOST_NOT_ASSESSABLE,
     )
     parts = [head, *(f"{_in_short(machine, simulated.cells)}\n" for machine, simulated in machines.items())]
-    for machine, simulated in machines.items():
-        parts.append(f"## {TITLES[machine]}\n\n{LEGEND.format(contacts=simulated.all_contacts)}\n")
-        parts += [f"{_of_detector(machine, name, rules)}\n" for name, rules in simulated.cells.items()]
     count = min(simulated.all_runs for simulated in machines.values())
     few = round(MOST_ALARMING * count)
     share = binomial_share(few, count)
@@ -487,69 +499,6 @@ def _is_only_slowed(cell: Cell) -> bool:
     return not cell.assessable and any(cell.detected.values())
 
 
-def _of_detector(machine: str, name: str, rules: Mapping[str, Mapping[str, Cell]]) -> str:
-    """Return the part of the page about a detector: what helps, and the two tables."""
-    tables = [
-        [(f"`{rule}`", *(_in_words(states, state)[place] for state in STATES)) for rule, states in rules.items()]
-        for place in (0, 1)
-    ]
-    lines = "".join(f"* {line}\n" for line in helps(rules))
-    title = f"### {TITLES[machine]}: {name} (`{DETECTORS.load(name).short_name}`)"
-    return "\n".join([title, "", lines, *(_table(("threshold", *STATES), rows) for rows in tables)])
-
-
-def helps(rules: Mapping[str, Mapping[str, Cell]]) -> Iterator[str]:
-    """Yield a sentence about the changes that the first threshold tolerates, and one per change that it does not.
-
-    Named are the options of the signature with which it tolerates the change, and the fastest other threshold that
-    does, and that is not much slower as learned.
-    """
-    usual = next(iter(rules))
-    default = rules[usual]
-    if not tolerates(default, UNCHANGED):
-        yield f"As learned, with `{usual}`: {_why(default, UNCHANGED)}."
-    fine = [state for state in CHANGES if tolerates(default, state)]
-    if fine:
-        yield f"Tolerated with `{usual}`: {', '.join(fine)}."
-    for state in CHANGES:
-        if state in fine or state not in default:
-            continue
-        good = {
-            rule: states
-            for rule, states in rules.items()
-            if rule != usual and tolerates(states, state) and not _is_much_slower(states, default)
-        }
-        others = sorted((rule for rule in good if rule not in OPTIONS), key=lambda rule: good[rule][state].typical)
-        options = [
-            f"`{rule}` ({alarming} % alarm, {latency} ms)"
-            for rule in [*(rule for rule in OPTIONS if rule in good), *others[:1]]
-            for alarming, latency in [_in_words(good[rule], state)]
-        ]
-        helping = f"helps: {', '.join(options)}" if options else "no option helps"
-        yield f"{state}: {_why(default, state)}; {helping}."
-
-
-def _is_much_slower(states: Mapping[str, Cell], default: Mapping[str, Cell]) -> bool:
-    one, other = states[UNCHANGED], default[UNCHANGED]
-    return any(other.detected[group] and not one.mean(group) <= MOST_SLOWER * other.mean(group) for group in GROUPS)
-
-
-def _why(states: Mapping[str, Cell], state: str) -> str:
-    """Return why a state is not tolerated."""
-    cell, unchanged = states[state], states[UNCHANGED]
-    parts = []
-    if cell.alarming_share > MOST_ALARMING:
-        parts.append(f"{100.0 * cell.alarming_share:.0f} % of the assessable runs alarm")
-    if cell.missed:
-        parts.append(f"{cell.missed} of {cell.contacts} contacts are missed")
-    if not cell.is_assessable(unchanged):
-        counts = ((cell.runs - cell.assessable, cell.runs, "runs"), (cell.not_assessable, cell.contacts, "contacts"))
-        left_out = [f"{'all' if count == of else f'{count} of {of}'} {what}" for count, of, what in counts if count]
-        left_out.append(f"{100.0 * cell.unassessed / cell.seeds:.0f} % of the samples")
-        parts.append(f"not assessable: {', '.join(left_out)}")
-    return ", ".join(parts) or "as before, but not tolerated as learned"
-
-
 def _in_words(states: Mapping[str, Cell], state: str) -> tuple[str, str]:
     """Return the share of alarming runs in per cent, and the mean latencies with the missed contacts."""
     cell = states.get(state)
@@ -570,6 +519,41 @@ def _named(detector: str, rule: str) -> str:
     return f"`{detector}` with `{rule}`"
 
 
+def draw(machines: Mapping[str, Simulated], image: Path) -> None:
+    """Draw the share of alarming runs by detector and change: for the signature, and with each of its options."""
+    from matplotlib.colors import ListedColormap
+
+    rules = ("signature", *OPTIONS)
+    with drawing():
+        figure = new_figure(10.5, 0.5 + sum(0.6 + 0.22 * len(item.cells) for item in machines.values()))
+        heights = [len(item.cells) for item in machines.values()]
+        panels = figure.subplots(len(machines), len(rules), squeeze=False, sharex=True, height_ratios=heights)
+        for row, (machine, simulated) in zip(panels, machines.items(), strict=True):
+            for axes, rule in zip(row, rules, strict=True):
+                cells = [states.get(rule, {}) for states in simulated.cells.values()]
+                kinds = [[_kind(states, state) for state in STATES] for states in cells]
+                axes.pcolormesh(kinds, cmap=ListedColormap(_COLOURS), vmin=0, vmax=2, edgecolors="white", linewidth=1)
+                for line, states in enumerate(cells):
+                    for column, state in enumerate(STATES):
+                        text = _in_words(states, state)[0].removesuffix("n.a.") if states else "–"
+                        axes.text(
+                            column + 0.5, line + 0.5, "" if text == "0" else text, ha="center", va="center", fontsize=6
+                        )
+                axes.set_title(f"{TITLES[machine]}: {rule}", fontsize=9)
+                axes.set_xticks([column + 0.5 for column in range(len(STATES))], STATES, rotation=60, ha="right")
+                axes.set_yticks([line + 0.5 for line in range(len(cells))])
+                axes.set_yticklabels(simulated.cells if axes is row[0] else [])
+                axes.invert_yaxis()
+        save(figure, image)
+
+
+def _kind(states: Mapping[str, Cell], state: str) -> int:
+    """Return 0 for a change that is tolerated, 1 for one that is not, 2 where hardly anything can be assessed."""
+    if state not in states or not states[state].is_assessable(states[UNCHANGED]):
+        return 2
+    return 0 if tolerates(states, state) else 1
+
+
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows)]
     return "\n".join(lines) + "\n"
@@ -578,7 +562,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def main(arguments: list[str]) -> int:
     """Simulate, score and write both files, or only the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--page", action="store_true", help="write the page from robustness.json")
+    parser.add_argument("--page", action="store_true", help="write page and picture from robustness.csv")
     parser.add_argument(
         "--machines", nargs="+", choices=list(SIMULATORS), default=list(SIMULATORS), help="those simulated again"
     )
@@ -589,11 +573,13 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
     results = options.output / RESULTS
-    machines = of_json(results.read_text(encoding="utf-8")) if results.exists() else {}
+    machines = read_results(results) if results.exists() else {}
     for name in [] if options.page else options.machines:
         cells = simulated_cells(name, options.seeds, (options.runs, options.impacts))
         machines[name] = Simulated(cells, options.seeds, options.runs, options.impacts)
-        results.write_text(to_json(machines), encoding="utf-8")
+        write_results(results, machines)
+    (options.output / PICTURE).parent.mkdir(exist_ok=True)
+    draw(machines, options.output / PICTURE)
     (options.output / PAGE).write_text(page_text(machines), encoding="utf-8")
     return 0
 
