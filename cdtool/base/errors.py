@@ -49,6 +49,16 @@ class UsageError(CdtoolError):
     """A command or function was called with invalid arguments."""
 
 
+class FieldsError(UsageError):
+    """Values of a model are wrong or do not fit together: `problem` is that of the first of its `fields`."""
+
+    def __init__(self, fields: tuple[str, ...], problem: str, hint: str = "") -> None:
+        super().__init__(f"{fields[0]} {problem}", hint)
+        self.args = (fields, problem, hint)  # for another process
+        self.fields = fields
+        self.problem = problem
+
+
 class ConfigurationError(CdtoolError):
     """A machine file or benchmark file is wrong; the message names the key, which is `key` where it is known."""
 

@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import msgspec
 from msgspec import Meta
 
-from cdtool.base.errors import CdtoolError, ConfigurationError, MistakesError, UsageError, nearest
+from cdtool.base.errors import CdtoolError, ConfigurationError, FieldsError, MistakesError, UsageError, nearest
 from cdtool.base.value_words import value_in_words
 
 Model = TypeVar("Model")
@@ -344,12 +344,29 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
             place.note(name, "is missing", key.allowed)
     if any(key.required and key.attribute not in given for key in keys.values()):
         return None
+    return _made(model, {**given, **filled_in}, place, known)
+
+
+def _made(model: type[Model], given: Mapping[str, Any], place: Place, known: int) -> Model | None:
+    """Return the model of these values; None if some do not fit together, with every mistake in `place`.
+
+    Values that do not fit are replaced by their defaults to check the others.
+    """
     try:
-        return model(**given, **filled_in)
+        return model(**given)
+    except FieldsError as fault:
+        names = {key.attribute: name for name, key in keys_of(model).items()}
+        concerned = [names[attribute] for attribute in fault.fields]
+        wrong = {mistake.key for mistake in place.mistakes[known:]}
+        if not any(f"{place.prefix}{name}" in wrong for name in concerned):  # else it follows from the default
+            place.note(concerned[0], fault.problem, fault.hint)
+        others = {name: value for name, value in given.items() if name not in fault.fields}
+        if len(others) < len(given) and not any(keys_of(model)[name].required for name in concerned):
+            _made(model, others, place, known)
     except CdtoolError as fault:
         if len(place.mistakes) == known:  # else it may only follow from a value that was replaced
             place.mistakes.append(place.whole(fault))
-        return None
+    return None
 
 
 def _value(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
@@ -414,7 +431,7 @@ def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
 
 
 def check(values: Any) -> None:
-    """Raise UsageError naming the first field of a model whose value its annotation does not allow.
+    """Raise FieldsError for the first field of a model whose value its annotation does not allow.
 
     For `__post_init__` of a model that is also made in Python.
     """
@@ -430,4 +447,4 @@ def check(values: Any) -> None:
             number = item.item() if getattr(item, "shape", None) == () else item  # of numpy
             _, problem, allowed = _scalar(key, get_args(lists[0])[0] if is_list else key.hint, number)
             if problem:
-                raise UsageError(f"{key.attribute} {problem}", allowed)
+                raise FieldsError((key.attribute,), problem, allowed)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.errors import ConfigurationError, FieldsError, UsageError, nearest
 from cdtool.base.findings import Finding
 from cdtool.base.settings import Place, setting
 from cdtool.results.results import LimitResult, RecordingFinding
@@ -43,7 +43,7 @@ class Bounds:
         if self.min is None and self.max is None:
             raise UsageError("has no bound", "give { max = 50 }, { min = 1 } or both")
         if self.min is not None and self.max is not None and self.min > self.max:
-            raise UsageError(f"has min {self.min:g} above max {self.max:g}", "exchange them")
+            raise FieldsError(("min", "max"), f"is {self.min:g}, above max {self.max:g}", "exchange them")
 
 
 def limit_rules(

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from cdtool.base.errors import UsageError
+from cdtool.base.errors import FieldsError
 from cdtool.base.settings import NOT_A_KEY, Positive, check, setting
 from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.recordings.motion import MotionClass
@@ -131,7 +131,7 @@ class Combined:
     def __post_init__(self) -> None:
         check(self)
         if len(self.members) < 2:
-            raise UsageError(f"members are {list(self.members)}", "two or more thresholds are needed")
+            raise FieldsError(("members",), f"are {list(self.members)}", "two or more thresholds are needed")
         for name in self.members:
             known("member", name, tuple(_RULES))
 

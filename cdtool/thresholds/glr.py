@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import UsageError
+from cdtool.base.errors import FieldsError
 from cdtool.base.settings import NOT_A_KEY, Count, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.recording import Recording
@@ -67,7 +67,7 @@ class Glr:
     def __post_init__(self) -> None:
         check(self)
         if not self.windows:
-            raise UsageError("windows are empty", "give numbers of samples, each at least 1")
+            raise FieldsError(("windows",), "are empty", "give numbers of samples, each at least 1")
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSequential:
         """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""

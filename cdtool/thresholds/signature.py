@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import NothingValidError, SignatureError, UsageError
+from cdtool.base.errors import FieldsError, NothingValidError, SignatureError, UsageError
 from cdtool.base.settings import NotNegative, Positive, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion import MotionClass
@@ -108,10 +108,12 @@ class Signature:
     def __post_init__(self) -> None:
         check(self)
         if self.position_step > self.position_window:
-            raise UsageError("the grid step must be at most the window", "see docs/signature.md")
+            fields = ("position_step", "position_window")
+            raise FieldsError(fields, f"is {self.position_step:g}, more than position_window", "see docs/signature.md")
         if self.speed_range and self.alignment == "time":
-            raise UsageError(
-                "speed_range cannot be combined with alignment 'time': at another speed a time is another location",
+            raise FieldsError(
+                ("speed_range", "alignment"),
+                "cannot be combined with alignment 'time': at another speed a time is another location",
                 "choose time_then_position or position",
             )
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from cdtool.base.errors import UsageError
+from cdtool.base.errors import FieldsError
 from cdtool.base.settings import Positive, check, setting
 
 # The longest hold [s]: later the rest level would rest on the contact itself.
@@ -71,7 +71,7 @@ class OnsetRule:
     def __post_init__(self) -> None:
         check(self)
         if self.above is not None and self.back_to is not None and self.back_to > self.above:
-            raise UsageError(f"back_to_n is {self.back_to:g}, more than above_n", "give at most above_n")
+            raise FieldsError(("back_to", "above"), f"is {self.back_to:g}, more than above_n", "give at most above_n")
 
     @property
     def described(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import pickle
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Annotated, Literal
@@ -10,7 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 import pytest
 
-from cdtool.base.errors import ConfigurationError, MistakesError, UsageError
+from cdtool.base.errors import ConfigurationError, FieldsError, MistakesError, UsageError
 from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.settings import NOT_A_KEY, Count, NotNegative, Place, Positive, check, keys_of, read, setting
 
@@ -43,7 +44,9 @@ class Outer:
     def __post_init__(self) -> None:
         check(self)
         if self.latch and self.count is None:
-            raise UsageError("latch without count", "give count")
+            raise FieldsError(("latch", "count"), "is given without count", "give count")
+        if len(self.names) > 1 and self.mass > 5.0:
+            raise FieldsError(("mass", "names"), "is above 5 for several names", "give one name")
 
 
 def mistakes(**values: object) -> list[str]:
@@ -99,7 +102,7 @@ def test_values_become_those_of_the_model():
         ({"inner": {}}, "m.toml: inner.rate_hz: is missing (give a number above 0)"),
         ({"groups": {"x": {"rate_hz": 0}}}, "m.toml: groups.x.rate_hz: is 0 (give a number above 0)"),
         ({"made": {"rate_hz": 1}}, "m.toml: made: unknown key"),
-        ({"latch": True}, "m.toml: latch without count (give count)"),
+        ({"latch": True}, "m.toml: latch: is given without count (give count)"),
     ],
 )
 def test_a_mistake_names_its_key_its_value_and_what_is_allowed(values, said):
@@ -117,6 +120,25 @@ def test_all_mistakes_of_a_file_come_at_once_each_of_them_once():
         "groups.b",
         "inner.rate_hz",
     ]
+
+
+def test_values_that_do_not_fit_together_are_named_with_the_other_mistakes_of_the_table():
+    pairs = {"latch": True, "mass_kg": 6, "names": ["a", "b"]}
+    latch, mass = "m.toml: latch: is given without count", "m.toml: mass_kg: is above 5 for several names"
+    said = [item.split(" (")[0] for item in mistakes(**pairs)]
+    assert said == [latch, mass]
+    said = [item.split(" (")[0] for item in mistakes(**pairs, gravity="much")]
+    assert said == ["m.toml: gravity: is 'much'", latch, mass]
+
+
+def test_values_are_not_compared_with_one_that_is_wrong():
+    said = [item.split(" (")[0] for item in mistakes(latch=True, count="two", mass_kg=6, names=["a", "b"])]
+    assert said == ["m.toml: count: is 'two'", "m.toml: mass_kg: is above 5 for several names"]
+
+
+def test_an_error_of_fields_crosses_processes():
+    fault = pickle.loads(pickle.dumps(FieldsError(("mass", "names"), "is above 5", "give less")))
+    assert (str(fault), fault.fields, fault.hint) == ("mass is above 5 (give less)", ("mass", "names"), "give less")
 
 
 def test_what_only_follows_from_a_mistake_is_not_a_second_one():

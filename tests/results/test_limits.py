@@ -123,7 +123,7 @@ def test_false_alarms_are_counted_in_groups_without_contacts():
         ('"gm" = { max = 1 }', "does not name a metric"),
         ('"gm.stiff.mean_ms" = { }', "has no bound"),
         ('"gm.stiff.mean_ms" = 5', "a table"),
-        ('"gm.stiff.mean_ms" = { max = 1, min = 2 }', "min 2 above max 1"),
+        ('"gm.stiff.mean_ms" = { max = 1, min = 2 }', "min: is 2, above max 1"),
         ('"gm.stiff.mean_ms" = { maximum = 1, max = 2 }', "unknown key"),
         ('"gm.stiff.mean_ms" = { max = "fast" }', "a number"),
     ],

@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 import numpy as np
 from msgspec import Meta
 
-from cdtool.base.errors import ConfigurationError, RecordingError, UsageError, nearest
+from cdtool.base.errors import ConfigurationError, FieldsError, RecordingError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import joined
@@ -62,7 +62,8 @@ class ObstacleTable:
             given = " and ".join(forms) or f"none of {', '.join(names)}"
             raise UsageError(f"{given} is given", f"give one of {', '.join(names)}")
         if self.force_n and (len(self.force_n) < 2 or len(self.force_n) != len(self.deflection_mm)):
-            raise UsageError("force_n and deflection_mm do not fit", "give two or more of each, both from 0")
+            fields = ("force_n", "deflection_mm")
+            raise FieldsError(fields, "and deflection_mm do not fit", "give two or more of each, both from 0")
 
 
 def shipped_obstacles(path: Path | None = None) -> dict[str, Obstacle]:
@@ -212,7 +213,7 @@ class StiffnessGrid:
 
     def __post_init__(self) -> None:
         if self.end <= self.begin:
-            raise UsageError(f"to is {self.end:g}, not above from", "give a larger stiffness")
+            raise FieldsError(("end", "begin"), f"is {self.end:g}, not above from", "give a larger stiffness")
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -270,9 +271,9 @@ class InjectTable:
 
     def __post_init__(self) -> None:
         if self.file_format not in FORMATS:
-            raise UsageError(f"format is '{self.file_format}'", nearest(self.file_format, FORMATS))
+            raise FieldsError(("file_format",), f"is '{self.file_format}'", nearest(self.file_format, FORMATS))
         if self.direction != "motion" and not any(self.direction):
-            raise UsageError("direction has the length 0", 'give a vector such as [0, 0, 1], or "motion"')
+            raise FieldsError(("direction",), "has the length 0", 'give a vector such as [0, 0, 1], or "motion"')
 
 
 def inject_section(table: InjectTable, place: Place, found: LogsOf, groups: tuple[str, ...]) -> InjectSection:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.base.errors import ConfigurationError, FieldsError, UsageError
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import first_of
 from cdtool.base.remote.remote_path import joined
@@ -80,9 +80,8 @@ class OnsetTable(OnsetRule):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.synchronisation == "measured" and self.synchronisation_s is not None:
-            raise UsageError(
-                "synchronisation is measured, but synchronisation_s is stated too", "remove one of the two"
-            )
+            fields = ("synchronisation", "synchronisation_s")
+            raise FieldsError(fields, "is measured, but synchronisation_s is stated too", "remove one of the two")
 
     @property
     def rule(self) -> OnsetRule:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
 
 from cdtool.alarms.activation import Activation
-from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.errors import ConfigurationError, FieldsError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_bytes, read_toml
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.registry import Registry
@@ -125,7 +125,7 @@ class LearnTable(LogsTable):
 
     def __post_init__(self) -> None:
         if self.guard_s is not None and self.until == "end":
-            raise UsageError("guard_s is given without until", 'set until = "onset", or remove it')
+            raise FieldsError(("guard_s", "until"), "is given without until", 'set until = "onset", or remove it')
 
     @property
     def guard(self) -> float | None:

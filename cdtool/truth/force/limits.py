@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
-from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.errors import ConfigurationError, FieldsError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.settings import NOT_A_KEY, Count, NotNegative, Place, Positive, Text, read, setting
 from cdtool.base.value_words import value_in_words
@@ -58,7 +58,7 @@ class PressureLimit:
     def __post_init__(self) -> None:
         if self.transient is not None and self.transient < self.quasi_static:
             hint = f"give at least the quasi-static one, {self.quasi_static:g}"
-            raise UsageError(f"transient_n_per_cm2 is {self.transient:g}", hint)
+            raise FieldsError(("transient", "quasi_static"), f"is {self.transient:g}", hint)
 
     @property
     def first(self) -> float:
@@ -111,20 +111,19 @@ class ForceProfile:
         times = [step.from_s for step in self.steps]
         if not times or times[0] != 0.0 or any(later <= earlier for earlier, later in pairwise(times)):
             given = f"begin at {', '.join(f'{time:g}' for time in times)} s" if times else "are empty"
-            raise UsageError(f"steps {given}", "the first step begins with the contact, at 0, and times increase")
+            raise FieldsError(("steps",), given, "the first step begins with the contact, at 0, and times increase")
         for what, names in (
             ("steps", [step.name for step in self.steps]),
             ("pressures", [item.area for item in self.pressures]),
         ):
             if twice := [name for name in names if names.count(name) > 1]:
-                raise UsageError(f"{what} name '{twice[0]}' twice", "give each a different name")
+                raise FieldsError((what,), f"name '{twice[0]}' twice", "give each a different name")
         if self.pressures and not self.pressure_source.strip():
-            raise UsageError(
-                "pressure_source is missing", "state from where the pressures are: standard, edition, table"
-            )
+            hint = "state from where the pressures are: standard, edition, table"
+            raise FieldsError(("pressure_source", "pressures"), "is missing", hint)
         if len(self.steps) < 2 and any(item.transient is not None for item in self.pressures):
             hint = "give a second one: from its time on, the quasi-static pressure applies"
-            raise UsageError("steps has one step", hint)
+            raise FieldsError(("steps", "pressures"), "has one step", hint)
 
     @property
     def warning(self) -> str:

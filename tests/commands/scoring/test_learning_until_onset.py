@@ -246,7 +246,7 @@ def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):
         ((HEAD, LEARN.replace('until = "onset"\n', ""), GROUPS), 'both learned from and scored .*until = "onset"'),
         ((HEAD, LEARN, '[holdout]\nlogs = ["stiff/*.csv"]\n'), "both learned from and scored"),
         ((HEAD, LEARN.replace("onset", "contact"), GROUPS), "learn.until: is 'contact'"),
-        ((HEAD, LEARN.replace('until = "onset"', "guard_s = 0.1"), GROUPS), "learn: guard_s is given without until"),
+        ((HEAD, LEARN.replace('until = "onset"', "guard_s = 0.1"), GROUPS), "learn.guard_s: is given without until"),
         ((HEAD, LEARN, "guard_s = -0.1\n", GROUPS), "learn.guard_s: is -0.1"),
         ((HEAD, LEARN, "to = 3.2\n", GROUPS), "learn.to: is 3.2 .*in quotes"),
         ((HEAD, LEARN, 'to = "3.2"\n', GROUPS), "learn.to: is '3.2'"),

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
-from cdtool.base.errors import UsageError
+from cdtool.base.errors import FieldsError, UsageError
 from cdtool.base.settings import CountFromZero, NotNegative, check, setting
 
 Due = Literal["before_test", "test_day", "never"]
@@ -117,7 +117,7 @@ class MeasuringPoint:
 
     def __post_init__(self) -> None:
         if self.group and self.logs:
-            raise UsageError(f"the measuring point '{self.name}' has a group and logs", "give one of them")
+            raise FieldsError(("group", "logs"), f"is given with logs for '{self.name}'", "give one of them")
         check(self)
         if not 0.0 <= self.speed_tolerance <= MOST_SPEED_TOLERANCE:
             raise UsageError(

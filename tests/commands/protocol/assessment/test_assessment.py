@@ -367,7 +367,7 @@ def test_a_plan_names_each_point_once():
 
     with pytest.raises(UsageError, match="two measuring points"):
         replace(PLAN, points=(POINT, POINT))
-    with pytest.raises(UsageError, match="group and logs"):
+    with pytest.raises(UsageError, match="given with logs"):
         replace(POINT, logs=("a.csv",))
 
 
