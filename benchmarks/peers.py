@@ -84,7 +84,7 @@ def strokes(axis: LinearAxis) -> Recording:
 
 
 def _momentum(axis: LinearAxis, log: Recording) -> bool:
-    """lfilter's side forms momentum, net force and their difference; it knows no masks and no varying period."""
+    """lfilter's side forms momentum, net force and their difference; without masks, with one period."""
     from scipy.signal import lfilter
 
     detector = Momentum()
