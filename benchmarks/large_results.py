@@ -31,7 +31,8 @@ from timing import environment, table  # noqa: E402
 
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file  # noqa: E402
 from cdtool.commands.scoring.gathering import results_before, results_of  # noqa: E402
-from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, OperationOutcome, Wanted  # noqa: E402
+from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, OperationOutcome  # noqa: E402
+from cdtool.commands.scoring.pieces import Piece, PieceOutcome  # noqa: E402
 from cdtool.commands.scoring.scored_logs import ScoredLogs  # noqa: E402
 from cdtool.commands.scoring.scoring import LogRows  # noqa: E402
 from cdtool.execution.workers import Workers  # noqa: E402
@@ -59,17 +60,18 @@ class _Drawn:
     names: tuple[str, ...]
     known: dict[str, RowsOfLog] = field(default_factory=dict)
 
-    def __call__(self, group: str, path: Path, wanted: Wanted | None, _: tuple[str, ...] | None) -> list[LogOutcome]:
-        drawn = self.known.get(path.name) or next(self.rows)
+    def __call__(self, piece: Piece) -> PieceOutcome:
+        drawn = self.known.get(piece.path.name) or next(self.rows)
         detectors = tuple(DetectorOutcome(name, (self._on_operation(drawn, name),)) for name in self.names)
         rows = LogRows(drawn.recording, drawn.forces, findings=drawn.findings)
         outcome = LogOutcome(rows, detectors)
-        if wanted is None or not wanted.is_wanted(group, tuple(outcome.of_operation(0))):
-            return [outcome]
-        self.known[path.name] = drawn
+        wanted = piece.wanted
+        if wanted is None or not wanted.is_wanted(piece.group, tuple(outcome.of_operation(0))):
+            return PieceOutcome((outcome,))
+        self.known[piece.path.name] = drawn
         named = dict(zip(("quick", "slow"), self.names, strict=False))
-        trace = trace_of(lambda name: named.get(name, name), group, drawn.recording.recording)
-        return [LogOutcome(rows, detectors, (trace,))]
+        trace = trace_of(lambda name: named.get(name, name), piece.group, drawn.recording.recording)
+        return PieceOutcome((LogOutcome(rows, detectors, (trace,)),))
 
     def _on_operation(self, drawn: RowsOfLog, name: str) -> OperationOutcome:
         contacts = tuple(row for row in drawn.contacts if row.detector == name)
@@ -114,7 +116,7 @@ def _gathered(recordings: int, detectors: int) -> tuple[Results, tuple[Trace, ..
     of_three = list(islice(groups, 3))
     logs = [(of_three[i % 3], Path(f"{i:06d}.mcap")) for i in range(recordings)]
     drawn = _Drawn(rows_of_logs(recordings, detectors), names)
-    scored = ScoredLogs(setup, lambda: drawn, logs, Workers())
+    scored = ScoredLogs(setup, drawn, logs, Workers())
     before = results_before(setup, {"tool": "cdtool", "tool_version": "0", "machine": "door"}, names)
     return results_of(setup, before, scored, dict.fromkeys(names, MULTIPLES), {}), scored.traces
 

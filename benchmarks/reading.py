@@ -159,7 +159,8 @@ def _compared(log: str, path: Path, peer: str) -> bool:
                 sums.append(of_columns)
                 if number >= 0:
                     seconds[name].append(took)
-            if len(sums[0]) != len(sums[1]) or not np.allclose(*sums, rtol=1e-12):
+            ours_sums, peer_sums = sums
+            if len(ours_sums) != len(peer_sums) or not np.allclose(ours_sums, peer_sums, rtol=1e-12):
                 sys.exit(f"error: {log}: {peer} reads other numbers than cdtool")
     held = verdict(
         f"{log}: cdtool / {peer}, CPU time", ratio(seconds["cdtool"], seconds[peer]), AT_MOST[log], at_most=True
