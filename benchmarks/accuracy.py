@@ -1,22 +1,41 @@
-"""Shared parts of the accuracy benchmarks: simulated runs in memory, detectors, signatures, scores, orders, rows.
+"""Latencies on new seeds of the simulated gate and arm: order of the detectors, means, misses and false alarms.
 
-Machine, gains, signature, onset and monitored joints are read from the machine.toml and benchmark.toml written by
-`cdtool simulate`, so there is one definition. Only the recordings are not written to disk.
+    python benchmarks/accuracy.py gate            # seeds 401 402 403 404 405
+    python benchmarks/accuracy.py arm             # seeds 801 802 803 804 805
+    python benchmarks/accuracy.py gate 501 502    # others
+
+Runs are those of `cdtool simulate --seed`, kept in memory (the arm's are not rounded to a log's decimals: means differ
+by less than 0.5 ms); machine, gains, signature, onset and watched joints are read from the files that it writes. Arm:
+impact on the arm (trial 1), and on the forearm, which does not move (trial 2). Both machines are tuned to reproduce the
+thesis's latencies (see docs/simulators.md): this measures how reliably they do so from seed to seed, and is no evidence
+about a real machine. Checked are the thesis's detectors and IGM; on the gate the others are shown for comparison, and
+desired dynamics misses stiff impacts with its default gains.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from statistics import mean, stdev
+from statistics import mean, median, stdev
+
+import numpy as np
+from timing import environment, table
 
 from cdtool.alarms.pipeline import detect_operation
 from cdtool.base.errors import NothingValidError
 from cdtool.commands.learning.fitting import fit_operations
 from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.commands.simulate import arm_recordings, gate_recordings
+from cdtool.commands.simulate.arm_model import simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
+from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
+from cdtool.commands.simulate.recording_folder import GROUPS, IMPACT_OF
+from cdtool.detectors import DETECTORS
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import FittedThreshold
@@ -27,6 +46,10 @@ IMPACTS = ("stiff", "soft")
 HEADS = ("missed", "false", "reference", "worst seed")
 WITHIN = 0.25
 FALSE_ALARMS_ALLOWED = 1
+SEEDS = {"gate": (401, 402, 403, 404, 405), "arm": (801, 802, 803, 804, 805)}
+GATE_COUNTS = {"free": 14, "holdout": 40, "stiff": 30, "soft": 30}
+ARM_COUNTS = {"free": 14, "holdout": 30, "stiff": 30, "soft": 30}
+BLIND = "feekf"  # in trial 2: the forearm does not move
 
 
 @dataclass(frozen=True)
@@ -68,6 +91,9 @@ class Score:
 
 Scores = Mapping[int, Mapping[str, Score]]
 """By seed and the detector's short name."""
+
+Requirement = tuple[str, bool]
+"""What must hold, and whether it does."""
 
 
 def written_setup(write: Callable[[Path, Mapping[str, int]], int]) -> BenchmarkFile:
@@ -192,13 +218,111 @@ def print_false_alarms(scores: Scores, where: str = "") -> None:
             )
 
 
-def conclude(wanted: Sequence[tuple[str, bool]], seeds: Sequence[int]) -> int:
-    """Print which requirements are met; return the exit status, 0 if all are."""
-    held = all(good for _, good in wanted)
+# Means of three seeds in the specification [ms], fastest first: the order required on each seed.
+GATE_CELLS = (
+    Cell("stiff", "stiff", {"pi": 26.67, "feekf": 32.67, "gm": 63.67, "pt": 165.0}),
+    Cell("soft", "soft", {"feekf": 82.0, "gm": 124.0, "pt": 213.0, "pi": 388.3}),
+)
+GATE_ASKED = (*GATE_CELLS[0].reference, "igm")
+STIFF_1 = Cell("T1 stiff", "stiff", {"feekf": 12.0, "igm": 14.0, "gm": 28.33})
+SOFT_1 = Cell("T1 soft", "soft", {"feekf": 85.67, "igm": 103.67, "gm": 113.0})
+STIFF_2 = Cell("T2 stiff", "stiff", {"igm": 15.67, "gm": 68.33})
+SOFT_2 = Cell("T2 soft", "soft", {"igm": 349.0, "gm": 388.67})
+# Trial 2's stiff means depend on single late alarms: the medians set its order, and no mean is required.
+STIFF_2_MEDIAN = Cell("T2 stiff, median", "stiff", STIFF_2.reference, median)
+
+
+def simulate_gate(seed: int, group: str, number: int) -> Recording:
+    """Simulate one run with the seeds of the command line."""
+    gate, rng = GateParameters(), np.random.default_rng([seed, GROUPS.index(group), number])
+    return gate_recordings.as_recording(simulate_gate_run(gate, rng, IMPACT_OF[group]), f"{group}/{number:02d}", gate)
+
+
+def simulate_arm(trial: Trial, seed: int, group: str, number: int) -> Recording:
+    """Simulate one run with the seeds of the command line."""
+    rng = np.random.default_rng([seed, trial, GROUPS.index(group), number])
+    run = simulate_arm_run(ArmParameters(), rng, trial, IMPACT_OF[group])
+    return arm_recordings.as_recording(run, f"{group}/{number:02d}")
+
+
+def gate(seeds: Sequence[int]) -> list[Requirement]:
+    known = [DETECTORS.load(name).short_name for name in DETECTORS.names()]
+    detectors = [*GATE_ASKED, *(name for name in known if name not in GATE_ASKED)]
+    bench = Bench(written_setup(partial(gate_recordings.simulate_gate, seed=0)), GATE_COUNTS, simulate_gate)
+    scores = {seed: score_seed(bench, seed, detectors) for seed in seeds}
+    print_cells(seeds, [row for cell in GATE_CELLS for row in rows(cell, scores)])
+    orders = [(order_wanted(cell), ordered(cell, scores)) for cell in GATE_CELLS]
+    print_false_alarms(scores)
+    missed = sum(not_detected(cell, scores, GATE_ASKED) for cell in GATE_CELLS)
+    return [
+        *orders,
+        (f"every mean within {100 * WITHIN:.0f} %", all(near(cell, scores) for cell in GATE_CELLS)),
+        (f"missed: {missed}, wanted 0 ({', '.join(GATE_ASKED)})", missed == 0),
+        few_alarms([scores], GATE_ASKED),
+    ]
+
+
+def arm(seeds: Sequence[int]) -> list[Requirement]:
+    scores: dict[Trial, Scores] = {}
+    for trial in (1, 2):
+        setup = written_setup(partial(arm_recordings.simulate_arm, seed=0, trial=trial))
+        bench = Bench(setup, ARM_COUNTS, partial(simulate_arm, trial))
+        detectors = [DETECTORS.load(name).short_name for name in setup.detectors]
+        scores[trial] = {seed: score_seed(bench, seed, detectors) for seed in seeds}
+    shown = {1: (STIFF_1, SOFT_1), 2: (STIFF_2, STIFF_2_MEDIAN, SOFT_2)}
+    print_cells(seeds, [row for trial, cells in shown.items() for cell in cells for row in rows(cell, scores[trial])])
+    asked = [(1, STIFF_1), (1, SOFT_1), (2, STIFF_2_MEDIAN), (2, SOFT_2)]
+    orders = [(order_wanted(cell), ordered(cell, scores[trial])) for trial, cell in asked]
+    for trial, each in scores.items():
+        print_false_alarms(each, f" in trial {trial}")
+    missed = sum(not_detected(cell, scores[1], detectors) for cell in (STIFF_1, SOFT_1))
+    means = all(near(cell, scores[1]) for cell in (STIFF_1, SOFT_1)) and near(SOFT_2, scores[2])
+    return [
+        *orders,
+        (f"T1 and T2 soft: every mean within {100 * WITHIN:.0f} %", means),
+        (f"T1 missed or not assessable: {missed}, wanted 0", missed == 0),
+        blind([by_name[BLIND] for by_name in scores[2].values()]),
+        few_alarms([*scores.values()], detectors),
+    ]
+
+
+def blind(of_seeds: Sequence[Score]) -> Requirement:
+    """The friction EKF in trial 2: not assessable in every contact, never missed, without an alarm."""
+    contacts = len(of_seeds) * sum(ARM_COUNTS[group] for group in IMPACTS)
+    unknown = sum(sum(score.not_assessable.values()) for score in of_seeds)
+    missed = sum(sum(score.missed.values()) for score in of_seeds)
+    alarms = sum(score.false_alarms + sum(map(len, score.latencies.values())) for score in of_seeds)
+    text = f"T2 {BLIND}: not assessable {unknown} of {contacts}, missed {missed}, alarms {alarms}, wanted all, 0, 0"
+    return text, unknown == contacts and not missed and not alarms
+
+
+def few_alarms(scores: Sequence[Scores], detectors: Sequence[str]) -> Requirement:
+    """Whether no detector has more false alarms than allowed, over all seeds."""
+    most = max(sum(by_name[name].false_alarms for each in scores for by_name in each.values()) for name in detectors)
+    text = f"at most {FALSE_ALARMS_ALLOWED} false alarm per detector over all seeds ({', '.join(detectors)})"
+    return text, most <= FALSE_ALARMS_ALLOWED
+
+
+def print_cells(seeds: Sequence[int], cells: Sequence[tuple[object, ...]]) -> None:
+    """Print the latencies of each kind of impact and detector."""
+    table(("", *map(str, seeds), "all +- std", *HEADS), cells)
+    print("-: nothing detected; false: alarms over all hold-out and impact runs, so the same in all cells of a machine")
+    print("or trial; std over all impacts; worst seed: largest deviation of a seed's mean from the reference\n")
+
+
+def main(machine: str, seeds: Sequence[int]) -> int:
+    """Print everything; return 0 if all requirements are met."""
+    print(f"== latency on the simulated {machine} [ms], seeds {' '.join(map(str, seeds))}\n{environment()}", flush=True)
+    wanted = {"gate": gate, "arm": arm}[machine](seeds)
     print()
     for text, good in wanted:
         print(f"{'ok  ' if good else 'FAIL'}  {text}")
-    print(
-        f"{'ok  ' if held else 'FAIL'}  {'all' if held else 'not all'} of it held on seeds {' '.join(map(str, seeds))}"
-    )
-    return 0 if held else 1
+    return 0 if all(good for _, good in wanted) else 1
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("machine", choices=SEEDS)
+    parser.add_argument("seeds", type=int, nargs="*")
+    asked = parser.parse_args()
+    sys.exit(main(asked.machine, asked.seeds or SEEDS[asked.machine]))

@@ -1,6 +1,6 @@
 """A fleet on the local disk: what many recordings cost, what a second run costs, and what a killed run loses.
 
-Every run is a new process on short recordings of a gate (`fleet_logs.py`: 7 s at 250 Hz, CSV, five detectors).
+Every run is a new process on short recordings of a gate (7 s at 250 Hz, CSV, five detectors).
 
 python benchmarks/fleet.py scale [RECORDINGS]   # 20,000: memory, time per recording, workers, cost of the store; 1 h
 python benchmarks/fleet.py again [RECORDINGS]   # 20,000: nothing changed, one recording added, one gain changed
@@ -18,23 +18,64 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from statistics import median
 from time import sleep
 
-from fleet_logs import write_fleet
 from timing import Spread, main, ratio, table, verdict
+
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 
 RECORDINGS, FEW = 20_000, 1_000
 KILLS, KILLED_RECORDINGS = 50, 240
 ROUNDS = 5
 SEED = 1
+# What is simulated; each scored one is copied with another last digit, since recordings of equal content are refused.
+SIMULATED = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
+SCORED = ("holdout", "stiff", "soft")
+# Of the rows at 1 kHz, each of so many is kept: 250 Hz, 7 s, 115 kB of CSV.
+EVERY = 4
 AT_MOST_MORE_MIB, AT_MOST_SLOWER, AT_LEAST_FASTER, AT_MOST_STORE = 200.0, 1.10, 1.8, 1.05
 AT_MOST_AGAIN, AT_MOST_TRUSTED = 0.15, 0.15
 
 _RUN = "import sys; from fleet import child; child(*sys.argv[1:])"
+
+
+def write_fleet(folder: Path, recordings: int) -> Path:
+    """Write a benchmark file with so many scored recordings and 14 impact-free ones; return the benchmark file."""
+    with tempfile.TemporaryDirectory() as name:
+        base = Path(name)
+        simulate_gate(base, SIMULATED, SEED, file_format="csv")
+        folder.mkdir(parents=True, exist_ok=True)
+        for file in ("benchmark.toml", "machine.toml"):
+            (folder / file).write_bytes((base / file).read_bytes())
+        for group in ("free", *SCORED):
+            (folder / group).mkdir(exist_ok=True)
+        for path in sorted((base / "free").glob("*.csv")):
+            (folder / "free" / path.name).write_text(_thinned(path)[0], encoding="utf-8", newline="\n")
+        texts = [(path.parent.name, path.stem, *_thinned(path)) for path in _in_turn(base)]
+        for number in range(recordings):
+            group, stem, text, end = texts[number % len(texts)]
+            mark = f"{number // len(texts):04d}"
+            log = folder / group / f"{mark}-{stem}.csv"
+            log.write_text(f"{text[:end]}{mark}{text[end:]}", encoding="utf-8", newline="\n")
+    return folder / "benchmark.toml"
+
+
+def _in_turn(base: Path) -> Iterator[Path]:
+    """Yield the scored recordings, the groups in turn."""
+    every = [sorted((base / group).glob("*.csv")) for group in SCORED]
+    for number in range(max(map(len, every))):
+        yield from (logs[number] for logs in every if number < len(logs))
+
+
+def _thinned(path: Path) -> tuple[str, int]:
+    """Return a recording at a lower rate, and where further digits of a cell of its first row go."""
+    head, *rows = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    text = "".join((head, *rows[::EVERY]))
+    return text, text.index("\n", len(head))
 
 
 def child(file: str, store: str, jobs: str, output: str, *flags: str) -> None:

@@ -1,10 +1,10 @@
 """Results of 1,000, 20,000 and 100,000 recordings: what the first process holds and takes, and the HTML page of them.
 
-    python benchmarks/large_results.py [--without-browser]
+    python benchmarks/large_results.py
 
 Rows are drawn at random (seeded) and gathered as those of a benchmark, so everything after the detection is measured:
 gathering, statistics, every report. Each number of recordings runs in a process of its own; its peak is read from
-/proc. The page is opened by headless Chromium, by selenium. Linux only.
+/proc. The page is opened by headless Chromium, by selenium, if there is one. Linux only.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from timing import environment, table  # noqa: E402
 
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file  # noqa: E402
 from cdtool.commands.scoring.gathering import results_before, results_of  # noqa: E402
-from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, OperationOutcome, Wanted  # noqa: E402
+from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome, OperationOutcome  # noqa: E402
+from cdtool.commands.scoring.pieces import Piece, PieceOutcome  # noqa: E402
 from cdtool.commands.scoring.scored_logs import ScoredLogs  # noqa: E402
 from cdtool.commands.scoring.scoring import LogRows  # noqa: E402
 from cdtool.execution.workers import Workers  # noqa: E402
@@ -59,17 +60,18 @@ class _Drawn:
     names: tuple[str, ...]
     known: dict[str, RowsOfLog] = field(default_factory=dict)
 
-    def __call__(self, group: str, path: Path, wanted: Wanted | None, _: tuple[str, ...] | None) -> list[LogOutcome]:
-        drawn = self.known.get(path.name) or next(self.rows)
+    def __call__(self, piece: Piece) -> PieceOutcome:
+        drawn = self.known.get(piece.path.name) or next(self.rows)
         detectors = tuple(DetectorOutcome(name, (self._on_operation(drawn, name),)) for name in self.names)
         rows = LogRows(drawn.recording, drawn.forces, findings=drawn.findings)
         outcome = LogOutcome(rows, detectors)
-        if wanted is None or not wanted.is_wanted(group, tuple(outcome.of_operation(0))):
-            return [outcome]
-        self.known[path.name] = drawn
+        wanted = piece.wanted
+        if wanted is None or not wanted.is_wanted(piece.group, tuple(outcome.of_operation(0))):
+            return PieceOutcome((outcome,))
+        self.known[piece.path.name] = drawn
         named = dict(zip(("quick", "slow"), self.names, strict=False))
-        trace = trace_of(lambda name: named.get(name, name), group, drawn.recording.recording)
-        return [LogOutcome(rows, detectors, (trace,))]
+        trace = trace_of(lambda name: named.get(name, name), piece.group, drawn.recording.recording)
+        return PieceOutcome((LogOutcome(rows, detectors, (trace,)),))
 
     def _on_operation(self, drawn: RowsOfLog, name: str) -> OperationOutcome:
         contacts = tuple(row for row in drawn.contacts if row.detector == name)
@@ -114,7 +116,7 @@ def _gathered(recordings: int, detectors: int) -> tuple[Results, tuple[Trace, ..
     of_three = list(islice(groups, 3))
     logs = [(of_three[i % 3], Path(f"{i:06d}.mcap")) for i in range(recordings)]
     drawn = _Drawn(rows_of_logs(recordings, detectors), names)
-    scored = ScoredLogs(setup, lambda: drawn, logs, Workers())
+    scored = ScoredLogs(setup, drawn, logs, Workers())
     before = results_before(setup, {"tool": "cdtool", "tool_version": "0", "machine": "door"}, names)
     return results_of(setup, before, scored, dict.fromkeys(names, MULTIPLES), {}), scored.traces
 
@@ -151,7 +153,7 @@ def opened(page: Path) -> tuple[float, list[str]]:
         driver.quit()
 
 
-def main(with_browser: bool) -> int:
+def main() -> int:
     print(environment())
     held, peaks, slopes = True, {}, {}
     with tempfile.TemporaryDirectory() as name:
@@ -173,7 +175,9 @@ def main(with_browser: bool) -> int:
         for recordings, took in slopes.items():
             each = 1e3 * took / recordings
             print(f"      {recordings} recordings: {each:.2f} ms of CPU time each in the first process")
-        if with_browser:
+        if shutil.which("chromedriver") is None:
+            print("skip  how soon the page reacts: no chromedriver")
+        else:
             seconds, messages = opened(page)
             held &= _verdict("page of 100,000 recordings reacts after [s]", seconds, MOST_SECONDS)
             held &= _verdict("messages in its console", len(messages), 0)
@@ -191,4 +195,4 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
         print(json.dumps(measured(int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))))
     else:
-        sys.exit(main(with_browser="--without-browser" not in sys.argv))
+        sys.exit(main())

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, sleep
 
-from memory_logs import MACHINE_CHANNELS, write_log
+from mcap_logs import MACHINE_CHANNELS, write_log
 from timing import main, table
 
 import cdtool
@@ -57,7 +57,7 @@ def measure() -> bool:
         for compression in ("none", "zstd"):
             logs = {"1 h": folder / "hour.mcap", "10 min": folder / "short.mcap"}
             for log, seconds in zip(logs.values(), (HOUR_S, SHORT_S), strict=True):
-                write_log(log, prepared, seconds, size * seconds / HOUR_S, compression)
+                write_log(log, prepared, seconds, compression, size * seconds / HOUR_S)
             print(f"\ncompression {compression}: {logs['1 h'].stat().st_size / 1e9:.2f} GB of 1 h", flush=True)
             held &= _measured(folder, logs)
     return held

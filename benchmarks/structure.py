@@ -1,16 +1,9 @@
-"""How the code is built: a recording's way through the modules, import cycles, single callers, lines, complexity.
+"""How the code is built: what a read and a benchmark run, import cycles, single callers, lines, complexity.
 
     python benchmarks/structure.py           # one table
     python benchmarks/structure.py --show    # and what each number consists of
     python benchmarks/structure.py --lower   # write counts that have become smaller into tests/project/house.toml
 
-* **Walk.** `cdtool.read` reads one CSV and one MCAP log (several clocks, declared units, one gap) while every call of a
-  public function is recorded, up to where the machine refers the channels to the load side. A stay is a run of calls
-  into one module, a return is a stay in a module that was left before. A call counts where it enters a module from
-  another one; every call does, also those of the second channel. The package of one format is one module, because its
-  caller knows only its contract, and so is `messages`, by which formats decode; `every module` counts the modules
-  inside them, too. `UTILITIES` are passed over. Only
-  the main thread is recorded.
 * **Reach.** The distinct functions of the package and their modules that run, and how deeply their calls are nested,
   while the CSV log `sample_logs/gate/stiff/03.csv` is read with the machine file already read, and while
   `sample_logs/gate` is benchmarked with one detector. Comprehensions and bodies of classes do not count.
@@ -35,7 +28,6 @@ import io
 import json
 import subprocess
 import sys
-import tempfile
 import tokenize
 import tomllib
 from collections import Counter, defaultdict
@@ -43,38 +35,21 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
-from inspect import CO_GENERATOR, CO_OPTIMIZED
-from itertools import groupby
+from inspect import CO_OPTIMIZED
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-import numpy as np
 from timing import table
 
 PACKAGE = Path(__file__).parents[1] / "cdtool"
 BOUNDS = Path(__file__).parents[1] / "tests" / "project" / "house.toml"
-MOST_STAYS, MOST_RETURNS, MOST_SINGLE_CALLERS = 12, 2, 40
+MOST_SINGLE_CALLERS = 40
 GOAL_LINES = 52_000  # what the package is to have at most once its files are in the rooms of the measuring chain
 MOST_COMPLEX, MOST_ARGUMENTS = 10, 7
 GATE = Path(__file__).parents[1] / "sample_logs" / "gate"
 # The most functions, modules and nested calls of one read, and functions and modules of one benchmark.
 MOST_READ, MOST_BENCHMARK = (60, 20, 9), (650, 120, None)
-# Modules whose calls are no step of a recording's walk, and why.
-UTILITIES: Mapping[str, str] = {
-    "cdtool.base.errors": "how any module reports an error",
-    "cdtool.base.plain_text": "how any module writes a number",
-    "cdtool.recordings.units": "a table of units that is looked up",
-    "cdtool.base.registry": "a table of names that is looked up",
-    "cdtool.base.kernels": "how a compiled loop is called",
-    "cdtool.formats.channels.channel_map": "a value: what the machine file maps",
-    "cdtool.recordings.recording": "a value: what has been read so far",
-}
-# Packages whose modules are each a format, the one by which they decode messages, and where a walk ends: the channels
-# are there, the method begins.
-FORMATS = "cdtool.formats"
-MESSAGES = "cdtool.formats.messages"
-METHOD = "cdtool.machines"
 
 
 @dataclass(frozen=True)
@@ -365,56 +340,6 @@ def kernel_lines(tree: ast.Module) -> set[int]:
 
 
 @dataclass(frozen=True)
-class Call:
-    """A public function that was called, and the module that called it (empty: from outside of the package)."""
-
-    caller: str
-    module: str
-    function: str
-
-
-def calls_of(run: Callable[[], object], package: Path, utilities: Iterable[str] = (), method: str = "") -> list[Call]:
-    """The calls of the package's public functions as `run` makes them, those of `utilities` and of `method` left out.
-
-    A utility is passed over: what it calls counts as called by its caller. What the method calls is no longer part of
-    the walk. A generator counts once, where its first value is asked for.
-    """
-    names = {str(module.path): name for name, module in modules_of(package).items()}
-    passed = set(utilities)
-    generators: set[FrameType] = set()
-    found: list[Call] = []
-
-    def record(frame: FrameType, event: str, _: object) -> None:
-        code = frame.f_code
-        module = names.get(code.co_filename)
-        if event != "call" or module is None or module in passed or not _is_public(code.co_qualname):
-            return
-        # Neither the body of a class, nor a compiled loop: it has no caller here, and belongs to whoever calls it.
-        if not code.co_flags & CO_OPTIMIZED or frame.f_back is None:
-            return
-        if code.co_flags & CO_GENERATOR:
-            if frame.f_lasti < 0 or frame in generators:
-                return
-            generators.add(frame)
-        caller, back = "", frame.f_back
-        while back is not None:
-            name = names.get(back.f_code.co_filename, "")
-            if method and _is_below(name, method):
-                return
-            caller = caller or ("" if name in passed else name)
-            back = back.f_back
-        if not (method and _is_below(module, method)):
-            found.append(Call(caller, module, code.co_qualname))
-
-    sys.setprofile(record)
-    try:
-        run()
-    finally:
-        sys.setprofile(None)
-    return found
-
-
-@dataclass(frozen=True)
 class Reach:
     """What of the package a piece of work runs: functions as module:name, and how deeply their calls are nested."""
 
@@ -451,142 +376,13 @@ def reach_of(run: Callable[[], object], package: Path) -> Reach:
     return Reach(tuple(found), deepest)
 
 
-def _is_public(qualname: str) -> bool:
-    """No part of the name is private or local, nor the check of a new value; `__init__` and its kin are public."""
-    if qualname.endswith(".__post_init__"):
-        return False
-    return all(
-        part.isidentifier() and (not part.startswith("_") or (part.startswith("__") and part.endswith("__")))
-        for part in qualname.split(".")
-    )
-
-
-def _is_below(name: str, package: str) -> bool:
-    return name == package or name.startswith(f"{package}.")
-
-
-def room_of(module: str, formats: str = FORMATS, messages: str = MESSAGES) -> str:
-    """The module, or the package of one format or of messages that it belongs to."""
-    if _is_below(module, messages):
-        return messages
-    return ".".join(module.split(".")[: formats.count(".") + 2]) if _is_below(module, formats) else module
-
-
-@dataclass(frozen=True)
-class Walk:
-    """The stays of a walk, one behind the other: a module and what was called in it, each function once."""
-
-    stays: tuple[tuple[str, tuple[str, ...]], ...]
-
-    @classmethod
-    def of(cls, calls: Iterable[Call], room: Callable[[str], str]) -> Walk:
-        """The calls that enter a room from another one."""
-        entered = [
-            (room(call.module), call.function)
-            for call in calls
-            if not call.caller or room(call.caller) != room(call.module)
-        ]
-        grouped = groupby(entered, key=lambda step: step[0])
-        return cls(tuple((name, tuple(dict.fromkeys(step[1] for step in steps))) for name, steps in grouped))
-
-    @property
-    def rooms(self) -> int:
-        return len({name for name, _ in self.stays})
-
-    @property
-    def returns(self) -> int:
-        return len(self.stays) - self.rooms
-
-
-_MACHINE = """\
-[machine]
-type = "linear_axis"
-name = "axis"
-motor_inertia = 0.001
-load_mass = 620
-transmission_ratio = 0.001333
-viscous_friction = 0.0003
-coulomb_friction = 0.0
-
-[channels]
-time = { column = "time", unit = "s" }
-torque = { column = "i_motor", unit = "A", scale = 0.56 }
-speed = { column = "n_motor", unit = "rpm" }
-force = { column = "load_cell", unit = "kN" }
-
-[channels.mcap]
-torque = { topic = "/drive", field = "effort[0]", unit = "A", scale = 0.56 }
-speed = { topic = "/drive", field = "velocity[0]", unit = "rpm" }
-force = { topic = "/load_cell", field = "wrench.force.x", unit = "kN" }
-"""
-_HEADER = "std_msgs/Header header\n"
-_HEADER_TYPE = (
-    f"{'=' * 80}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
-    f"{'=' * 80}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
-)
-_JOINT_STATE = f"{_HEADER}string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n{_HEADER_TYPE}"
-_VECTOR = f"{'=' * 80}\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
-_WRENCH = f"{'=' * 80}\nMSG: geometry_msgs/Wrench\nVector3 force\nVector3 torque\n"
-_WRENCH_STAMPED = f"{_HEADER}geometry_msgs/Wrench wrench\n{_HEADER_TYPE}{_WRENCH}{_VECTOR}"
-
-
-def write_logs(folder: Path) -> dict[str, Path]:
-    """A machine file and one log in CSV and in MCAP: a drive at 1 kHz with a gap, a load cell on a clock of its own."""
-    from mcap_ros2.writer import Writer
-
-    rng = np.random.default_rng(0)
-    number = np.arange(3000)
-    drive = 1e-3 * number[(number < 1500) | (number > 1600)]
-    cell = 0.0004 + 1.003e-3 * np.arange(len(drive))
-    current = 1.0 + rng.normal(0.0, 0.01, len(drive))
-    speed = 500.0 * np.sin(drive) + rng.normal(0.0, 1.0, len(drive))
-    force = rng.normal(0.0, 1e-3, len(drive))
-    (folder / "machine.toml").write_text(_MACHINE, encoding="utf-8")
-    rows = np.column_stack((drive, current, speed, cell, force))
-    head = "time1 [s],i_motor [A],n_motor [rpm],time2 [s],load_cell [kN]"
-    np.savetxt(folder / "log.csv", rows, "%.6f", ",", header=head, comments="")
-    stamp = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
-    with (folder / "log.mcap").open("wb") as file:
-        writer = Writer(file)
-        kinds = {
-            "/drive": writer.register_msgdef("sensor_msgs/msg/JointState", _JOINT_STATE),
-            "/load_cell": writer.register_msgdef("geometry_msgs/msg/WrenchStamped", _WRENCH_STAMPED),
-        }
-        messages: list[tuple[float, str, dict[str, Any]]] = []
-        for drive_time, amperes, rpm, cell_time, kilonewtons in rows.tolist():
-            joint = {"header": stamp, "name": ["axis"], "position": [0.0], "velocity": [rpm], "effort": [amperes]}
-            vectors = {"force": {"x": kilonewtons, "y": 0.0, "z": 0.0}, "torque": {"x": 0.0, "y": 0.0, "z": 0.0}}
-            messages.append((drive_time, "/drive", joint))
-            messages.append((cell_time, "/load_cell", {"header": stamp, "wrench": vectors}))
-        for time, topic, message in sorted(messages, key=lambda item: item[0]):
-            nanoseconds = 1_700_000_000 * 10**9 + round(1e9 * time)
-            writer.write_message(topic, kinds[topic], message, nanoseconds, nanoseconds)
-        writer.finish()
-    return {"CSV": folder / "log.csv", "MCAP": folder / "log.mcap"}
-
-
-def recorded() -> dict[str, list[Call]]:
-    """The calls with which each log is read, by its kind; modules and kernels are loaded before."""
-    import cdtool
-    from cdtool.formats.machine_file import read_machine_file
-
-    if not Path(cdtool.__file__).samefile(PACKAGE / "__init__.py"):
-        raise SystemExit(f"cdtool is imported from {cdtool.__file__}, not from this checkout; pip install -e .")
-    read = cdtool.read
-    found = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for kind, log in write_logs(Path(folder)).items():
-            machine = read_machine_file(log.parent / "machine.toml")
-            read(log, machine)  # loads its modules and compiles its kernels
-            found[kind] = calls_of(lambda log=log, machine=machine: read(log, machine), PACKAGE, UTILITIES, METHOD)
-    return found
-
-
 def reached() -> dict[str, tuple[Reach, tuple[int | None, ...]]]:
     """What one read of a log and one benchmark with one detector reach, with their targets."""
     import cdtool
     from cdtool.formats.machine_file import read_machine_file
 
+    if not Path(cdtool.__file__).samefile(PACKAGE / "__init__.py"):
+        raise SystemExit(f"cdtool is imported from {cdtool.__file__}, not from this checkout; pip install -e .")
     machine = read_machine_file(GATE / "machine.toml")
     works: dict[str, tuple[Callable[[], object], tuple[int | None, ...]]] = {
         "read of a CSV log": (lambda: cdtool.read(GATE / "stiff" / "03.csv", machine), MOST_READ),
@@ -611,15 +407,6 @@ def measure(show: bool) -> bool:
         rows.append((name, f"{value:,}", "" if most is None else f"<= {most:,}", "ok" if met[-1] else "FAIL"))
 
     lists: dict[str, list[str]] = {}
-    for kind, calls in recorded().items():
-        walk, fine = Walk.of(calls, room_of), Walk.of(calls, str)
-        add(f"{kind} log: stays", len(walk.stays), MOST_STAYS)
-        add(f"{kind} log: returns", walk.returns, MOST_RETURNS)
-        add(f"{kind} log: modules", walk.rooms)
-        add("  every module counted: stays", len(fine.stays))
-        add("  every module counted: returns", fine.returns)
-        add("  every module counted: modules", fine.rooms)
-        lists[f"Walk of the {kind} log ({len(walk.stays)} stays, {walk.returns} returns)"] = _shown(walk)
     for work, (reach, most) in reached().items():
         for what, value, target in zip(
             ("functions", "modules", "depth"), (len(reach.functions), reach.modules, reach.depth), most, strict=True
@@ -663,24 +450,12 @@ def measure(show: bool) -> bool:
         for title, lines in lists.items():
             print(f"\n== {title}")
             print("\n".join(lines) or "none")
-        print("\n== Utilities that a walk passes over")
-        print("\n".join(f"{name}: {reason}" for name, reason in UTILITIES.items()))
     return all(met)
-
-
-def _shown(walk: Walk) -> list[str]:
-    seen: set[str] = set()
-    lines = []
-    for number, (name, functions) in enumerate(walk.stays, 1):
-        mark = "<-" if name in seen else "  "
-        seen.add(name)
-        lines.append(f"{number:3} {mark} {name}: {', '.join(functions)}")
-    return lines
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--show", action="store_true", help="print the walks and the lists, too")
+    parser.add_argument("--show", action="store_true", help="print the lists, too")
     parser.add_argument("--lower", action="store_true", help="only write smaller counts into tests/project/house.toml")
     options = parser.parse_args()
     if options.lower:

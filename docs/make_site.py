@@ -37,7 +37,7 @@ def stage(target: Path, source_url: str) -> None:
 
     `source_url` is where the repository's files are shown, for links to files that are not pages; empty if unknown.
     """
-    shutil.copytree(DOCS, target / "docs", ignore=shutil.ignore_patterns("*.py", "site", "__pycache__", "wording.html"))
+    shutil.copytree(DOCS, target / "docs", ignore=shutil.ignore_patterns("*.py", "site", "__pycache__"))
     for name in OUTSIDE:
         shutil.copy(ROOT / name, target / name)
     for page in SAMPLES.rglob("README.md"):

@@ -1,4 +1,4 @@
-"""benchmarks/structure.py on small generated packages, and on its own generated logs."""
+"""benchmarks/structure.py on small generated packages."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from pathlib import Path
 from textwrap import dedent
 from types import ModuleType
 
-import numpy as np
 import pytest
 
-import cdtool
 from tests.project.pages import benchmark_script
 
 _numbers = itertools.count()
@@ -164,112 +162,6 @@ def test_functions_above_the_limits_are_listed_and_kernels_are_not(script, packa
     assert found[0].place.startswith("pkg/a.py:")
 
 
-def step(script: ModuleType, caller: str, module: str, function: str = "f") -> object:
-    return script.Call(caller, module, function)
-
-
-def test_a_stay_is_a_change_of_module_and_a_return_is_a_stay_where_one_was_before(script):
-    called = [("", "a"), ("a", "b"), ("a", "b"), ("a", "c"), ("c", "c"), ("a", "b"), ("b", "d"), ("d", "d")]
-    walk = script.Walk.of([step(script, *names) for names in called], str)
-    assert [name for name, _ in walk.stays] == ["a", "b", "c", "b", "d"]
-    assert (walk.rooms, walk.returns) == (4, 1)
-
-
-def test_the_package_of_a_format_is_one_room_and_the_modules_beside_it_are_not(script):
-    def room(name: str) -> str:
-        return script.room_of(name, "pkg.formats", "pkg.messages")
-
-    assert room("pkg.formats.csv.table") == room("pkg.formats.csv") == "pkg.formats.csv"
-    assert room("pkg.formats.mcap.log") == "pkg.formats.mcap"
-    assert room("pkg.formats.source") == "pkg.formats.source"
-    assert room("pkg.messages.columns.cdr") == room("pkg.messages.fields") == room("pkg.messages") == "pkg.messages"
-    assert room("pkg.clock.stamps") == "pkg.clock.stamps" and room("pkg.formats") == "pkg.formats"
-    inside = [("", "pkg.a"), ("pkg.a", "pkg.formats.csv"), ("pkg.formats.csv", "pkg.formats.csv.table")]
-    back = [("pkg.formats.csv.table", "pkg.clock"), ("pkg.formats.csv", "pkg.formats.csv.table")]
-    calls = [step(script, *names) for names in inside + back]
-    assert (len(script.Walk.of(calls, room).stays), script.Walk.of(calls, room).returns) == (3, 0)
-    assert (len(script.Walk.of(calls, str).stays), script.Walk.of(calls, str).returns) == (5, 1)
-
-
-READING = {
-    "start.py": """
-        from PKG import helper, stage, values
-        def read():
-            made = stage.Stage(helper.of(2))
-            total = sum(stage.numbers()) + _private()
-            return made, total, method_of().refer()
-        def _private():
-            return values.public()
-        def method_of():
-            from PKG.method.machine import Machine
-            return Machine()
-    """,
-    "helper.py": """
-        from PKG import values
-        def of(count):
-            return values.public() + count
-    """,
-    "stage.py": """
-        class Stage:
-            def __init__(self, value):
-                self.value = (lambda: value)()
-        class _Hidden:
-            def run(self): ...
-        def numbers():
-            yield 1
-            _Hidden().run()
-            yield 2
-    """,
-    "values.py": "def public(): return 1\n",
-    "method/machine.py": """
-        from PKG import values
-        class Machine:
-            def refer(self): return values.public()
-    """,
-}
-
-
-@pytest.fixture
-def calls(
-    script: ModuleType, package: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., list[tuple[str, str, str]]]:
-    """The calls made when the package above reads."""
-
-    def record(utility: str = "", method: str = "") -> list[tuple[str, str, str]]:
-        root = package(READING, f"made_for_walk_{next(_numbers)}")
-        monkeypatch.syspath_prepend(root.parent)
-        read, prefix = importlib.import_module(f"{root.name}.start").read, f"{root.name}."
-        found = script.calls_of(read, root, [prefix + utility], prefix + method if method else "")
-        return [(item.caller.removeprefix(prefix), item.module.removeprefix(prefix), item.function) for item in found]
-
-    return record
-
-
-def test_public_calls_are_recorded_with_the_module_that_made_them(calls):
-    assert calls() == [
-        ("", "start", "read"),
-        ("start", "helper", "of"),
-        ("helper", "values", "public"),
-        ("start", "stage", "Stage.__init__"),
-        ("start", "stage", "numbers"),
-        ("start", "values", "public"),
-        ("start", "start", "method_of"),
-        ("start", "method.machine", "Machine.refer"),
-        ("method.machine", "values", "public"),
-    ]
-
-
-def test_a_utility_is_passed_over_and_the_walk_ends_at_the_method(calls):
-    assert calls(utility="helper", method="method") == [
-        ("", "start", "read"),
-        ("start", "values", "public"),
-        ("start", "stage", "Stage.__init__"),
-        ("start", "stage", "numbers"),
-        ("start", "values", "public"),
-        ("start", "start", "method_of"),
-    ]
-
-
 def test_reach_counts_private_functions_and_not_comprehensions(script, package, monkeypatch):
     name = f"made_for_reach_{next(_numbers)}"
     nested = {
@@ -294,23 +186,3 @@ def test_reach_counts_private_functions_and_not_comprehensions(script, package, 
     called = [function.removeprefix(f"{name}.") for function in reach.functions]
     assert called == ["start:read", "start:_one", "inner:two", "inner:numbers"]
     assert (reach.modules, reach.depth) == (2, 3)
-
-
-def test_the_logs_of_the_walk_have_two_clocks_declared_units_and_one_gap(script, tmp_path):
-    logs = script.write_logs(tmp_path)
-    read = {kind: cdtool.read(log, tmp_path / "machine.toml") for kind, log in logs.items()}
-    assert set(read) == {"CSV", "MCAP"}
-    for recording in read.values():
-        steps = np.diff(recording["torque"].time)
-        assert np.count_nonzero(steps > 0.05) == 1
-        assert not np.array_equal(recording["torque"].time, recording["force"].time)
-        assert np.ptp(np.diff(recording["force"].time)) < 1e-4
-    for channel in ("torque", "speed", "force"):
-        first, second = (read[kind][channel].values for kind in ("CSV", "MCAP"))
-        np.testing.assert_allclose(first, second, rtol=1e-3, atol=1e-3)
-
-
-def test_what_a_walk_passes_over_is_there_and_has_a_reason(script):
-    modules = script.modules_of(script.PACKAGE)
-    assert {*script.UTILITIES, script.FORMATS, script.METHOD} <= set(modules)
-    assert all(script.UTILITIES.values())

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +13,8 @@ from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Contact, Series
 from cdtool.thresholds.limit import Limit
+from tests.contracts.lost_evidence import ALLOWED, Cost, cost_of, pressed_outside
 from tests.thresholds.strokes import TIME, N, noise_runs, stroke
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from lost_evidence import ALLOWED, Cost, cost_of, pressed_outside
 
 AT_ONCE = Activation(debounce=1)
 ONSET, LENGTH = 2.0, 0.03

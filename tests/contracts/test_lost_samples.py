@@ -1,11 +1,10 @@
 """Lost samples: no detector with any threshold mistakes a gap for a contact, or is unable to assess for long after one.
 
-A reduced form of benchmarks/lost_samples.py.
+A reduced form of benchmarks/lost_samples.py of commit def748d0.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -30,13 +29,11 @@ from cdtool.recordings.recording import Recording, Series
 from cdtool.results.curves.sweep import critical_factor
 from cdtool.thresholds import THRESHOLDS
 from cdtool.truth.onset import OnsetRule, find_contacts
+from tests.contracts.damaged_logs import KINDS, Fault, damaged, filled, random_faults
+from tests.contracts.lost_evidence import cost_of
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 from tests.synthetic.motions import moving_recording
 from tests.synthetic.robots import six_joint_robot
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from damaged_logs import KINDS, Fault, damaged, filled, random_faults
-from lost_evidence import cost_of
 
 ARM_LOGS = Path(__file__).parents[2] / "sample_logs" / "arm"
 CELLS = [(detector, threshold) for detector in DETECTORS.names() for threshold in THRESHOLDS.names()]

@@ -14,7 +14,7 @@ from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.reading import survey
 from cdtool.formats.containers.container_checks import check_chunks
 from tests.formats import bombs
-from tests.noted_times import note
+from tests.time_bounds import check
 
 SECONDS, MIB = 5.0, 300
 # Reads a plain file of each kind, then a bomb; prints the seconds, the MiB above the plain files, and the message.
@@ -84,7 +84,7 @@ def test_a_bomb_is_refused_without_allocating_its_memory(make, name, tmp_path):
     assert (
         "damaged or not a Parquet or Feather file: " if "with_a_false" in make.__name__ else ": refused ("
     ) in message
-    note(seconds, SECONDS)
+    check(seconds, SECONDS)
     assert more < MIB
 
 

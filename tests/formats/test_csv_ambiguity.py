@@ -10,7 +10,7 @@ import pytest
 from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TablePins, TimeSource
 from cdtool.formats.csv import Csv
-from tests.noted_times import noted
+from tests.time_bounds import bounded
 
 BEYOND = 19_000  # rows, more than the sample has
 
@@ -146,7 +146,7 @@ def test_two_pairs_of_digits_are_refused_unless_a_cell_shows_whether_they_are_mi
 )
 def test_a_long_line_of_one_letter_is_read_or_refused_with_its_number(log, line):
     path = log(f"t;x\n0;1.5\n{line}\n1;2.5\n" if line[0] != "[" else f"t;{line};x\n{line};;[N]\n0;0;1\n1;0;2\n")
-    with noted(3.0):
+    with bounded(3.0):
         try:
             Csv().columns(path)
         except RecordingError as fault:

@@ -20,7 +20,7 @@ from cdtool.formats.channels.reading import choose_format, log_pieces, survey
 from cdtool.formats.csv.text import BLOCK_BYTES
 from cdtool.formats.pieces import join_pieces
 from tests.command import cdtool as command
-from tests.noted_times import note
+from tests.time_bounds import check
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
@@ -215,7 +215,7 @@ def test_a_bomb_is_refused_without_filling_the_memory(tmp_path):
     seconds, more, message = json.loads(done.stdout)
     assert message.startswith(f"{bomb}: unpacks to ") and ": refused (" in message and "\n" not in message
     assert more < 64  # MiB
-    note(seconds, 15.0)
+    check(seconds, 15.0)
 
 
 def test_a_small_log_is_unpacked_at_once_and_a_long_one_is_not(tmp_path):

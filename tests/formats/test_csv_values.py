@@ -11,7 +11,7 @@ from cdtool.base.errors import UsageError
 from cdtool.formats.csv import Csv, write_csv
 from tests.base.findings.facts import fact_of
 from tests.data_folder import UR10E_LOGS, data, needs_data
-from tests.noted_times import noted
+from tests.time_bounds import bounded
 
 
 def read(path):
@@ -45,7 +45,7 @@ def test_seven_seconds_at_1_khz_are_written_and_read_back(tmp_path):
     path = tmp_path / "big.csv"
     write_csv(path, columns, dict.fromkeys(columns, "%.6f"))
     read(path)  # imports pandas
-    with noted(0.5):
+    with bounded(0.5):
         write_csv(path, columns, dict.fromkeys(columns, "%.6f"))
         source = read(path)
     for name, values in columns.items():

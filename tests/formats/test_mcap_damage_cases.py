@@ -25,10 +25,10 @@ from tests.formats.mcap_damage.bombs import bombs
 from tests.formats.mcap_damage.generator import KINDS, cases, kind_of
 from tests.formats.mcap_damage.readers import Reading, value_key
 from tests.formats.mcap_damage.truth import Message, Truth
-from tests.noted_times import note
+from tests.time_bounds import check
 
 SEED, COUNT, STEP = 1, 1000, 100
-SECONDS = 5.0  # processor time per bomb; checked by benchmarks/time_bounds.py
+SECONDS = 5.0  # processor time per bomb
 ROOT = Path(__file__).parents[2]
 
 
@@ -102,5 +102,5 @@ def test_bombs_are_refused_within_300_mb_and_the_other_messages_are_read(tmp_pat
     measured = [json.loads(line) for line in ran.stdout.splitlines()]
     assert len(measured) == 2 * len(bombs())
     for bomb in measured:
-        note(bomb["seconds"], SECONDS)
+        check(bomb["seconds"], SECONDS)
     assert not [bomb for bomb in measured if bomb["faults"] or bomb["bytes"] >= 300e6]

@@ -9,7 +9,7 @@ import pytest
 from tests.fuzz import targets
 from tests.fuzz.seed_corpus import write
 from tests.fuzz.targets import SEPARATOR, TARGETS, try_messages
-from tests.noted_times import noted
+from tests.time_bounds import bounded
 
 FOUND = Path(__file__).parent / "found"
 _JSON = b"\3"  # the encoding, as targets.try_messages numbers them
@@ -18,7 +18,7 @@ FILES = sorted(str(path.relative_to(FOUND)) for path in FOUND.glob("*/*"))
 
 @pytest.mark.parametrize("name", FILES)
 def test_an_input_that_was_found_once_is_read_or_refused_in_one_line(tmp_path, name):
-    with noted(30.0):  # compiling the kernels included
+    with bounded(30.0):  # compiling the kernels included
         TARGETS[Path(name).parent.name]((FOUND / name).read_bytes(), tmp_path / "input")
 
 

@@ -1,4 +1,4 @@
-"""A short run of what benchmarks/hostile_input.py tries for long: hostile files and options to every command."""
+"""A short run of what tests/fuzz/hostile_input.py tries for long: hostile files and options to every command."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_no_hostile_file_or_option_makes_a_traceback_or_more_than_a_line(bench):
     assert not complaints, "\n".join(complaints)
 
 
-# Found by benchmarks/hostile_input.py.
+# Found by tests/fuzz/hostile_input.py.
 @pytest.mark.parametrize(
     "arguments",
     [

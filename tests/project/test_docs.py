@@ -78,7 +78,7 @@ EXAMPLES = {
 # Lines of shell blocks that set something up or take long: run by CI or by hand, not here.
 NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/", "python docs/make_")
 # Of the recordings that an example writes the later commands of its page get so many: each is learned from for every
-# other one. What the page says of all of them is checked by tests/whole_runs and benchmarks/robot_collisions.py.
+# other one. What the page says of all of them is checked by tests/whole_runs/test_first_log.py.
 FEWER = {"docs/examples/robot_collisions.py": ("hits/hit_*.csv", 10)}
 
 _LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")

@@ -1,4 +1,4 @@
-"""Logs without reference channels, from simulator to verdict; the full test is benchmarks/without_reference.py."""
+"""Logs without reference channels, from simulator to verdict; the full test is in commit def748d0."""
 
 from __future__ import annotations
 

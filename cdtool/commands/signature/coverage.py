@@ -121,7 +121,7 @@ def check_coverage(
     signature of n - 1 runs is less certain than one of all n: its critical factors are up to 3 % larger at 14 runs.
     That is not corrected, so that the predicted chance is too large rather than too small. "Needs more runs" assumes
     that the critical factors stay as they are and only become better known. Measured on simulated runs by
-    `benchmarks/signature_coverage.py`; runs of one day do not represent other days.
+    `benchmarks/signature_coverage.py` at commit def748d0; runs of one day do not represent other days.
 
     Examples
     --------

@@ -172,7 +172,7 @@ def _name(axes: Axes, text: str) -> None:
 
 
 def _title(trace: Trace) -> str:
-    words = [f"{label(trace.group, 40)}  ·  {label(trace.recording, 50)}"]
+    words = [f"{label(trace.group, 35)}  ·  {label(trace.recording, 45)}"]
     contact = trace.shown
     if contact is None:
         words.append("no contact")

@@ -1,6 +1,6 @@
 """A planted regression of the simulated gate is found, and equal builds are not reported as different.
 
-A small set; the full one is benchmarks/compare_builds.py.
+A small set; the full one is benchmarks/compare_builds.py of commit def748d0.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from cdtool.commands.console.colour import Toned, shows_colour, style_of
+from cdtool.commands.console.colour import Toned, shows_colour
 from cdtool.commands.console.console import say, table
 from cdtool.commands.console.summary_table import show_conclusion, show_table
 from tests.report.html.html_case import case
@@ -80,11 +80,6 @@ def test_colours_repeat_what_the_words_say(terminal, capsys, monkeypatch):
     coloured = re.sub(r"\x1b\[[0-9;]*m", "", printed())
     monkeypatch.setenv("NO_COLOR", "1")
     assert coloured == re.sub(r"\x1b\[[0-9;]*m", "", printed())
-
-
-def test_a_cell_without_a_tone_has_no_style():
-    assert style_of("4") == style_of(Toned(4)) == ""
-    assert str(Toned(4, "bad")) == "4"
 
 
 @pytest.mark.parametrize("columns", [60, 80])

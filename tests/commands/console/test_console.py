@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-from pathlib import Path
 from unittest import mock
 
 import pytest
@@ -31,33 +30,6 @@ def test_a_left_out_log_has_its_whole_reason_and_its_name_once(capsys, folder):
     assert line.endswith(f"x.csv: {reason}\n")
     assert line.count("x.csv") == 1
     assert len(line) <= 301
-
-
-def test_sentences_fit_100_columns_in_a_pipe_and_positions_have_a_unit(gate_folder, feekf_signature):
-    logs = [gate_folder / "holdout" / "01.csv", gate_folder / "stiff" / "01.csv"]
-    done = cdtool("detect", *logs, "-m", gate_folder / "machine.toml", "-s", feekf_signature)
-    sentences = done.out[done.out.index("not assessable in") :]
-    assert all(len(line) <= 100 or " " not in line.strip() for line in sentences.splitlines())
-    told = " ".join(sentences.split())
-    assert " m) no limit known here" in told and "e-" not in told
-
-
-def test_names_are_not_split_at_line_ends(capsys):
-    name = "stiff-03-of-the-second-campaign/" + 90 * "x"
-    console.say(f"not assessable in {name}: 12 %")
-    assert name in capsys.readouterr().out
-
-
-def test_the_results_of_a_benchmark_are_explained_in_lines_of_100_columns(gate_folder: Path, tmp_path: Path):
-    (tmp_path / "benchmark.toml").write_text(
-        f'machine = "{gate_folder / "machine.toml"}"\ndetectors = ["gm"]\n[signature]\nforce = true\n'
-        f'[learn]\nlogs = ["{gate_folder}/free/0[123].csv"]\n[impacts.stiff]\nlogs = ["{gate_folder}/stiff/01.csv"]\n',
-        encoding="utf-8",
-    )
-    done = cdtool("benchmark", tmp_path / "benchmark.toml")
-    assert done.status == 0, done.err
-    assert max(map(len, done.out.splitlines())) <= 100
-    assert "followed back to half of it" in " ".join(done.out.split())
 
 
 BYTES = bytes(range(256)) * 4

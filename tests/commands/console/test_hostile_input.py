@@ -24,8 +24,8 @@ from cdtool.base.errors import RecordingError
 from cdtool.results.traces.file import read_traces
 from tests.command import cdtool
 from tests.command_server import CommandServer, Ended, command_server
-from tests.noted_times import note, noted
 from tests.synthetic.robots import JOINTS, six_joint_urdf
+from tests.time_bounds import bounded, check
 
 ROOT = Path(__file__).parents[3]
 GATE = ROOT / "sample_logs" / "gate"
@@ -66,7 +66,7 @@ def check_refused(commands: CommandServer, *arguments: object, words: Sequence[s
     assert len(lines) == 1 and lines[0].startswith("error: "), done.err
     assert len(lines[0]) <= LONGEST_LINE, len(lines[0])
     assert all(word in done.err for word in words), done.err
-    note(done.seconds, SECONDS)
+    check(done.seconds, SECONDS)
     assert done.more_mib < MIB, done
     return done
 
@@ -309,7 +309,7 @@ def test_devices_and_pipes_are_refused_before_reading(tmp_path, kind, arguments)
         os.mkfifo(path)
     if kind == "folder":
         path.mkdir()
-    with noted(SECONDS):
+    with bounded(SECONDS):
         done = cdtool(*(path if item == "{}" else item for item in arguments))
     assert done.status == 2 and done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert str(path) in done.err

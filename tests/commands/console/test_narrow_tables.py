@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from cdtool.commands.console.console import column_blocks, column_width, table
+from cdtool.commands.console.console import table
 
 HEADINGS = [("group", "left"), ("detector", "left"), ("latency\nms", "right"), ("range\nms", "right"), ("why", "left")]
 ROWS = [
@@ -43,12 +43,3 @@ def test_a_name_longer_than_the_terminal_is_folded_without_loss(terminal):
     name = "x" * 150
     lines = terminal(60, [("stiff", name, "1", "2", "")])
     assert sum(line.count("x") for line in lines) % 150 == 0 and max(map(len, lines)) <= 60
-
-
-def test_blocks_repeat_the_names_and_keep_the_order():
-    widths = [
-        column_width(heading, side, [row[i] for row in ROWS], i < 2) for i, (heading, side) in enumerate(HEADINGS)
-    ]
-    assert column_blocks(widths, 200) == [[0, 1, 2, 3, 4]]
-    assert column_blocks(widths, 62) == [[0, 1, 2], [0, 1, 3], [0, 1, 4]]
-    assert [i for block in column_blocks(widths, 62) for i in block if i > 1] == [2, 3, 4]

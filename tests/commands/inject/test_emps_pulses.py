@@ -1,10 +1,9 @@
-"""Injected force pulses against the recorded ones of the EMPS axis, by benchmarks/emps_pulses.py."""
+"""Injected force pulses against the recorded ones of the EMPS axis."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,35 +14,31 @@ from cdtool.commands.inject.axis_contact import axis_contact
 from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.with_injected import refusal
 from cdtool.detectors.momentum import Momentum
+from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import MachineFile
 from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.machines.axis_model.obstacle import Obstacle
 from cdtool.machines.axis_model.parameters import AxisModel
+from tests.commands.inject import emps_pulses
 from tests.data_folder import data, needs_data
-from tests.project.pages import benchmark_script
 
 RECORDINGS = ("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat")
 
 
 @pytest.fixture(scope="module")
-def script() -> ModuleType:
-    return benchmark_script("emps_pulses")
+def identified() -> tuple[MachineFile, AxisModel]:
+    machine_file: MachineFile = emps_pulses.identified(data("emps"))
+    return machine_file, emps_pulses.model_of(machine_file)[1]
 
 
 @pytest.fixture(scope="module")
-def identified(script: ModuleType) -> tuple[MachineFile, AxisModel]:
-    machine_file: MachineFile = script.identified(data("emps"))
-    return machine_file, script.model_of(machine_file)[1]
-
-
-@pytest.fixture(scope="module")
-def axes(script: ModuleType, identified: tuple[MachineFile, AxisModel]) -> Any:
-    return script.compared(data("emps"), *identified)
+def axes(identified: tuple[MachineFile, AxisModel]) -> Any:
+    return emps_pulses.compared(data("emps"), *identified)
 
 
 @needs_data(*RECORDINGS)
-def test_the_residual_crosses_every_threshold_when_the_recorded_one_does(script: ModuleType, axes: Any) -> None:
-    times = script.crossing_times(axes)
+def test_the_residual_crosses_every_threshold_when_the_recorded_one_does(axes: Any) -> None:
+    times = emps_pulses.crossing_times(axes)
     assert [item.threshold for item in times] == [15.0, 40.0, 80.0, 120.0, 160.0]
     for item in times:
         assert len(item.difference) == 25
@@ -56,8 +51,8 @@ def test_the_residual_crosses_every_threshold_when_the_recorded_one_does(script:
 
 
 @needs_data(*RECORDINGS)
-def test_the_displacement_is_within_six_percent_of_the_recorded_one(script: ModuleType, axes: Any) -> None:
-    displaced = list(script.displacements(axes))
+def test_the_displacement_is_within_six_percent_of_the_recorded_one(axes: Any) -> None:
+    displaced = list(emps_pulses.displacements(axes))
     assert len(displaced) == 25
     assert all(140e-6 < item.recorded < 180e-6 for item in displaced)
     assert max(item.error for item in displaced) <= 0.06
@@ -75,9 +70,9 @@ def test_nothing_changes_before_the_first_pulse(axes: Any) -> None:
 
 
 @needs_data(*RECORDINGS)
-def test_the_pulses_are_known_to_the_sample(script: ModuleType, axes: Any) -> None:
+def test_the_pulses_are_known_to_the_sample(axes: Any) -> None:
     """The recorded torque jumps by the whole pulse in its first sample, and the pulse is taken out of it again."""
-    logged = script.read_as_logged(data("emps") / script.PULSES, script.read_machine_file(script.MACHINE))
+    logged = read_as_logged(data("emps") / emps_pulses.PULSES, emps_pulses.read_machine_file(emps_pulses.MACHINE))
     with_pulse, without = (item["torque"].values[:, 0] for item in (logged.recording, axes.recorded))
     for part in axes.sections:
         assert with_pulse[part.start] - with_pulse[part.start - 1] > 170.0
@@ -86,46 +81,44 @@ def test_the_pulses_are_known_to_the_sample(script: ModuleType, axes: Any) -> No
 
 @needs_data(*RECORDINGS)
 @pytest.mark.parametrize("wrong", ["soft controller", "heavy load"])
-def test_a_wrong_model_does_not_meet_the_limits(
-    script: ModuleType, identified: tuple[MachineFile, AxisModel], wrong: str
-) -> None:
+def test_a_wrong_model_does_not_meet_the_limits(identified: tuple[MachineFile, AxisModel], wrong: str) -> None:
     machine_file, model = identified
     if wrong == "soft controller":
         assert model.controller is not None
         model = replace(model, controller=replace(model.controller, speed_gain=0.8 * model.controller.speed_gain))
     else:
         model = replace(model, drive=replace(model.drive, load_mass=1.5 * model.drive.load_mass))
-    axes = script.compared(data("emps"), machine_file, model)
-    times, displaced = script.crossing_times(axes), list(script.displacements(axes))
-    assert max(item.error for item in displaced) > script.LARGEST_DISPLACEMENT
+    axes = emps_pulses.compared(data("emps"), machine_file, model)
+    times, displaced = emps_pulses.crossing_times(axes), list(emps_pulses.displacements(axes))
+    assert max(item.error for item in displaced) > emps_pulses.LARGEST_DISPLACEMENT
     assert wrong == "soft controller" or not all(item.is_met for item in times)
 
 
 @needs_data(*RECORDINGS)
 def test_an_onset_that_is_three_samples_late_does_not_meet_the_limits(
-    script: ModuleType, identified: tuple[MachineFile, AxisModel], axes: Any
+    identified: tuple[MachineFile, AxisModel], axes: Any
 ) -> None:
-    shifted = script.with_force(
-        script.read_as_logged(data("emps") / script.FREE, identified[0]),
+    shifted = emps_pulses.with_force(
+        read_as_logged(data("emps") / emps_pulses.FREE, identified[0]),
         axes.machine,
         identified[1],
         np.roll(axes.pulses, 3),
     )
     late = replace(axes, injected=axes.machine.referred_to_load(shifted))
-    assert not any(item.is_met for item in script.crossing_times(late))
+    assert not any(item.is_met for item in emps_pulses.crossing_times(late))
 
 
 @needs_data(*RECORDINGS)
 def test_recordings_of_different_references_are_not_compared(
-    script: ModuleType, identified: tuple[MachineFile, AxisModel], tmp_path: Path
+    identified: tuple[MachineFile, AxisModel], tmp_path: Path
 ) -> None:
     from scipy.io import loadmat, savemat
 
-    for name, shift in ((script.FREE, 0.0), (script.PULSES, 1e-4)):
+    for name, shift in ((emps_pulses.FREE, 0.0), (emps_pulses.PULSES, 1e-4)):
         values = {key: item for key, item in loadmat(data("emps") / name).items() if not key.startswith("__")}
         savemat(tmp_path / name, {**values, "qg": values["qg"] + shift})
-    with pytest.raises(SystemExit, match="different references"):
-        script.compared(tmp_path, *identified)
+    with pytest.raises(ValueError, match="different references"):
+        emps_pulses.compared(tmp_path, *identified)
 
 
 @needs_data(*RECORDINGS)

@@ -1,6 +1,6 @@
 """The simulated arm's latencies: order, misses, false alarms and what cannot be assessed, on a seed of its own.
 
-benchmarks/arm_accuracy.py compares five whole seeds with the reference; this is a smaller one for every test run.
+benchmarks/accuracy.py compares five whole seeds with the reference; this is a smaller one for every test run.
 """
 
 from __future__ import annotations

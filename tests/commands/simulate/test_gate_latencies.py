@@ -1,6 +1,6 @@
 """The thesis's tables 5.1 and 5.2 in form and order, on a seed that no parameter was chosen on.
 
-A small set (the full check with five seeds is benchmarks/gate_accuracy.py): the order of the detectors in each cell,
+A small set (the full check with five seeds is benchmarks/accuracy.py): the order of the detectors in each cell,
 means near the reference, nothing missed, hardly a false alarm.
 """
 

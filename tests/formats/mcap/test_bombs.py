@@ -19,7 +19,7 @@ from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeS
 from cdtool.formats.mcap import Mcap, chunks
 from cdtool.formats.mcap.records import MAGIC
 from tests.formats.mcap.small_files import read_or_refused
-from tests.noted_times import note
+from tests.time_bounds import check
 
 MEBIBYTE = 1 << 20
 _CHILD = """
@@ -42,7 +42,7 @@ found = run(sys.argv[2])
 print(json.dumps([found, time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - base]))
 """
 
-# The time allowed for a bomb [s]; checked by benchmarks/time_bounds.py.
+# The time allowed for a bomb [s].
 SECONDS = 5.0
 
 
@@ -110,7 +110,7 @@ def test_a_bomb_is_refused_in_less_than_300_megabytes(tmp_path, compression, sta
     )
     found, seconds, kilobytes = json.loads(done.stdout)
     assert "damaged at byte" in found[0]
-    note(seconds, SECONDS)
+    check(seconds, SECONDS)
     assert kilobytes < 300_000
 
 
@@ -124,7 +124,7 @@ def test_many_small_chunks_with_high_ratios_are_a_bomb(tmp_path):
     )
     found, seconds, kilobytes = json.loads(done.stdout)
     assert any("in all" in text for text in found)
-    note(seconds, SECONDS)
+    check(seconds, SECONDS)
     assert kilobytes < 300_000
 
 

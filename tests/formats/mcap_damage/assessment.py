@@ -11,7 +11,7 @@ from cdtool.base.errors import CdtoolError
 from tests.formats.mcap_damage.bombs import without_bomb
 from tests.formats.mcap_damage.readers import READERS, Key, Reading
 from tests.formats.mcap_damage.truth import Case, Message, Truth
-from tests.noted_times import noted
+from tests.time_bounds import bounded
 
 # Far more processor time [s] than any of these small files needs.
 LONGEST = 20.0
@@ -25,7 +25,7 @@ def faults(case: Case, path: Path) -> list[str]:
     problems = []
     for reader, key in READERS.items():
         try:
-            with noted(LONGEST):
+            with bounded(LONGEST):
                 reading = reader(path, topics)
         except Exception:  # any traceback is a fault
             trace = traceback.format_exc().strip().splitlines()

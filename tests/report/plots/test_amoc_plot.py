@@ -16,8 +16,7 @@ from cdtool.results.curves.sweep import MULTIPLES
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.results import Results, SweepResult
 from tests.report.bench import contacts_of
-from tests.report.hostile import HOSTILE
-from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
+from tests.report.plots.svg import joined, texts
 from tests.results.sweeps import CONTACTS, swept
 
 QUIET_FROM = 0.7
@@ -88,12 +87,6 @@ def test_detectors_with_different_exposure_have_a_range_of_bounds(tmp_path):
     assert "(at most 30.0 to 59.9 per hour)" in shown
 
 
-def test_in_the_zone_each_detector_has_its_own_column():
-    rows = [row for name in ("momentum", "direct") for row in swept(name, "stiff", lambda m: 60.0 * m, none)]
-    marks = small_marks(drawn(of(rows, ("momentum", "direct"))), False)
-    assert len(set(marks[:, 0])) == 2
-
-
 def test_the_factor_in_use_is_marked_on_each_curve_and_its_results_are_listed(tmp_path):
     evaluated = of(swept("momentum", "stiff", lambda m: 62.0 * m, alarms, lambda _: 1, not_assessable=2))
     (mark,) = in_use(drawn(evaluated))
@@ -140,16 +133,6 @@ def test_a_factor_in_use_whose_median_is_not_reached_is_drawn_at_the_top_and_exp
     assert "not reached" in texts(tmp_path / "a.svg") and "15 of 20" in texts(tmp_path / "a.svg")
 
 
-def test_a_curve_is_named_where_there_is_room_and_the_key_names_all(tmp_path):
-    far = swept("momentum", "stiff", lambda m: 600.0 * m, alarms) + swept("direct", "stiff", lambda m: 20.0 * m, alarms)
-    plot_amoc(of(far, ("momentum", "direct")), tmp_path / "far.svg")
-    assert [texts(tmp_path / "far.svg").count(name) for name in ("momentum", "direct")] == [2, 2]
-    names = tuple(f"detector_{i}" for i in range(12))
-    same = [row for name in names for row in swept(name, "stiff", lambda m: 60.0 * m, alarms)]
-    plot_amoc(of(same, names), tmp_path / "same.svg")
-    assert [texts(tmp_path / "same.svg").count(name) for name in names] == [1] * 12
-
-
 def test_a_detector_without_a_curve_is_in_the_key_with_its_contacts_not_assessable(tmp_path):
     contacts = [*contacts_of("momentum", "stiff", [30.0]), *contacts_of("direct", "stiff", ["blind"] * 3)]
     rows = tuple(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
@@ -157,12 +140,6 @@ def test_a_detector_without_a_curve_is_in_the_key_with_its_contacts_not_assessab
     plot_amoc(evaluated, tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert shown[shown.index("direct") + 1 :][:5] == ["–", "–", "–", "3", "–"]
-
-
-def test_panels_share_both_axes():
-    rows = [row for group in ("stiff", "soft") for row in swept("momentum", group, lambda m: 60.0 * m, alarms)]
-    first, second = drawn(of(rows, groups=("stiff", "soft"))).axes
-    assert first.get_xlim() == second.get_xlim() and first.get_ylim() == second.get_ylim()
 
 
 def test_rates_are_per_operation_where_the_budget_is(tmp_path):
@@ -184,27 +161,6 @@ def test_no_sweep_no_false_alarm_everything_missed_and_nothing_assessable_are_dr
     blind = swept("momentum", "stiff", lambda _: None, none, lambda _: CONTACTS, not_assessable=CONTACTS)
     figure = drawn(of([replace(row, missed=0) for row in blind]))
     assert in_use(figure) == [] and arrows(figure) == []
-
-
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_the_same_input_gives_the_same_bytes(tmp_path, suffix):
-    evaluated = of(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
-    for name in ("a", "b"):
-        plot_amoc(evaluated, tmp_path / f"{name}{suffix}")
-    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_hostile_names_are_drawn_as_plain_text(tmp_path, kind):
-    name = HOSTILE[kind]
-    plot_amoc(of(swept(name, name, lambda m: 60.0 * m, alarms), (name,), (name,)), tmp_path / "a.svg")
-    assert_harmless(tmp_path / "a.svg", kind)
-
-
-@pytest.mark.parametrize("name", ["n" * 300, "W" * 300, "i"])
-def test_nothing_is_clipped_whatever_the_names(name):
-    rows = swept(name, name, lambda m: None if m > 2.0 else 60.0 * m, alarms, lambda m: 12 if m > 2.0 else 0)
-    assert_within(drawn(of(rows, (name,), (name,))))
 
 
 def test_a_median_of_zero_is_drawn_at_the_lower_end_of_a_logarithmic_axis_and_explained(tmp_path):

@@ -125,11 +125,3 @@ def test_the_most_informative_trace_has_a_contact_and_most_detectors_that_could_
     assert most_informative([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
     assert most_informative([free, fewer]) is fewer
     assert most_informative([free]) is free
-
-
-def test_the_same_report_gives_the_same_bytes(evaluated: Evaluated, hit, tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        write_figures(Report(evaluated, (hit,)), tmp_path / name)
-    for path in (tmp_path / "a").iterdir():
-        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()

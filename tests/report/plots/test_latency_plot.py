@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from cdtool.report.plots import latency_plot
 from cdtool.report.plots.figures import drawing
@@ -14,8 +13,7 @@ from cdtool.report.plots.latency_plot import plot_latencies
 from cdtool.results.evaluated import evaluate
 from cdtool.results.results import Results
 from tests.report.bench import contact, contacts_of
-from tests.report.hostile import HOSTILE
-from tests.report.plots.svg import assert_harmless, assert_within, joined, texts
+from tests.report.plots.svg import joined, texts
 
 # The width of the lines that mark medians, and of no other.
 TICK = 2.0
@@ -120,13 +118,6 @@ def test_latencies_over_more_than_a_decade_get_a_logarithmic_axis(results):
     assert narrow.axes[0].get_xlim()[0] == 0.0
 
 
-def test_panels_share_their_axis_and_are_below_each_other(results):
-    first, second = drawn(results).axes
-    assert first.get_xlim() == second.get_xlim()
-    assert (first.get_position().x0, first.get_position().x1) == (second.get_position().x0, second.get_position().x1)
-    assert first.get_position().y0 > second.get_position().y1
-
-
 def test_a_latency_of_zero_is_drawn_on_a_logarithmic_axis_and_explained(results, tmp_path):
     more = replace(results, contacts=(*results.contacts, contact("momentum", "stiff", 0.0)))
     plot_latencies(evaluate(more), tmp_path / "a.svg")
@@ -159,19 +150,3 @@ def test_thousands_of_contacts_are_thinned_to_marks_that_span_them_and_this_is_s
     assert "(at most 400 are drawn)" in joined(tmp_path / "a.svg")
     plot_latencies(evaluate(of(results, [20.0, 30.0])), tmp_path / "b.svg")
     assert "are drawn)" not in joined(tmp_path / "b.svg")
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_hostile_names_are_drawn_as_plain_text(results, tmp_path, kind):
-    name = HOSTILE[kind]
-    renamed = tuple(replace(item, group=name, detector=name) for item in results.contacts)
-    exposure = (replace(results.exposure[-1], group=name + " ", detector=name),)
-    hostile = replace(results, groups=(name, name + " "), detectors=(name,), contacts=renamed, exposure=exposure)
-    plot_latencies(evaluate(hostile), tmp_path / "a.svg")
-    assert_harmless(tmp_path / "a.svg", kind)
-
-
-@pytest.mark.parametrize("name", ["n" * 300, "W" * 300, "i"])
-def test_nothing_is_clipped_whatever_the_names(results, name):
-    renamed = tuple(replace(item, detector=name, group=name) for item in results.contacts)
-    assert_within(drawn(replace(results, detectors=(name,), groups=(name, "holdout"), contacts=renamed)))

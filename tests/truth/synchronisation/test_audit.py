@@ -33,7 +33,7 @@ def test_offset_and_drift_of_a_load_cell_are_found_with_jitter_and_other_rates()
 
 
 def test_intervals_contain_the_offset_and_drifts_are_within_5_ppm():
-    """A reduced benchmarks/sync_coverage.py."""
+    """Reduced: benchmarks/sync_coverage.py of commit def748d0 has hundreds of sets."""
     hits = 0
     for seed in range(4):
         rng = np.random.default_rng(seed)

@@ -5,48 +5,37 @@ command every second; with the pulse taken out of the torque channel again, it i
 time, which the controller did not command. `cdtool identify` sees only the recording without pulses, DATA_EMPS.mat. Its
 model is simulated twice, without and with the force, and the difference is added to DATA_EMPS.mat. The momentum
 observer then runs on this recording and on the one with real pulses.
-
-python benchmarks/emps_pulses.py                    # the folder emps/ of $CDTOOL_DATA, by default of ../shared/data
-python benchmarks/emps_pulses.py --data FOLDER
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import os
-import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from timing import main, table
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
-
-import cdtool  # noqa: E402
-from cdtool.commands.inject.channel_change import ChannelChange  # noqa: E402
-from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
-from cdtool.detectors.momentum import Momentum  # noqa: E402
-from cdtool.formats.channels.channel_assembly import LoggedRecording  # noqa: E402
-from cdtool.formats.channels.reading import read_as_logged  # noqa: E402
-from cdtool.formats.machine_file import MachineFile, read_machine_file  # noqa: E402
-from cdtool.machines.axis import Axis  # noqa: E402
-from cdtool.machines.axis_model.axis_run import AxisRun, axis_run  # noqa: E402
-from cdtool.machines.axis_model.model_table import axis_model  # noqa: E402
-from cdtool.machines.axis_model.parameters import AxisModel  # noqa: E402
-from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis  # noqa: E402
-from cdtool.recordings.recording import Recording  # noqa: E402
+import cdtool
+from cdtool.commands.inject.channel_change import ChannelChange
+from cdtool.commands.inject.injected_logs import injected_recording
+from cdtool.detectors.momentum import Momentum
+from cdtool.formats.channels.channel_assembly import LoggedRecording
+from cdtool.formats.channels.reading import read_as_logged
+from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.machines.axis import Axis
+from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
+from cdtool.machines.axis_model.model_table import axis_model
+from cdtool.machines.axis_model.parameters import AxisModel
+from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
+from cdtool.recordings.recording import Recording
+from tests.project.pages import DOCS
 
 Array = npt.NDArray[np.float64]
 
-DATA = Path(os.environ.get("CDTOOL_DATA", ROOT.parent / "shared" / "data")) / "emps"
-MACHINE = ROOT / "docs" / "examples" / "emps.toml"
+MACHINE = DOCS / "examples" / "emps.toml"
 FREE, PULSES, PULSE_COLUMN = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat", "pulses_N"
 THRESHOLDS = (15.0, 40.0, 80.0, 120.0, 160.0)  # N
 BANDWIDTH = 100.0  # rad/s: the observer's residual reaches each of the thresholds
@@ -142,7 +131,7 @@ def compared(folder: Path, machine_file: MachineFile, model: AxisModel) -> Axes:
     if len(references[0]) != len(references[1]) or not np.allclose(
         references[0].values, references[1].values, rtol=0.0, atol=_SAME_REFERENCE
     ):
-        sys.exit("error: the two recordings have different references")
+        raise ValueError("the two recordings have different references")
     pulses = read_pulses(folder / PULSES, hit.factors["torque"][0])
     torque = hit.recording["torque"]
     without = torque.with_values(torque.values - pulses[:, np.newaxis], torque.unit)
@@ -230,60 +219,3 @@ def displacements(axes: Axes) -> Iterator[Displacement]:
         yield Displacement(
             float(time[part.start]), float(np.max(courses[0])), peak, share, float(np.max(np.abs(error))) / peak
         )
-
-
-def show_times(times: Sequence[CrossingTimes]) -> None:
-    rows = []
-    for item in times:
-        difference = item.difference
-        rows.append(
-            (
-                f"{item.threshold:.0f} N",
-                f"{np.nanmean(item.recorded):.2f}",
-                f"{np.nanmean(item.injected):.2f}",
-                f"{np.nanmean(difference):+.2f}",
-                f"{np.nanmin(difference):+.2f} to {np.nanmax(difference):+.2f}",
-                f"{int(np.isnan(item.recorded).sum())} and {int(np.isnan(item.injected).sum())}",
-                "ok" if item.is_met else "WORSE",
-            )
-        )
-    table(("threshold", "recorded ms", "injected ms", "difference", "of each pulse", "not crossed", ""), rows)
-
-
-def measure(folder: Path) -> bool:
-    machine_file = identified(folder)
-    _, model = model_of(machine_file)
-    controller = model.controller
-    if controller is None:
-        print("WORSE no controller was identified")
-        return False
-    print(
-        f"identified: {model.drive.total_mass:.2f} kg, viscous {model.friction.viscous:.1f} N s/m, Coulomb "
-        f"{model.friction.coulomb_forward:.2f} and {model.friction.coulomb_backward:.2f} N, offset "
-        f"{model.friction.offset:.2f} N, gains {controller.position_gain:.2f} 1/s and {controller.speed_gain:.0f} N s/m"
-    )
-    axes = compared(folder, machine_file, model)
-    times, displaced = crossing_times(axes), list(displacements(axes))
-    forces = np.unique(axes.pulses[axes.pulses != 0.0])
-    print(f"{len(axes.sections)} pulses of {', '.join(f'{force:.1f}' for force in forces)} N, momentum observer with")
-    print(f"K = {BANDWIDTH:g} rad/s; every time within {LARGEST_TIME:g} ms\n")
-    show_times(times)
-    errors = [item.error for item in displaced]
-    good = max(errors) <= LARGEST_DISPLACEMENT
-    print(
-        f"\n{'ok   ' if good else 'WORSE'} largest displacement: recorded "
-        f"{1e6 * min(item.recorded for item in displaced):.0f} to {1e6 * max(item.recorded for item in displaced):.0f} "
-        f"micrometres, error {100 * min(errors):.1f} to {100 * max(errors):.1f} % (at most "
-        f"{100 * LARGEST_DISPLACEMENT:g} %)"
-    )
-    shares = [100 * item.root_mean_square for item in displaced]
-    print(f"      over the whole pulse: RMS {min(shares):.1f} to {max(shares):.1f} %")
-    for item in sorted(displaced, key=lambda item: -item.largest)[:2]:
-        print(f"      largest difference {100 * item.largest:.0f} % of the peak in the pulse at {item.start:.3f} s")
-    return good and all(item.is_met for item in times)
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=DATA)
-    main("injected and recorded force pulses", partial(measure, parser.parse_args().data))

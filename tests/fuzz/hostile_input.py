@@ -2,9 +2,9 @@
 
 Each attempt mutates one input file (its values or its bytes) or sets one option to a hostile value, and runs it.
 Attempts run in a monitored process: a crash, or more than --seconds, is counted too. Exits with status 1 if there is
-any. tests/fuzz/test_hostile_commands.py contains a short run.
+any. test_hostile_commands.py contains a short run.
 
-python benchmarks/hostile_input.py --attempts 3000 --seed 1
+python -m tests.fuzz.hostile_input --attempts 3000 --seed 1
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ import time
 from collections import Counter
 from multiprocessing.connection import Connection
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.fuzz.hostile_commands import attempts, complaint, make_bench, run
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,12 +56,6 @@ def filled(recording: Recording, fault: Fault) -> tuple[Recording, ...]:
         )
         for held in (False, True)
     )
-
-
-def without(recording: Recording, prefix: str) -> Recording:
-    """Return the recording without the channels whose names begin with `prefix`."""
-    kept: Mapping[str, Series] = {n: s for n, s in recording.channels.items() if not n.startswith(prefix)}
-    return replace(recording, channels=kept)
 
 
 def _hit(channel: str, fault: Fault) -> bool:

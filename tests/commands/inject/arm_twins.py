@@ -1,55 +1,38 @@
-"""Injected against true latencies on the simulated arm, trial 1 and 2: the same runs with the same noise, hit and not.
+"""Injected and true contacts of the simulated arm: the same runs with the same noise, hit and not hit.
 
 Every free run has a true twin: the same seed, simulated with the obstacle. The contact is injected into the free run
 with the simulator's own parameters, and both are judged by the same detectors with the same signatures. Gains,
 signature, watched joint and debounce are those of the files that `cdtool simulate arm` writes; latencies count from
 the exact contact. The simulator's friction differs by 5 % from run to run, which the model does not know.
-
-Required are the detectors of those files; the others are shown. A detector that misses a part of the true contacts is
-near its limit: there a single contact may be missed in one run and not in its twin, so that misses are only counted.
-
-python benchmarks/injection_arm.py                # 5 seeds, 8 pairs each: 3 min
-python benchmarks/injection_arm.py --seeds 1 --pairs 4
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
+import tempfile
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-from accuracy import written_setup
-from timing import main
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+from cdtool.alarms.pipeline import detect_operation
+from cdtool.base.errors import CdtoolError
+from cdtool.commands.inject.injected_logs import injected_recording
+from cdtool.commands.inject.robot_contact import RobotLog, robot_contact
+from cdtool.commands.learning.fitting import fit_operations
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run
+from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
+from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
+from cdtool.detectors.base import Detector
+from cdtool.machines.axis_model.axis_run import axis_run
+from cdtool.machines.planar_arm import PlanarArm
+from cdtool.recordings.operations import operations_of
+from cdtool.recordings.recording import Recording
+from cdtool.thresholds.base import FittedThreshold
+from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
 
-from cdtool.alarms.pipeline import detect_operation  # noqa: E402
-from cdtool.base.errors import CdtoolError  # noqa: E402
-from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
-from cdtool.commands.inject.robot_contact import RobotLog, robot_contact  # noqa: E402
-from cdtool.commands.learning.fitting import fit_operations  # noqa: E402
-from cdtool.commands.scoring.benchmark_file import BenchmarkFile  # noqa: E402
-from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run  # noqa: E402
-from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial  # noqa: E402
-from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm  # noqa: E402
-from cdtool.detectors import DETECTORS  # noqa: E402
-from cdtool.detectors.base import Detector  # noqa: E402
-from cdtool.machines.axis_model.axis_run import axis_run  # noqa: E402
-from cdtool.machines.planar_arm import PlanarArm  # noqa: E402
-from cdtool.recordings.operations import operations_of  # noqa: E402
-from cdtool.recordings.recording import Recording  # noqa: E402
-from cdtool.thresholds.base import FittedThreshold  # noqa: E402
-from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point  # noqa: E402
-
-SEEDS, PAIRS, LEARNED = 5, 8, 14
-FIRST_SEED = 7100
-TRIALS: tuple[Trial, ...] = (1, 2)
-KINDS: tuple[Impact, ...] = ("stiff", "soft")
+LEARNED = 14
 # Of the mean paired difference: share of the true latency, and [ms].
 SHARE, LEAST = 0.15, 4.0
 ARM = ArmParameters()
@@ -73,11 +56,6 @@ class Latencies:
         return float(np.mean(self.differences)) if len(self.differences) else math.nan
 
     @property
-    def standard_error(self) -> float:
-        known = self.differences
-        return float(np.std(known, ddof=1) / math.sqrt(len(known))) if len(known) > 1 else 0.0
-
-    @property
     def limit(self) -> float:
         detected = self.true[np.isfinite(self.true)]
         return max(SHARE * float(np.mean(detected)), LEAST) if len(detected) else math.nan
@@ -91,7 +69,9 @@ class Latencies:
 
 def setup_of(trial: Trial) -> BenchmarkFile:
     """Return machine and rules as `cdtool simulate arm` writes them."""
-    return written_setup(partial(simulate_arm, seed=0, trial=trial))
+    with tempfile.TemporaryDirectory() as folder:
+        simulate_arm(Path(folder), {"free": 2, "holdout": 1, "stiff": 1, "soft": 1}, seed=0, trial=trial)
+        return read_benchmark_file(Path(folder) / "benchmark.toml")
 
 
 def simulated(trial: Trial, seed: tuple[int, ...], impact: Impact) -> tuple[Recording, float | None]:
@@ -145,44 +125,3 @@ def _latency(
     verdict = detect_operation(operation, machine, detector, thresholds, setup.activation, setup.watched).verdict
     after = [alarm.time for alarm in verdict.alarms if alarm.time > start]
     return 1e3 * (after[0] - start) if after else math.nan
-
-
-def measure(seeds: int, pairs: int, names: tuple[str, ...]) -> bool:
-    met = True
-    for trial in TRIALS:
-        required = setup_of(trial).detectors
-        for kind in KINDS:
-            merged: dict[str, list[Latencies]] = {}
-            for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-                for name, item in compare(trial, seed, kind, pairs, names).items():
-                    merged.setdefault(name, []).append(item)
-            print(f"\ntrial {trial}, {kind}")
-            for name, items in merged.items():
-                both = Latencies(
-                    np.concatenate([item.injected for item in items]), np.concatenate([item.true for item in items])
-                )
-                is_required = name in required
-                show(name, both, is_required)
-                met &= both.agrees or not is_required
-    return met
-
-
-def show(name: str, both: Latencies, is_required: bool) -> None:
-    misses = [int(np.isnan(values).sum()) for values in (both.injected, both.true)]
-    words = ("ok   " if both.agrees else "WORSE") if is_required else ("     " if both.agrees else "other")
-    line = f"{words} {name:18s} misses {misses[0]:2d} and {misses[1]:2d} of {len(both.true)}"
-    if len(both.differences):
-        known = np.isfinite(both.injected) & np.isfinite(both.true)
-        line += f", injected {np.mean(both.injected[known]):6.1f} true {np.mean(both.true[known]):6.1f} ms"
-        line += f", difference {both.difference:+5.1f} +- {both.standard_error:.1f} of {both.limit:.1f}"
-    print(line, flush=True)
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("--pairs", type=int, default=PAIRS)
-    parser.add_argument("--detectors", default=",".join(DETECTORS.usable_names()))
-    chosen = parser.parse_args()
-    wanted = tuple(chosen.detectors.split(","))
-    main("injected and true latencies of the arm", lambda: measure(chosen.seeds, chosen.pairs, wanted))

@@ -1,0 +1,103 @@
+"""All figures: the same bytes each time, hostile names as plain text, nothing beyond the edge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.text import Text
+
+from cdtool.commands.detect import plot as detection_plot
+from cdtool.commands.detect.plot import plot_detected
+from cdtool.report.plots import amoc_plot, force_plot, latency_plot, survival_plot, trigger_plot
+from cdtool.report.plots.amoc_plot import plot_amoc
+from cdtool.report.plots.figures import SUFFIXES, drawing
+from cdtool.report.plots.force_plot import plot_forces
+from cdtool.report.plots.latency_plot import plot_latencies
+from cdtool.report.plots.survival_plot import plot_survival
+from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.results.evaluated import Evaluated, evaluate
+from cdtool.results.results import ExposureResult, Results
+from cdtool.results.traces.trace import ContactOutcome
+from tests.report.bench import contacts_of
+from tests.report.hostile import HOSTILE
+from tests.report.plots.force_panels import GAP, panel_of
+from tests.report.plots.svg import assert_harmless, assert_within
+from tests.results.sweeps import swept
+
+FIGURES = ("latency", "survival", "amoc", "forces", "detected", "triggers")
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure with one name at every place of one: written to a file, and as matplotlib has it."""
+
+    write: Callable[[Path], None]
+    figure: Callable[[], Any]
+
+    @classmethod
+    def of(cls, write: Callable[..., None], figure: Callable[..., Any], *content: Any) -> Drawing:
+        return cls(lambda path: write(*content, path), lambda: figure(*content))
+
+
+def evaluated(name: str) -> Evaluated:
+    """One detector and two groups, with contacts missed and not assessable, false alarms and a sweep."""
+    contacts = [row for group in (name, f"{name} ") for row in contacts_of(name, group, [20.0, 30.0, None, name])]
+    rows = swept(name, name, lambda m: 60.0 * m, lambda m: int(5 / m))
+    exposure = (ExposureResult(name, name, 4, 4, 0.1),)
+    return evaluate(Results({}, (name,), (name, f"{name} "), tuple(contacts), (), exposure, sweep=tuple(rows)))
+
+
+@pytest.fixture
+def drawing_of(bench, simulated) -> Callable[[str, str], Drawing]:
+    def make(kind: str, name: str) -> Drawing:
+        if kind == "forces":
+            steps = tuple(replace(step, name=f"{name}{i}") for i, step in enumerate(GAP.steps))
+            profile = replace(GAP, title=name, source=name, steps=steps)
+            return Drawing.of(plot_forces, force_plot._figure, [panel_of(name, profile)], profile)
+        if kind in ("detected", "triggers"):
+            recording = replace(simulated("stiff", 1), name=name, joints=(name,))
+            if kind == "detected":
+                return Drawing.of(plot_detected, detection_plot._figure, bench.detected(recording, "momentum"))
+            trace = bench.trace(recording, name, ("momentum", "pure_torque"))
+            blind = (ContactOutcome("not_assessable", float("nan"), float("nan"), name),)
+            panel = replace(trace.panels[0], detector=name, joint=name, unit=name, reason=name, seen=blind)
+            named = replace(trace, recording=name, joints=2, panels=(panel, *trace.panels[1:]))
+            return Drawing.of(plot_triggers, trigger_plot._figure, named)
+        plots = {
+            "latency": (plot_latencies, latency_plot._figure),
+            "survival": (plot_survival, survival_plot._figure),
+            "amoc": (plot_amoc, amoc_plot._figure),
+        }
+        return Drawing.of(*plots[kind], evaluated(name))
+
+    return make
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_the_same_input_gives_the_same_bytes(drawing_of, tmp_path, kind, suffix):
+    for name in ("a", "b"):
+        drawing_of(kind, "stiff").write(tmp_path / f"{name}{suffix}")
+    content = (tmp_path / f"a{suffix}").read_bytes()
+    assert content == (tmp_path / f"b{suffix}").read_bytes() and len(content) > 1000
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_names_are_drawn_as_plain_text(drawing_of, tmp_path, kind, name):
+    drawing_of(kind, HOSTILE[name]).write(tmp_path / "a.svg")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.svg"]
+    assert_harmless(tmp_path / "a.svg", name)
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+@pytest.mark.parametrize("name", ["momentum", "n" * 300])
+def test_nothing_is_clipped_and_no_text_is_read_as_mathematics(drawing_of, kind, name):
+    with drawing():
+        figure = drawing_of(kind, name).figure()
+        assert_within(figure)
+        assert not any(text.get_parse_math() for text in figure.findobj(Text))
