@@ -66,7 +66,7 @@ COMMANDS = {
     "docs/identification.md": 4,
 }
 EXAMPLES = {
-    "docs/python.md": 13,
+    "docs/python.md": 11,
     "docs/own-detector.md": 2,
     "docs/comparing.md": 1,
     "docs/impact.md": 8,
