@@ -67,7 +67,7 @@ COMMANDS = {
 }
 EXAMPLES = {
     "docs/python.md": 11,
-    "docs/own-detector.md": 2,
+    "docs/own-detector.md": 1,
     "docs/comparing.md": 1,
     "docs/impact.md": 7,
     "docs/transmission.md": 3,
