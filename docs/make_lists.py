@@ -1,7 +1,7 @@
 """Write the docs' lists of detectors and formats from the registry and the detectors' pages: python docs/make_lists.py
 
-docs/detectors/index.md is written as a whole; in README.md, docs/choosing.md and docs/containers.md the table between
-the two comments is. A detector's page gives its rows in its first lines: the heading is the title, the first paragraph
+docs/detectors/index.md is written as a whole; in README.md and docs/containers.md the table between the
+two comments is. A detector's page gives its rows in its first lines: the heading is the title, the first paragraph
 says what the detector looks at, the second one says "Good at: ... Weak at: ... Use it: ...". A format's row is made of
 its class: its suffixes and the first words of its docstring, and of the extra of its name in pyproject.toml.
 
@@ -39,10 +39,12 @@ _MODEL = "the machine file must give the inertia"
 _INDEX = """# The detectors
 
 Each page gives the equation, the signal and its unit, the gains with their defaults, and when the detector fails.
-[How to choose](../choosing.md) compares them. `cdtool list detectors` also lists those of installed plug-ins.
+"Model" means inertia and friction in the [machine file](../machine-file.md), and for an arm or a robot also the geometry; with coupled
+joints, a detector that uses a model also needs the position. [How to choose](../choosing.md) compares them. `cdtool list detectors` also
+lists those of installed plug-ins.
 
-| detector | short name | channels | what it looks at |
-|---|---|---|---|
+| detector | short | needs | what it looks at | use it |
+|---|---|---|---|---|
 """
 _README = "| detector | short | needs | good at | weak at |\n|---|---|---|---|---|\n"
 _CONTAINERS = "| format | what it reads | suffixes | `pip install` |\n|---|---|---|---|\n"
@@ -75,7 +77,6 @@ _SHORT = (
 _KEY_PAGES = ("benchmark-file", "machine-file", "force-limits")
 # The keys that every machine has stand once, in the table "machine".
 _ADDS_TO = dict.fromkeys(("axis", "rotary_axis", "planar_arm", "urdf_robot"), "machine")
-_CHOOSING = "| detector | short | needs | use it |\n|---|---|---|---|\n"
 
 
 @dataclass(frozen=True)
@@ -96,11 +97,10 @@ class Row:
 def files() -> Mapping[Path, str]:
     """Return the files with their contents as they should be."""
     rows = [_row(name) for name in DETECTORS.names()]
-    readme, choosing, containers = DOCS.parent / "README.md", DOCS / "choosing.md", DOCS / "containers.md"
+    readme, containers = DOCS.parent / "README.md", DOCS / "containers.md"
     return {
         DOCS / "detectors" / "index.md": _INDEX + "".join(map(_index_line, rows)),
         readme: _with_table(readme, _README, map(_readme_line, rows)),
-        choosing: _with_table(choosing, _CHOOSING, map(_choosing_line, rows)),
         containers: _with_table(containers, _CONTAINERS, map(_format_line, FORMATS.names())),
         **{
             page: _with_keys(page)
@@ -164,17 +164,13 @@ def _row(name: str) -> Row:
 
 
 def _index_line(row: Row) -> str:
-    return _line(f"[{row.title}]({row.page})", f"`{row.short_name}`", ", ".join(row.needs), row.looks_at)
+    needs = _words((*row.needs, *(["model"] if row.needs_model else [])))
+    return _line(f"[{row.title}]({row.page})", f"`{row.short_name}`", needs, row.looks_at, row.use_it)
 
 
 def _readme_line(row: Row) -> str:
     title = f"[{row.title}](docs/detectors/{row.page})"
     return _line(title, f"`{row.short_name}`", _words(row.needs), row.good_at, row.weak_at)
-
-
-def _choosing_line(row: Row) -> str:
-    needs = _words((*row.needs, *(["model"] if row.needs_model else [])))
-    return _line(f"[{row.title}](detectors/{row.page})", f"`{row.short_name}`", needs, row.use_it)
 
 
 def _format_line(name: str) -> str:

@@ -1,4 +1,4 @@
-"""The queries of docs/results-parquet.md run with DuckDB, on results of the sample logs and of a fleet of doors."""
+"""The queries of docs/many-recordings.md run with DuckDB, on results of the sample logs and of a fleet of doors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.synthetic.many_results import many_results
 duckdb = pytest.importorskip("duckdb", reason="duckdb is absent: the documented queries were not run")
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "results-parquet.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "many-recordings.md").read_text(encoding="utf-8")
 QUERIES = re.findall(r"```sql\n(.*?)```", PAGE, re.DOTALL)
 SLOWER, BY_GROUP, MISSED_BY_ALL, FALSE_ALARMS, STEPS = range(5)
 

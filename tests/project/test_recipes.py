@@ -97,7 +97,7 @@ def test_the_lists_of_the_docs_take_up_the_detector_and_the_format(folder, tmp_p
     script = docs_script("make_lists")
     monkeypatch.setattr(script, "DOCS", tmp_path / "docs")
     made = {path.name: text for path, text in script.files().items()}
-    assert all("[Net force](" in made[name] for name in ("README.md", "choosing.md", "index.md"))
+    assert all("[Net force](" in made[name] for name in ("README.md", "index.md"))
     assert "| `f64log` | F64 logs | `.f64` |" in made["containers.md"]
     (detector,) = [
         item for item in json.loads(cdtool("list", "detectors", "--json").out) if item["name"] == "net_force"

@@ -41,4 +41,4 @@ worst[["door", "recording", "detector", "latency_ms", "peak_force_n"]]
 
 # %% [markdown]
 # Of very many recordings, write `results.parquet`, and query the files without loading them: [Queries over
-# results](../results-parquet.md).
+# results](../many-recordings.md).
