@@ -1,15 +1,17 @@
-"""What a user waits for: reading a log, compared with the package that he would use instead.
+"""What a user waits for: reading a log, a benchmark of 200 recordings, a first start; against what else could be used.
 
-CPU time of whole reads, each reader in a process of its own that stays, interleaved in five rounds; and the peak memory
-of a process that reads a large table. The other package's numbers are those of cdtool, or the benchmark stops.
+CPU time and peak memory of whole reads, each reader in a process of its own that stays, interleaved in five
+rounds. `--before` names the Python of an environment with an earlier cdtool, for the rows that compare with it.
 
-python benchmarks/reading.py [--seconds 300] [--megabytes 648]    # 10 min; 1 GB in the temporary folder
+python benchmarks/reading.py [--before ../before/.venv/bin/python]    # 20 min; 2 GB in the temporary folder
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -17,28 +19,22 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from mcap_logs import write_log
+from mcap_logs import FLAT, JOINTS, write_log
 from timing import Spread, main, ratio, table, verdict
 
-from cdtool.formats.channels.reading import read_as_logged
-from cdtool.formats.machine_file import read_machine_file
+from cdtool.commands.simulate.gate_recordings import simulate_gate
 
 HERE = Path(__file__).resolve().parent
 SAMPLES = HERE.parent / "sample_logs" / "gate"
 ROUNDS = 5
-# Samples and sizes of the logs.
-SECONDS, SMALL_TABLE_MB, LARGE_TABLE_MB = 300.0, 50.0, 648.0
-# CPU time over that of the peer.
-AT_MOST = {"gate, 7 s, CSV": 1.6, "table, CSV": 1.3, "ROS 2, MCAP": 0.1}
-# Growth of the peak memory over the size of the columns.
-MEMORY_AT_MOST = 1.3
+COUNTS = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
 # A file is read again until so many bytes are read: the clock of a short read is too coarse.
 LEAST = 20_000_000
-# A process that reads the files whose paths it is sent; it answers with seconds of CPU, its peak memory [MiB] and sums.
+# A process that reads the files whose paths it is sent, and answers with seconds of CPU and its peak memory [KiB].
 SERVER = """
 import json, resource, sys, time, warnings
 warnings.simplefilter("ignore")
-import numpy as np
+sys.path.insert(0, sys.argv[1])
 from pathlib import Path
 {prepare}
 for line in sys.stdin:
@@ -46,52 +42,56 @@ for line in sys.stdin:
     times = max(1, {least} // path.stat().st_size)
     begin = time.process_time()
     for _ in range(times):
-        columns = {read}
+        result = {read}
     seconds = (time.process_time() - begin) / times
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    sums = sorted(float(np.sum(np.asarray(values), dtype=float)) for values in columns)
-    del columns
-    print(json.dumps([seconds, peak, sums]), flush=True)
+    del result
+    print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss]), flush=True)
 """
-CDTOOL = """
-from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
-from cdtool.formats.channels.reading import choose_format
-FIELDS = ("position[:]", "velocity[:]", "effort[:]")
-sources = [ChannelSource("speed", topic="/joint_states", field=field) for field in FIELDS]
-sources += [ChannelSource("force", topic=topic, field="data") for topic in ("/accelerometer", "/load_cell")]
-wanted = ChannelMap(TimeSource(clock="log"), tuple(sources), ("gate",), topics=True)
-def read(path):
-    columns = choose_format(path).columns(path, wanted if path.suffix == ".mcap" else None).columns
-    return [column.values for column in columns.values()]
-"""
-ROSBAGS = """
-from rosbags.highlevel import AnyReader
-def read(path):
-    joint, sensors = [], {"/accelerometer": [], "/load_cell": []}
-    with AnyReader([path]) as reader:
-        for connection, _, raw in reader.messages():
-            message = reader.deserialize(raw, connection.msgtype)
-            if connection.topic == "/joint_states":
-                joint.append((message.position[0], message.velocity[0], message.effort[0]))
-            else:
-                sensors[connection.topic].append(message.data)
-    return [*np.array(joint).T, *map(np.array, sensors.values())]
-"""
+# What each reader prepares, and what it returns of `path`: all columns of a table, the same fields of an MCAP log.
 READERS = {
-    "cdtool": (CDTOOL, "read(path)"),
-    "pandas": ("import pandas as pd", "pd.read_csv(path).to_numpy().T"),
-    "rosbags": (ROSBAGS, "read(path)"),
+    "cdtool": (
+        f"""
+try:
+    from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
+    from cdtool.formats.channels.reading import choose_format
+except ImportError:  # the earlier cdtool
+    from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+    from cdtool.ingest.reading import choose_format
+fields = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in {FLAT.wanted!r})
+wanted = ChannelMap(TimeSource(clock="log"), fields, {JOINTS!r}, topics=True)
+""",
+        "choose_format(path).columns(path, wanted if path.suffix == '.mcap' else None)",
+    ),
+    "pandas": ("import pandas as pd", "pd.read_csv(path)"),
+    "rosbags": ("from mcap_logs import FLAT, by_rosbags", "by_rosbags(path, FLAT)"),
+    "protobuf (upb)": ("from mcap_logs import FLAT, by_protobuf", "by_protobuf(path, FLAT)"),
+    "orjson": ("from mcap_logs import FLAT, by_orjson", "by_orjson(path, FLAT)"),
 }
 
 
-class Reader:
-    """A process that reads logs in one way."""
+BEFORE = "cdtool before"
+# A log, what cdtool is compared with, and at most how many times its CPU time cdtool may take.
+QUESTIONS = (
+    ("gate, 7 s, CSV", "pandas", 1.6),
+    ("table, 50 MB", "pandas", 1.3),
+    ("cdr, 7 s", BEFORE, 1.3),
+    ("cdr, 300 s", BEFORE, 3.5),
+    ("cdr, 300 s", "rosbags", 0.1),
+    ("protobuf, 300 s", "protobuf (upb)", 0.1),
+    ("json, 300 s", "orjson", 1 / 1.5),
+)
+LARGE = ("table, 648 MB", "cdr, 300 s")
+MEMORY_AT_MOST, BENCHMARK_AT_MOST, FIRST_START_AT_MOST = 1.3, 1.35, 0.65  # of those before
 
-    def __init__(self, way: str) -> None:
+
+class Reader:
+    """A process that reads logs in one way; `python` is the interpreter of its environment."""
+
+    def __init__(self, way: str, python: str = sys.executable) -> None:
         prepare, read = READERS[way]
         code = SERVER.format(prepare=prepare, read=read, least=LEAST)
         pipe = subprocess.PIPE
-        self.process = subprocess.Popen([sys.executable, "-c", code], stdin=pipe, stdout=pipe, text=True, cwd=HERE)
+        self.process = subprocess.Popen([python, "-c", code, str(HERE)], stdin=pipe, stdout=pipe, text=True, cwd=HERE)
 
     def __enter__(self) -> Reader:
         return self
@@ -99,80 +99,116 @@ class Reader:
     def __exit__(self, *_: object) -> None:
         self.process.communicate()
 
-    def read(self, path: Path) -> tuple[float, float, list[float]]:
-        """Return the CPU time [s], the largest memory of the process so far [MiB], and the sum of each column."""
+    def read(self, path: Path) -> tuple[float, float]:
+        """Return the CPU time [s], and the largest memory of the process so far [MiB]."""
         assert self.process.stdin is not None and self.process.stdout is not None
         print(path, file=self.process.stdin, flush=True)
         answer = self.process.stdout.readline()
         if not answer:
             sys.exit(f"error: the reader of {path} failed")
-        seconds, peak, sums = json.loads(answer)
-        return seconds, peak, sums
+        seconds, peak = json.loads(answer)
+        return seconds, peak / 1024.0
 
 
-def measure(seconds: float, megabytes: float) -> bool:
+def measure(before: str | None) -> bool:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        small, large, mcap = folder / "small.csv", folder / "large.csv", folder / "log.mcap"
-        write_table(small, SMALL_TABLE_MB)
-        rows = write_table(large, megabytes)
-        run = read_as_logged(SAMPLES / "free" / "01.mcap", read_machine_file(SAMPLES / "machine.toml")).recording
-        write_log(mcap, run, seconds, "zstd")
+        logs = write_logs(folder)
         held = [
-            _compared("gate, 7 s, CSV", SAMPLES / "stiff" / "03.csv", "pandas"),
-            _compared("table, CSV", small, "pandas"),
-            _compared("ROS 2, MCAP", mcap, "rosbags"),
+            _compared(log, logs[log], peer, at_most, before)
+            for log, peer, at_most in QUESTIONS
+            if before or peer != BEFORE
         ]
-        with Reader("cdtool") as reader:
-            _, before, _ = reader.read(SAMPLES / "stiff" / "03.csv")
-            _, peak, sums = reader.read(large)
-    of_columns = 8 * rows * len(sums) / 2**20
-    print(
-        f"table of {megabytes:g} MB: peak memory {peak:.0f} MiB, before {before:.0f}, its columns {of_columns:.0f} MiB"
-    )
-    more = Spread.of([(peak - before) / of_columns])
-    held.append(verdict("growth of the peak memory / columns", more, MEMORY_AT_MOST, at_most=True))
+        if before is None:
+            print("skip  what is compared with an earlier cdtool: name its Python by --before")
+            return all(held)
+        held += [_memory(log, logs[log], before) for log in LARGE]
+        simulate_gate(folder / "gate", COUNTS, seed=1, file_format="csv")
+        whole = ["benchmark", str(folder / "gate" / "benchmark.toml"), "--json"]
+        first = ["benchmark", str(SAMPLES / "benchmark.toml"), "--json"]
+        held.append(_commands("benchmark of 200 recordings", whole, before, BENCHMARK_AT_MOST))
+        held.append(_commands("first start, no kernel cached", first, before, FIRST_START_AT_MOST, is_first=True))
     return all(held)
 
 
-def write_table(path: Path, megabytes: float) -> int:
-    """Write a table of about that size: about 9 MB of rows, repeated; return its rows."""
-    rng, rows = np.random.default_rng(648), 200_000
-    columns = [np.arange(rows) * 0.5, *(rng.normal(0.0, scale, rows) for scale in (30.0, 2.0, 100.0, 5.0))]
+def write_logs(folder: Path) -> dict[str, Path]:
+    """Write the logs, and return their paths by name."""
+    logs = {"gate, 7 s, CSV": SAMPLES / "stiff" / "03.csv"}
+    for encoding, seconds in (("cdr", 7), ("cdr", 300), ("protobuf", 300), ("json", 300)):
+        path = logs[f"{encoding}, {seconds} s"] = folder / f"{encoding}_{seconds}.mcap"
+        write_log(path, seconds, encoding, "zstd")
+    for megabytes in (50, 648):
+        path = logs[f"table, {megabytes} MB"] = folder / f"{megabytes}.csv"
+        write_table(path, megabytes * 1_000_000)
+    return logs
+
+
+def write_table(path: Path, size: int) -> None:
+    """Write a table of about `size` bytes: about 9 MB of rows, repeated."""
+    rng = np.random.default_rng(648)
+    columns = [np.arange(200_000) * 0.5, *(rng.normal(0.0, scale, 200_000) for scale in (30.0, 2.0, 100.0, 5.0))]
     row = "%.3f,%.6f,%.6f,%.6f,%.4f\n"
-    body = (row * rows % tuple(np.column_stack(columns).ravel().tolist())).encode()
-    times = max(1, round(1e6 * megabytes / len(body)))
+    body = (row * 200_000 % tuple(np.column_stack(columns).ravel().tolist())).encode()
     with path.open("wb") as file:
         file.write(b"t,torque,speed,position,force\n")
-        for _ in range(times):
+        for _ in range(max(1, round(size / len(body)))):
             file.write(body)
-    return times * rows
 
 
-def _compared(log: str, path: Path, peer: str) -> bool:
-    with Reader("cdtool") as ours, Reader(peer) as theirs:
+def _compared(log: str, path: Path, peer: str, at_most: float, before: str | None) -> bool:
+    python = before if before and peer == BEFORE else sys.executable
+    with Reader("cdtool") as ours, Reader("cdtool" if peer == BEFORE else peer, python) as theirs:
         seconds: dict[str, list[float]] = {"cdtool": [], peer: []}
         for number in range(-1, ROUNDS):
-            sums = []
             for name, reader in ((("cdtool", ours), (peer, theirs)))[:: 1 if number % 2 else -1]:
-                took, _, of_columns = reader.read(path)
-                sums.append(of_columns)
+                took, _ = reader.read(path)
                 if number >= 0:
                     seconds[name].append(took)
-            ours_sums, peer_sums = sums
-            if len(ours_sums) != len(peer_sums) or not np.allclose(ours_sums, peer_sums, rtol=1e-12):
-                sys.exit(f"error: {log}: {peer} reads other numbers than cdtool")
-    held = verdict(
-        f"{log}: cdtool / {peer}, CPU time", ratio(seconds["cdtool"], seconds[peer]), AT_MOST[log], at_most=True
-    )
+    spread = ratio(seconds["cdtool"], seconds[peer])
+    held = verdict(f"{log}: cdtool / {peer}, CPU time", spread, at_most, at_most=True)
     table(("reader", "CPU s (low-high)"), [(name, Spread.of(each)) for name, each in seconds.items()])
     print(flush=True)
     return held
 
 
+def _memory(log: str, path: Path, before: str) -> bool:
+    """Peak memory of a process that reads one log once, over that before."""
+    peaks: dict[str, list[float]] = {sys.executable: [], before: []}
+    for _ in range(3):
+        for python, each in peaks.items():
+            with Reader("cdtool", python) as reader:
+                each.append(reader.read(path)[1])
+    shown = f"{log}: peak memory, {Spread.of(peaks[sys.executable])} MiB, over that before"
+    return verdict(shown, ratio(peaks[sys.executable], peaks[before]), MEMORY_AT_MOST, at_most=True)
+
+
+def _commands(name: str, arguments: list[str], before: str, at_most: float, is_first: bool = False) -> bool:
+    """CPU time of a whole command over that before; `is_first`: each time with a kernel cache that is empty."""
+    seconds: dict[str, list[float]] = {sys.executable: [], before: []}
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(-1, ROUNDS):
+            for place, (python, each) in enumerate(seconds.items()):
+                kernels = f"{folder}/{place}_{number if is_first else 0}"
+                # Modules are compiled before, as after an installation.
+                caches = {"NUMBA_CACHE_DIR": kernels, "PYTHONPYCACHEPREFIX": f"{folder}/{place}_bytecode"}
+                environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "", **caches}
+                took = _cpu_time([python, "-m", "cdtool", *arguments], environment)
+                if number >= 0:
+                    each.append(took)
+    shown = f"{name}: CPU time, {Spread.of(seconds[sys.executable])} s, over that before"
+    return verdict(shown, ratio(seconds[sys.executable], seconds[before]), at_most, at_most=True)
+
+
+def _cpu_time(command: list[str], environment: dict[str, str]) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False, cwd=HERE)
+    if done.returncode not in (0, 1):
+        sys.exit(f"error: {' '.join(command)}: status {done.returncode}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="of the MCAP log")
-    parser.add_argument("--megabytes", type=float, default=LARGE_TABLE_MB, help="of the large table")
-    given = parser.parse_args()
-    main("what a user waits for", partial(measure, given.seconds, given.megabytes))
+    parser.add_argument("--before", help="the Python of an environment with an earlier cdtool")
+    main("what a user waits for", partial(measure, parser.parse_args().before))
