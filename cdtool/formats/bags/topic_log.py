@@ -209,7 +209,8 @@ def survey(log: TopicLog) -> Pieces:
         jumps.add(block, log.origin)
         for stream, batch, *_ in block:
             topic = topics.setdefault(stream.topic, TopicSurvey(stream.topic))
-            yield from topic.pieces(stream, batch, log.origin)
+            if (piece := topic.piece(stream, batch, log.origin)) is not None:
+                yield piece
     findings = log.findings()
     columns: dict[str, Column] = {}
     for name in (name for name in log.topic_details if name in topics):

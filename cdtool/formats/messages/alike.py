@@ -19,13 +19,12 @@ import numpy.typing as npt
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.columns import as_float64
 from cdtool.formats.messages.batch import Batch
-from cdtool.formats.messages.decoded_batch import MOST_FIELDS, ByteArray, Decoder, IntArray, MessageGroup
+from cdtool.formats.messages.decoded_batch import MOST_FIELDS, ByteArray, Decoder, Found, IntArray, MessageGroup
 from cdtool.formats.messages.fields import Field, FieldMissingError
 from cdtool.formats.messages.layout import Layout
 
 # Layouts that others are compared with: writers have a few, such as one for each length of a varint.
 _MOST_LAYOUTS = 64
-Found = float | list[float] | FieldMissingError | None
 
 
 class DamagedMessageError(Exception):
@@ -109,6 +108,9 @@ class Example:
 
 def _consecutive(found: Sequence[float]) -> Iterator[tuple[int, int, int]]:
     """Yield column, first index and number of consecutive indices; NaN is left out."""
+    if isinstance(found, range):
+        yield 0, found.start, len(found)
+        return
     column = 0
     while column < len(found):
         end = column + 1

@@ -27,6 +27,10 @@ MOST_FIELDS = 4096
 _LATEST = 9_223_372_035  # s: the largest time stamp in ns that fits an int64
 
 
+# What the field language finds in a message: a number, an array, or why it finds none.
+Found = float | Sequence[float] | FieldMissingError | None
+
+
 class UndecodableError(Exception):
     """A channel has no decoder; the message is the reason."""
 
@@ -73,7 +77,7 @@ class MessageGroup(ABC):
     content: Any
 
     @abstractmethod
-    def find(self, field: Field, joints: Sequence[str]) -> float | list[float] | FieldMissingError | None:
+    def find(self, field: Field, joints: Sequence[str]) -> Found:
         """Return what the field language finds in the object."""
 
     @abstractmethod
@@ -101,10 +105,18 @@ class Decoder(ABC):
         return [group.content for group in sorted(self.groups(batch)[0], key=lambda group: int(group.rows[0]))]
 
     def decode(
-        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
+        self,
+        batch: Batch,
+        wanted: Sequence[Field],
+        joints: Sequence[str] = (),
+        stamps: bool = False,
+        longest: int | None = None,
     ) -> DecodedBatch:
-        """Decode the wanted fields of all messages; whole arrays with named elements are in the order of `joints`."""
-        return self._values(len(batch), *self.groups(batch), wanted, joints, stamps)
+        """Decode the wanted fields of all messages; whole arrays with named elements are in the order of `joints`.
+
+        Of arrays that are longer than `longest`, as the bytes of an image, only the width is returned.
+        """
+        return self._values(len(batch), *self.groups(batch), wanted, joints, stamps, longest)
 
     def _values(
         self,
@@ -114,10 +126,11 @@ class Decoder(ABC):
         wanted: Sequence[Field],
         joints: Sequence[str],
         stamps: bool,
+        longest: int | None,
     ) -> DecodedBatch:
         """Return the wanted fields of the n messages of these groups, and of those that are damaged for a reason."""
         fields = tuple(
-            absent_field(n, fault) if (fault := self.absent(each)) else field_values(n, groups, each, joints)
+            absent_field(n, fault) if (fault := self.absent(each)) else field_values(n, groups, each, joints, longest)
             for each in wanted
         )
         status = np.zeros(n, np.uint8)
@@ -131,8 +144,10 @@ def absent_field(n: int, fault: FieldMissingError) -> FieldValues:
     return FieldValues(np.full(n, math.nan), None, np.full(n, ABSENT, np.uint8), fault)
 
 
-def field_values(n: int, groups: Sequence[MessageGroup], field: Field, joints: Sequence[str]) -> FieldValues:
-    """Return one field of n messages."""
+def field_values(
+    n: int, groups: Sequence[MessageGroup], field: Field, joints: Sequence[str], longest: int | None = None
+) -> FieldValues:
+    """Return one field of n messages; of arrays longer than `longest` only the width."""
     state, count = np.zeros(n, np.uint8), np.full(n, -1)
     parts: list[tuple[IntArray, FloatArray]] = []
     singles: dict[int, list[tuple[IntArray, FloatArray]]] = {}  # messages that are alone in their group, by width
@@ -144,15 +159,17 @@ def field_values(n: int, groups: Sequence[MessageGroup], field: Field, joints: S
         elif found is None:
             state[group.rows] = OTHER_JOINTS
         else:
-            found = found if isinstance(found, list) else [] if field.whole else [found]
+            if isinstance(found, int | float):
+                found = [] if field.whole else [found]
+            count[group.rows] = len(found)
+            if longest is not None and len(found) > longest:
+                continue
             values = group.read(found)
             (parts if len(group.rows) > 1 else singles.setdefault(len(found), [])).append((group.rows, values))
     for same in singles.values():
         parts.append((np.concatenate([rows for rows, _ in same]), np.concatenate([values for _, values in same])))
-    for rows, values in parts:
-        count[rows] = values.shape[1]
     fault = faults[min(faults)] if faults else None
-    wide = np.flatnonzero(count > 0)
+    wide = np.flatnonzero((count > 0) if longest is None else (count > 0) & (count <= longest))
     table = _joined(n, int(count[wide[0]]) if len(wide) else 1, parts)
     return FieldValues(table, count, state, fault) if field.whole else FieldValues(table[:, 0], None, state, fault)
 

@@ -14,7 +14,7 @@ _STEP = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>[^\[\]]*)\])?")
 LONGEST_ARRAY = 16  # a survey lists only arrays up to this length
 STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # members of a header stamp: ROS 2, Gazebo, ROS 1
 
-Value = float | list[float] | None
+Value = float | Sequence[float] | None
 # In place of a nested message that is not there: all its numbers are NaN.
 NO_MESSAGE = object()
 
@@ -72,9 +72,10 @@ class Field:
             raise FieldMissingError(f"'{self.text}' is an array", [f"{self.text}[0]", f"{self.text}[:]"])
         return math.nan if value is NO_MESSAGE else _number(value, self.text)
 
-    def _in_order(self, array: Any, names: Sequence[str], joints: Sequence[str]) -> list[float]:
+    def _in_order(self, array: Any, names: Sequence[str], joints: Sequence[str]) -> Sequence[float]:
         """Return a whole array's numbers, in the order of the joints if its elements are named."""
-        numbers = [_number(item, self.text) for item in array]
+        # A range stands for the numbers of a message with its layout: those of an image are not listed.
+        numbers = array if isinstance(array, range) else [_number(item, self.text) for item in array]
         order = joint_order(len(numbers), names, joints)
         return numbers if order is None else [numbers[element] for element in order]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.messages.batch import Batch
-from cdtool.formats.messages.decoded_batch import MOST_FIELDS, DecodedBatch, Decoder, MessageGroup, UndecodableError
+from cdtool.formats.messages.decoded_batch import MOST_FIELDS, DecodedBatch, Decoder, Found, MessageGroup, UndecodableError
 from cdtool.formats.messages.fields import (
     STAMPS,
     Field,
@@ -53,20 +53,25 @@ class JsonDecoder(Decoder):
         return [_Single(rows[k : k + 1], message) for k, message in enumerate(messages.values())], reasons
 
     def decode(
-        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
+        self,
+        batch: Batch,
+        wanted: Sequence[Field],
+        joints: Sequence[str] = (),
+        stamps: bool = False,
+        longest: int | None = None,
     ) -> DecodedBatch:
         """Decode all messages as one group, if none needs the rules of the field language."""
         try:
             alike = _alike(batch, wanted, joints, stamps)
         except Exception:  # a message that cannot be read, or is not like the first: the field language says which
-            return super().decode(batch, wanted, joints, stamps)
-        return self._values(len(batch), [alike], {}, wanted, joints, stamps)
+            return super().decode(batch, wanted, joints, stamps, longest)
+        return self._values(len(batch), [alike], {}, wanted, joints, stamps, longest)
 
 
 class _Single(MessageGroup):
     """One message."""
 
-    def find(self, field: Field, joints: Sequence[str]) -> float | list[float] | FieldMissingError | None:
+    def find(self, field: Field, joints: Sequence[str]) -> Found:
         try:
             return field.of(self.content, joints)
         except FieldMissingError as fault:

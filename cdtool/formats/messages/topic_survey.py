@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -16,15 +15,10 @@ from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.messages.batch import Batch, Stream
 from cdtool.formats.messages.decoded_batch import ABSENT, DecodedBatch, Decoder, FieldValues
 from cdtool.formats.messages.decoders import Decoders
-from cdtool.formats.messages.fields import Field, parse_field
+from cdtool.formats.messages.fields import LONGEST_ARRAY, Field, parse_field
 from cdtool.formats.messages.stamp_order import StampOrders
 from cdtool.formats.messages.topic import count_values, sort_times
 from cdtool.recordings.distribution import Distribution
-
-_LONGEST_ARRAY = 16
-# Messages of a batch times bytes of the longest one. It bounds the memory: until its length is known, an image is an
-# array of numbers too, and each number takes 8 bytes.
-_LONGEST_BATCH = 1 << 23
 
 
 class TopicSurvey:
@@ -41,21 +35,13 @@ class TopicSurvey:
         self._rounded: Counter[str] = Counter()
         self._is_late = self._stamped = False
 
-    def pieces(self, stream: Stream, batch: Batch, origin: int) -> Iterator[Piece]:
-        """Yield the decoded messages of a batch, with times after `origin` [ns]."""
-        longest = int(batch.length.max()) if len(batch) else 1
-        some = max(1, _LONGEST_BATCH // max(1, longest))
-        for start in range(0, len(batch), some):
-            part = batch.rows(slice(start, start + some))
-            if (piece := self._piece(stream, part, origin)) is not None:
-                yield piece
-
-    def _piece(self, stream: Stream, batch: Batch, origin: int) -> Piece | None:
+    def piece(self, stream: Stream, batch: Batch, origin: int) -> Piece | None:
+        """Return the decoded messages of a batch, with times after `origin` [ns]; None without any."""
         fields = dict(self._fields)
 
         def read(decoder: Decoder) -> DecodedBatch:
             fields.update({name: parsed for name in decoder.fields(batch) if (parsed := _parsed(name)) is not None})
-            return decoder.decode(batch, list(fields.values()), stamps=True)
+            return decoder.decode(batch, list(fields.values()), stamps=True, longest=LONGEST_ARRAY)
 
         decoded = self.decoders.attempt(stream, batch, read)
         if decoded is None:
@@ -89,7 +75,7 @@ class TopicSurvey:
         values, present, widths = field_values.values[whole], field_values.state[whole] != ABSENT, self._widths[name]
         if field_values.count is not None:
             count = field_values.count[whole]
-            present &= (count >= 0) & (count <= _LONGEST_ARRAY)
+            present &= (count >= 0) & (count <= LONGEST_ARRAY)
             filled = count_values(count[present & (count > 0)])
             if filled:
                 self._shapes.setdefault(name, (next(iter(filled)),))

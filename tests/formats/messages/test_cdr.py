@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from io import BytesIO
 from types import SimpleNamespace
 
@@ -225,3 +226,19 @@ def test_files_of_other_writers_decode_as_with_the_package(name):
         ]
         compared += len(parts)
     assert compared or "wrong_rmw" in name or "services" in name
+
+
+def test_the_bytes_of_an_image_are_not_made_into_numbers_by_a_survey():
+    text = "float64 exposure\nuint8[] data"
+    sizes = [3, 200_000, 210_000, 5, 220_000, 230_000]
+    values = [{"exposure": float(size), "data": b"\1" * size} for size in sizes]
+    batch = batch_of([encode(text, value) for value in values])
+    decoder = decoder_of(text)
+    tracemalloc.start()
+    exposure, image = decoder.decode(batch, fields_of("exposure", "data[:]"), longest=16).fields
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert exposure.values.tolist() == sizes
+    assert image.count.tolist() == sizes and image.values.shape == (6, 3)
+    assert image.values[0].tolist() == [1.0, 1.0, 1.0] and np.isnan(image.values[1:]).all()
+    assert peak < 8 * len(batch.data)  # a list of the numbers alone takes more
