@@ -15,7 +15,14 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.messages.batch import Batch
-from cdtool.formats.messages.decoded_batch import MOST_FIELDS, DecodedBatch, Decoder, Found, MessageGroup, UndecodableError
+from cdtool.formats.messages.decoded_batch import (
+    MOST_FIELDS,
+    DecodedBatch,
+    Decoder,
+    Found,
+    MessageGroup,
+    UndecodableError,
+)
 from cdtool.formats.messages.fields import (
     STAMPS,
     Field,
