@@ -18,11 +18,11 @@ from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption,
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
     from cdtool.commands.identify.estimate import NotIdentifiable
     from cdtool.commands.identify.identifying import IdentifiedMachine
     from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
     from cdtool.commands.identify.joint import JointIdentification
+    from cdtool.commands.identify.presses import PressLogs
     from cdtool.execution.workers import Workers
 
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
@@ -66,10 +66,6 @@ def identify(
         str | None,
         typer.Option("--payload-centre", help="Its centre of mass in the link's frame [m]. Default: not known."),
     ] = None,
-    contacts: Annotated[
-        list[str] | None,
-        typer.Option("--contacts", help="Of an axis: logs of stiff hits on a load cell, for its drive; repeatable."),
-    ] = None,
     presses: Annotated[
         list[str] | None,
         typer.Option("--presses", help="Logs of slow press and release on a load cell, for the torque's scale."),
@@ -84,8 +80,8 @@ def identify(
 ) -> None:
     """Identify the model of an axis or robot from impact-free logs, with honest standard errors.
 
-    Of an axis: mass, drive, friction and controller; with --contacts its drive beyond the starts, with --presses the
-    scale of its torque. Of a robot: friction, inertias, torque constants.
+    Of an axis: mass, drive, friction and controller; with --presses the scale of its torque. Of a robot: friction,
+    inertias, torque constants.
     Every change of the machine file is shown; old values remain in its comments.
 
     Example: cdtool identify 'sample_logs/gate/free/*.csv' -m sample_logs/gate/machine.toml -o machine.toml
@@ -96,10 +92,10 @@ def identify(
     targets = output or []
     check_identification_files(targets, machine, force=force)
     loaded = _loaded_runs(loaded_logs, payload, payload_link, payload_centre)
-    struck = _contact_logs(contacts or (), presses or (), lever_arm)
-    if loaded is not None and struck is not None:
-        raise UsageError("--loaded-logs with --contacts or --presses", "these are for robots, those for axes")
-    _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
+    pressed = _press_logs(presses or (), lever_arm)
+    if loaded is not None and pressed is not None:
+        raise UsageError("--loaded-logs with --presses", "these are for robots, those for axes")
+    _identify_machine(logs, machine, targets, Workers(jobs), loaded or pressed, as_json=as_json, quiet=quiet)
 
 
 def _loaded_runs(
@@ -122,17 +118,17 @@ def _loaded_runs(
     return LoadedRuns(tuple(logs), mass, link or "", _centre(centre))
 
 
-def _contact_logs(contacts: Sequence[str], presses: Sequence[str], lever_arm: float | None) -> ContactLogs | None:
-    """Return the logs with a load cell; None without any. Raises UsageError for a lever arm that does not fit."""
-    from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
+def _press_logs(presses: Sequence[str], lever_arm: float | None) -> PressLogs | None:
+    """Return the logs with presses; None without any. Raises UsageError for a lever arm that does not fit."""
+    from cdtool.commands.identify.presses import PressLogs
 
     if lever_arm is not None and not 0.0 < lever_arm < math.inf:
         raise UsageError(f"--lever-arm is {lever_arm:g}", "give it in m, above 0")
-    if not contacts and not presses:
-        if lever_arm is not None:
-            raise UsageError("--lever-arm without --contacts or --presses", "give logs of contacts too")
-        return None
-    return ContactLogs(tuple(contacts), tuple(presses), lever_arm)
+    if presses:
+        return PressLogs(tuple(presses), lever_arm)
+    if lever_arm is not None:
+        raise UsageError("--lever-arm without --presses", "give logs of presses too")
+    return None
 
 
 def _centre(text: str | None) -> tuple[float, float, float] | None:
@@ -153,7 +149,7 @@ def _identify_machine(
     machine: Path,
     targets: Sequence[Path],
     workers: Workers,
-    other_logs: LoadedRuns | ContactLogs | None,
+    other_logs: LoadedRuns | PressLogs | None,
     *,
     as_json: bool,
     quiet: bool,

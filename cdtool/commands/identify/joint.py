@@ -12,7 +12,6 @@ from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerFit
 from cdtool.commands.identify.axis.torque_constant import TorqueScale
 from cdtool.commands.identify.axis.two_mass import TwoMassFit
-from cdtool.commands.identify.contact.contact_fit import ContactFit
 from cdtool.commands.identify.estimate import Estimate, Method, Missing, NotIdentifiable
 from cdtool.commands.identify.robot.friction_choice import JointFriction
 from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence
@@ -28,8 +27,8 @@ class JointIdentification:
     """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
 
     `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`
-    and `evidence`: of a joint of a robot or planar arm, which has none of the others. `contacts`: what contacts with a
-    load cell add. `torque_scale`: the factor by which all torques were multiplied before; None without presses.
+    and `evidence`: of a joint of a robot or planar arm, which has none of the others. `torque_scale`: the factor by
+    which all torques were multiplied before; None without presses.
     """
 
     joint: str
@@ -41,19 +40,17 @@ class JointIdentification:
     refused: Mapping[str, str] = field(default_factory=dict)
     robot: JointFriction | None = None
     evidence: RobotJointEvidence | None = None
-    contacts: ContactFit | None = None
     torque_scale: TorqueScale | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Return the estimates that the machine file gets.
 
-        The load's mass is that of the contacts, else that of the elastic drive if there is one, else that of the rigid
-        axis. Friction is rather that of several speeds than that of the starts. Friction of the load that the contacts
-        show to act on the motor is among the values known only together.
+        The load's mass is that of the elastic drive if there is one, else that of the rigid axis. Friction is rather
+        that of several speeds than that of the starts.
         """
         found: dict[tuple[str, str], Estimate] = {}
-        for fit in (self.two_mass, self.rigid, self.controller, self.robot, self.contacts):
+        for fit in (self.two_mass, self.rigid, self.controller, self.robot):
             for estimate in fit.identified.estimates if fit else ():
                 if fit is not self.rigid or not (self.two_mass and estimate.key == "load_mass"):
                     found[estimate.section, estimate.key] = estimate
@@ -62,8 +59,6 @@ class JointIdentification:
         if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
             # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
             found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
-        for item in self.contacts.together if self.contacts else ():
-            found.pop((item.section, item.key), None)
         return tuple(map(self._with_scale_error, found.values()))
 
     def _with_scale_error(self, estimate: Estimate) -> Estimate:
@@ -76,15 +71,14 @@ class JointIdentification:
     @property
     def together(self) -> tuple[Estimate, ...]:
         """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
-        of_contacts = self.contacts.together if self.contacts else ()
-        known = {(item.section, item.key) for item in (*self.estimates, *of_contacts)}
+        known = {(item.section, item.key) for item in self.estimates}
         found: list[Estimate] = [*(self.robot.together if self.robot else ()), *self._friction_of_starts()]
         found += [*self._of_starts(), *self._of_controller()]
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
         known |= {(item.section, item.key) for item in self.not_identifiable if not self.robot}
-        return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
+        return tuple(item for item in found if (item.section, item.key) not in known)
 
     def _friction_of_starts(self) -> list[Estimate]:
         """Return Coulomb and viscous friction where only their sum is known: without both a model has neither."""
@@ -100,10 +94,9 @@ class JointIdentification:
         """Return what the starts show together with the identified values: how far they go."""
         if not self.two_mass:
             return []
-        found, identified, drive = [], self.two_mass.identified, self.contacts.drive if self.contacts else None
-        if drive or "stiffness" in identified:
-            wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
-            found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
+        found, identified = [], self.two_mass.identified
+        if "stiffness" in identified:
+            found.append(_exact("model.drive", "observed_wind_up", self.two_mass.largest_wind_up, self.units[2]))
         if "static" in identified:
             values, unit = vars(self.two_mass.model.friction), f"{self.units[2]}/s"
             found += [_exact("model.friction", key, values[key], unit) for key in ("stribeck_speed", "smoothing_speed")]
@@ -128,11 +121,9 @@ class JointIdentification:
     @property
     def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
         """Return the parameters that no method could identify."""
-        known = {(item.section, item.key) for item in self.estimates}
-        together = (*self._friction_of_starts(), *(self.contacts.together if self.contacts else ()))
-        known |= {(item.section, item.key) for item in together}
+        known = {(item.section, item.key) for item in (*self.estimates, *self._friction_of_starts())}
         found: dict[tuple[str, str], NotIdentifiable] = {}
-        for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
+        for fit in (self.rigid, self.two_mass, self.controller, self.robot):
             for item in fit.identified.not_identifiable if fit else ():
                 if (item.section, item.key) not in known:
                     found.setdefault((item.section, item.key), item)
@@ -208,7 +199,7 @@ def _of_rigid(fit: RigidAxisFit | None) -> dict[str, Any]:
 
 
 def _of_methods(joint: JointIdentification) -> dict[str, Any]:
-    two_mass, controller, contacts = joint.two_mass, joint.controller, joint.contacts
+    two_mass, controller = joint.two_mass, joint.controller
     return {
         "two_mass": two_mass
         and {
@@ -217,14 +208,6 @@ def _of_methods(joint: JointIdentification) -> dict[str, Any]:
             "largest_wind_up": two_mass.largest_wind_up,
         },
         "controller": controller and {"kind": controller.kind.value, "residual_rms": controller.residual_rms},
-        "contacts": contacts
-        and {
-            "condition_number": contacts.condition_number,
-            "relative_error": dict(contacts.relative_error),
-            "delays_of_load_cell": list(contacts.delays),
-            "largest_wind_up": contacts.wind_up,
-            "largest_drive_force": contacts.drive_force,
-        },
         "torque_scale": joint.torque_scale and asdict(joint.torque_scale),
     }
 

@@ -20,11 +20,12 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.commands.identify.contact.load_cell_contact import contact_force
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.recordings.recording import Contact, Recording
 
+# The load cell's axis is that of its force within this long of the onset [s].
+_BEGINNING = 0.2
 # Standard deviation of the low-pass of all channels [s].
 _SMOOTHING = 0.05
 # Force counts above this share of the peak; press and release must have this share of the peak in common.
@@ -104,7 +105,7 @@ def _press_and_release(
     recording: Recording, contact: Contact, total_mass: float, joint: int, lever_arm: float
 ) -> _PressAndRelease:
     run = axis_run(recording, joint)
-    cell_time, cell_force = contact_force(recording, contact, lever_arm)
+    cell_time, cell_force = _contact_force(recording, contact, lever_arm)
     inside = (run.time >= contact.start) & (run.time <= contact.end)
     if np.count_nonzero(inside) * run.period < 2.0 * _SHORTEST:
         raise RecordingError(f"{run.name}: the contact lasts {contact.end - contact.start:.2f} s", "press slowly")
@@ -127,6 +128,22 @@ def _press_and_release(
     # The force counts as positive; the torque that presses has the sign of its mean under load.
     direction = math.copysign(1.0, float(np.mean(torque[loaded])))
     return _PressAndRelease(direction * torque[used], force[used], sign[used], run.period)
+
+
+def _contact_force(recording: Recording, contact: Contact, lever_arm: float) -> tuple[FloatArray, FloatArray]:
+    """Return times [s] and force over the rest level before the contact, positive in the contact [N, N m]."""
+    if "force" not in recording:
+        raise RecordingError(f"{recording.name}: no load cell", "map its channel 'force' in [channels]")
+    series = recording["force"]
+    known = np.all(np.isfinite(series.values), axis=1)
+    time, values = series.time[known], series.values[known]
+    before = (time > contact.start - 0.5) & (time < contact.start - 0.02)
+    within = (time >= contact.start) & (time <= contact.start + _BEGINNING)
+    if np.count_nonzero(before) < 3 or np.count_nonzero(within) < 3:
+        raise RecordingError(f"{recording.name}: the load cell does not cover the contact", "use other contacts")
+    over = values - np.median(values[before], axis=0)
+    along = np.mean(over[within], axis=0)
+    return time, lever_arm * over @ (along / max(float(np.linalg.norm(along)), 1e-300))
 
 
 def _speed(run: AxisRun) -> FloatArray:
