@@ -188,15 +188,11 @@ def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Pa
 
 
 def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
-    from cdtool.commands.identify.words import words_of_plan
-
     if is_named:
         typer.echo(f"joint {plain(joint.joint)}")
     _show_quality(joint)
     for item in joint.not_identifiable:
         typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
-    for plan in joint.plan:
-        typer.echo(f"plan: {words_of_plan(plan, joint.units[2])}: for {', '.join(plan.keys)}")
     for method, reason in joint.refused.items():
         typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
 
@@ -219,7 +215,7 @@ def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Seque
 
 def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: bool) -> None:
     """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
-    from cdtool.commands.identify.words import words_of_decision, words_of_joint_plan, words_of_robot
+    from cdtool.commands.identify.words import words_of_decision, words_of_robot
 
     rows = []
     for joint, friction, floor in zip(done.joints, robot.joints, robot.repeated.floor.tolist(), strict=True):
@@ -234,8 +230,6 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
         name = plain(joint.joint)
         for item in joint.not_identifiable:
             typer.echo(f"{name}: not identifiable: {item.section}.{item.key}{_needed(item)}")
-        for plan in joint.plan:
-            typer.echo(f"{name}: plan: {words_of_joint_plan(plan, joint)}: for {', '.join(plan.keys)}")
         for reason in joint.refused.values():
             typer.echo(f"{name}: {plain(reason)}")
     for line in words_of_robot(robot, done.joints, len(done.runs)):

@@ -29,7 +29,7 @@ class Method(Enum):
 class Missing(Enum):
     """What the recordings would need so that a parameter could be identified."""
 
-    SECOND_SPEED = "runs at a second speed"
+    SECOND_SPEED = "runs at other speeds"
     REVERSALS = "runs in both directions"
     ACCELERATION = "runs with stronger acceleration"
     START_UP = "recordings that begin at rest and contain the start of the motion"
@@ -93,6 +93,14 @@ class NotIdentifiable:
     missing: tuple[Missing, ...]
     numbers: Mapping[str, float] = field(default_factory=dict)
     joint: int = 0
+
+    @property
+    def relative_error(self) -> float:
+        """Return the relative standard error of a parameter that is too uncertain; NaN where it is not known."""
+        if "relative_standard_error" in self.numbers:
+            return self.numbers["relative_standard_error"]
+        value = abs(self.numbers.get("value", 0.0))
+        return self.numbers.get("standard_error", math.nan) / value if value > 0.0 else math.nan
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -84,7 +84,6 @@ class IdentifiedMachine:
     @property
     def summary(self) -> dict[str, Any]:
         """Return everything but the samples as JSON values."""
-        plan = self.robot.plan if self.robot else None
         return {
             "tool": "cdtool identify",
             "machine": self.machine,
@@ -95,7 +94,6 @@ class IdentifiedMachine:
             "findings": [asdict(item) for item in self.findings],
             "written": self.written or None,
             "robot": self.robot.summary if self.robot else None,
-            "inertia_plan": plan and asdict(plan),
         }
 
 

@@ -28,11 +28,7 @@ from cdtool.commands.identify.robot.robot_dynamics import (
     joint_estimates,
 )
 from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence, joint_evidence
-from cdtool.commands.identify.robot.robot_excitation import (
-    PlannedRobotMotion,
-    measure_joint_motion,
-    plan_robot_motion,
-)
+from cdtool.commands.identify.robot.robot_excitation import measure_joint_motion
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
@@ -125,14 +121,6 @@ class RobotIdentification:
             )
             for name, is_slide, refused, friction, evidence in rows
         )
-
-    @property
-    def plan(self) -> PlannedRobotMotion | None:
-        """Return the motion that would show the inertias of all links; None if nothing is missing, or nothing moves."""
-        for refused in self.inertias.not_identifiable:
-            count = int(refused.numbers.get("base_parameters", 0.0))
-            return plan_robot_motion([item.motion for item in self.evidence], count)
-        return None
 
     @property
     def summary(self) -> dict[str, Any]:

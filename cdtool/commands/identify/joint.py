@@ -1,4 +1,4 @@
-"""What was identified of one joint by all methods, what is missing, and the motion that would add it."""
+"""What was identified of one joint by all methods, and what is missing."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion, plan_motions
+from cdtool.commands.identify.axis.excitation import Excitation
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerFit
 from cdtool.commands.identify.axis.torque_constant import TorqueScale
 from cdtool.commands.identify.axis.two_mass import TwoMassFit
-from cdtool.commands.identify.estimate import Estimate, Method, Missing, NotIdentifiable
+from cdtool.commands.identify.estimate import Estimate, Method, NotIdentifiable
 from cdtool.commands.identify.robot.friction_choice import JointFriction
 from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence
 from cdtool.machines.axis_model.model_table import finite_values
 
 _CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
-# A motor's inertia below this share of the total is not given [-].
-_NO_MASS = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,39 +135,14 @@ class JointIdentification:
         return self.rigid.excitation if self.rigid else None
 
     @property
-    def plan(self) -> tuple[PlannedMotion, ...]:
-        """Return the motions that would make the other parameters identifiable; empty if nothing is missing."""
-        rate = math.nan
-        if self.two_mass is not None:
-            rate = 1.0 / self.two_mass.starts[0].ensemble.period
-        elif self.controller is not None and self.controller.controller is not None:
-            rate = 1.0 / self.controller.controller.period
-        return plan_motions((*self.not_identifiable, *self._needs_of_the_drive()), self.excitation, rate)
-
-    def _needs_of_the_drive(self) -> tuple[NotIdentifiable, ...]:
-        """Return the motor's inertia if the stiffness of a drive was not identified because it is not given.
-
-        It is what the rigid axis has more than its load. Another refusal, as of a fit that ends at a bound, needs no
-        other motion: its own text says what to do.
-        """
-        if self.rigid is None or "two_mass" not in self.refused or "load_mass" not in self.rigid.identified:
-            return ()
-        motor = self.rigid.total_mass - self.rigid.identified["load_mass"].value
-        if motor > _NO_MASS * self.rigid.total_mass:
-            return ()
-        return (NotIdentifiable("model.drive", "stiffness", (Missing.MOTOR_INERTIA,)),)
-
-    @property
     def summary(self) -> dict[str, Any]:
         """Return everything but the samples as JSON values."""
         methods = (_of_rigid(self.rigid), _of_methods(self), _of_robot(self))
-        plan = [{**asdict(plan), "missing": plan.missing.name.lower()} for plan in self.plan]
         values = {
             "joint": self.joint,
             "estimates": [item.summary for item in self.estimates],
             "not_identifiable": [item.summary for item in self.not_identifiable],
             "refused": dict(self.refused),
-            "plan": plan,
         }
         return values | {key: value for method in methods for key, value in method.items()}
 

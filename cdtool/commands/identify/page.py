@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from functools import partial
 
 from cdtool.base.plain_text import counted
-from cdtool.commands.identify.axis.excitation import PlannedMotion
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.commands.identify.joint import JointIdentification
@@ -20,7 +19,6 @@ from cdtool.commands.identify.robot.sections import robot_sections
 from cdtool.commands.identify.words import (
     listed_numbers,
     short_number,
-    words_of_joint_plan,
     words_of_needs,
     words_of_reason,
 )
@@ -31,7 +29,7 @@ from cdtool.report.table import Cell, Heading, Table, number_cell, tabulate
 
 
 def identification_html(done: IdentifiedMachine) -> str:
-    """Return the page of one machine: changes, what is not identifiable, plan, errors and misfit."""
+    """Return the page of one machine: changes, what is not identifiable, errors and misfit."""
     missing = sum(len(joint.not_identifiable) for joint in done.joints)
     known = sum(len(joint.estimates) for joint in done.joints)
     together = sum(len(joint.together) for joint in done.joints)
@@ -58,14 +56,8 @@ _ORIGIN = (
 
 
 def _joint_sections(joint: JointIdentification, name: str) -> list[PageSection]:
-    plan = joint.plan
     return [
         PageSection(f"{name}Not identifiable", (_missing_table(joint),) if joint.not_identifiable else ()),
-        PageSection(
-            f"{name}Excitation plan",
-            (_plan_table(joint, plan),) if plan else (),
-            note="Speeds and accelerations are derived from the highest ones in these logs." if plan else "",
-        ),
         PageSection(f"{name}Excitation", (_excitation_table(joint),) if joint.rigid or joint.two_mass else ()),
         *(_axis_sections(joint, name) if joint.rigid or joint.two_mass or joint.controller else ()),
         PageSection(f"{name}Methods not used", (_refused_table(joint),) if joint.refused else ()),
@@ -105,14 +97,6 @@ def _missing_table(joint: JointIdentification) -> Table:
     return tabulate("missing", "Not identifiable from these logs", fields, joint.not_identifiable)
 
 
-def _plan_table(joint: JointIdentification, plan: Sequence[PlannedMotion]) -> Table:
-    fields = (
-        (Heading("add"), lambda item: Cell(words_of_joint_plan(item, joint))),
-        (Heading("makes identifiable"), lambda item: Cell(", ".join(item.keys))),
-    )
-    return tabulate("plan", "Motion that would make the other parameters identifiable", fields, plan)
-
-
 def _excitation_table(joint: JointIdentification) -> Table:
     travel, rows = joint.units[2], []
     if joint.rigid is not None:
@@ -125,9 +109,7 @@ def _excitation_table(joint: JointIdentification) -> Table:
             ("acceleration while moving, RMS", f"{number(found.acceleration)} {travel}/s²"),
             ("of which noise", f"{number(found.acceleration_noise)} {travel}/s²"),
             ("highest acceleration", f"{number(found.highest_acceleration)} {travel}/s²"),
-            ("travel", f"{number(found.travel)} {travel}"),
             ("moving time", f"{number(found.moving_time)} s"),
-            ("strokes, reversals", f"{found.strokes}, {found.reversals}"),
             ("condition number, rigid axis", number(joint.rigid.condition_number)),
         ]
     if joint.two_mass is not None:
