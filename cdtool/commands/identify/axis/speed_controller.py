@@ -2,7 +2,7 @@
 
 The controller is simulated with the logged references and speeds, and its force compared with the logged one (output
 error). The loop through the machine stays open in this: noise of the force sensor does not bias the gains. A structure
-with more (a limit, a delay, an offset of the error, another source of the error) is taken if it explains more by one
+with more (a limit, a delay, another source of the error) is taken if it explains more by one
 criterion, see `_is_better`.
 
 Where the command is not logged, the measured force is compared, through a first-order lag that is fitted too.
@@ -45,7 +45,6 @@ _DEFAULTS = {
     "force_limit": math.inf,
     "speed_filter_hz": math.inf,
     "speed_filter_order": 0.0,
-    "error_offset": 0.0,
     "lag": 0.0,
     "delay_samples": 0.0,
     "substeps": 1.0,
@@ -356,15 +355,13 @@ def _scale(sections: _Sections, model: _Model, name: str) -> float:
     if name == "integral_gain":
         return max(value, abs(model.values["speed_gain"]))
     defaults = {"position_gain": 10.0, "anti_windup_rate": 10.0, "lag": 10.0 * sections.period}
-    if name == "error_offset":
-        return max(1e-3 * float(np.ptp(sections.inputs[2])), 1e-9)
     return max(value, defaults.get(name, 1e-9))
 
 
 def _lowest(name: str, period: float) -> float:
     # At 0 neither a lag nor a corner has an effect that shows which way to go.
     bounds = {"lag": _LEAST_LAG * period, "speed_filter_hz": 1e-3 / period}
-    return -math.inf if name in (*_GAINS, "error_offset") else bounds.get(name, 0.0)
+    return -math.inf if name in _GAINS else bounds.get(name, 0.0)
 
 
 def _highest(name: str, period: float) -> float:
@@ -672,7 +669,7 @@ def _starting_model(sections: _Sections, source: _Source, order: int) -> _Model:
 
 
 def _improved(fit: _Fit, source: _Source, settings: ControllerSettings) -> _Fit:
-    """Return the fit with what explains most, one after another: another delay, limits, an offset of the error."""
+    """Return the fit with what explains most, one after another: another delay, limits."""
     while not fit.is_exact:
         trials = [_OutputError(fit.sections, model).fit(_TRIAL, 1e-4) for model in _more(fit, source, settings)]
         trials = [trial for trial in trials if not (source.is_command and _exceeds_its_limit(trial))]
@@ -700,8 +697,6 @@ def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[
         # In a measured torque, which lags, a delay shows from sample to sample only.
         if delay != present and (source.is_command or abs(delay - present) <= 1.0):
             yield model.with_values({**filtered, "delay_samples": float(delay)})
-    if "error_offset" not in model.free:  # as a bias of the logged speed has it
-        yield model.with_values({}, ("error_offset",))
 
 
 def _exceeds_its_limit(fit: _Fit) -> bool:
@@ -825,7 +820,7 @@ def _without_zeros(fit: _Fit, is_command: bool) -> tuple[_Fit, FloatArray]:
     if fit.model.values["lag"] < 1.01 * _LEAST_LAG * fit.sections.period and "lag" in fit.model.free:
         fit = _OutputError(fit.sections, fit.model.without("lag")).fit(_LAST, 1e-12)
     errors = _standard_errors(fit, is_command)
-    for name in ("error_offset", "position_gain", "integral_gain"):
+    for name in ("position_gain", "integral_gain"):
         free, value = fit.model.free, abs(fit.model.values[name])
         if name in free and not value > _SIGNIFICANT * errors[free.index(name)]:
             fit = _OutputError(fit.sections, fit.model.without(name)).fit(_LAST, 1e-12)
