@@ -237,14 +237,12 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
 
 
 def _show_changes(done: IdentifiedMachine) -> None:
-    rows = [("key", "old", "new", "standard error", "unit")]
+    rows = []
     for change in done.changes:
         old = "-" if change.old[0] is None else _numbers([item or 0.0 for item in change.old])
         errors = _numbers([float(f"{item:.2g}") for item in change.standard_errors])
         rows.append((f"{change.section}.{change.key}", old, _numbers(change.values), errors, change.unit))
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        typer.echo("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    table([(heading, "left") for heading in ("key", "old", "new", "standard error", "unit")], rows)
 
 
 def _numbers(values: Any) -> str:

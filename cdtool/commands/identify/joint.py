@@ -137,43 +137,25 @@ class JointIdentification:
     @property
     def summary(self) -> dict[str, Any]:
         """Return everything but the samples as JSON values."""
-        methods = (_of_rigid(self.rigid), _of_methods(self), _of_robot(self))
         values = {
             "joint": self.joint,
             "estimates": [item.summary for item in self.estimates],
             "not_identifiable": [item.summary for item in self.not_identifiable],
             "refused": dict(self.refused),
+            "torque_scale": self.torque_scale and asdict(self.torque_scale),
         }
-        return values | {key: value for method in methods for key, value in method.items()}
+        return {**values, **_of_axis(self), **_of_robot(self)}
 
 
 def _exact(section: str, key: str, value: float, unit: str) -> Estimate:
     return Estimate(section, key, value, math.nan, unit, Method.OUTPUT_ERROR)
 
 
-def _of_rigid(fit: RigidAxisFit | None) -> dict[str, Any]:
-    if fit is None:
-        return {"force_error_on_unseen_runs": None, "friction_at_speed": []}
-    validation = fit.cross_validation
-    unseen = validation and {
-        "error": validation.error,
-        "floor": validation.floor,
-        "repeats": validation.repeats,
-        "worst_run": validation.worst.run,
-        "error_of_worst_run": validation.worst.error,
-        "of_runs": validation.worst.of_runs,
-    }
-    return {
-        "force_error_on_unseen_runs": unseen,
-        "friction_at_speed": [asdict(level) for level in fit.levels],
-        "excitation": asdict(fit.excitation),
-        "condition_number": fit.condition_number,
-    }
-
-
-def _of_methods(joint: JointIdentification) -> dict[str, Any]:
-    two_mass, controller = joint.two_mass, joint.controller
-    return {
+def _of_axis(joint: JointIdentification) -> dict[str, Any]:
+    rigid, two_mass, controller = joint.rigid, joint.two_mass, joint.controller
+    values: dict[str, Any] = {
+        "force_error_on_unseen_runs": rigid and rigid.cross_validation and rigid.cross_validation.summary,
+        "friction_at_speed": [asdict(level) for level in rigid.levels] if rigid else [],
         "two_mass": two_mass
         and {
             "condition_number": two_mass.condition_number,
@@ -181,17 +163,18 @@ def _of_methods(joint: JointIdentification) -> dict[str, Any]:
             "largest_wind_up": two_mass.largest_wind_up,
         },
         "controller": controller and {"kind": controller.kind.value, "residual_rms": controller.residual_rms},
-        "torque_scale": joint.torque_scale and asdict(joint.torque_scale),
     }
+    if rigid:
+        values |= {"excitation": asdict(rigid.excitation), "condition_number": rigid.condition_number}
+    return values
 
 
 def _of_robot(joint: JointIdentification) -> dict[str, Any]:
     friction, evidence = joint.robot, joint.evidence
     if friction is None or evidence is None:
         return {}
-    motion = evidence.motion
     return {
         "friction_decision": friction.summary,
         "unseen_run": evidence.unseen and evidence.unseen.summary,
-        "motion": {**asdict(motion), "missing": [missing.name.lower() for missing in motion.missing]},
+        "motion": asdict(evidence.motion),
     }

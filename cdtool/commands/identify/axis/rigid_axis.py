@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,14 +47,12 @@ from cdtool.machines.axis_model.axis_run import AxisRun
 class RigidAxisSettings:
     """How a rigid axis is identified.
 
-    `low_pass_hz`: corner of the low-pass of every term. `method`: LEAST_SQUARES or INSTRUMENTAL_VARIABLES; None is the
-    latter if every run has a reference, or if the acceleration is noisy. Without references the instruments are the
-    measured signals, delayed. `units`: of inertia, force and travel. `torque_filter_time` [s]: of the low-pass through
-    which the torque was logged, 0 for none; None if it is not known: a lag that the runs show is then undone.
+    `low_pass_hz`: corner of the low-pass of every term. `units`: of inertia, force and travel. `torque_filter_time`
+    [s]: of the low-pass through which the torque was logged, 0 for none; None if it is not known: a lag that the runs
+    show is then undone.
     """
 
     low_pass_hz: float = 20.0
-    method: Method | None = None
     units: tuple[str, str, str] = ("kg", "N", "m")
     torque_filter_time: float | None = None
     #: Fewer equations identify nothing.
@@ -118,6 +118,12 @@ class CrossValidation:
     def left_over(self) -> float:
         """Return the error over the floor; NaN without a floor."""
         return self.error / self.floor if self.floor > 0.0 else math.nan
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return the errors as JSON values."""
+        worst = {"worst_run": self.worst.run, "error_of_worst_run": self.worst.error, "of_runs": self.worst.of_runs}
+        return {"error": self.error, "floor": self.floor, "repeats": self.repeats, **worst}
 
 
 @dataclass(frozen=True)
@@ -271,7 +277,6 @@ class _Equations:
     direction: FloatArray
     filtered: Sequence[FilteredRun]
     rows: Sequence[IntArray]
-    is_forced: bool
 
     @property
     def block(self) -> IntArray:
@@ -295,14 +300,14 @@ def _is_noisy(excitation: Excitation, settings: RigidAxisSettings) -> bool:
 def _instruments(
     filtered: Sequence[FilteredRun], excitation: Excitation, settings: RigidAxisSettings
 ) -> list[FloatArray] | None:
-    """Return the instruments of each run (n, 4): of the reference, or the delayed columns; None for least squares."""
+    """Return the instruments of each run (n, 4): of its reference, if every run has one, else none for least squares.
+
+    A noisy acceleration needs some: then they are the measured signals, delayed.
+    """
     given = [run.instruments for run in filtered if run.instruments is not None]
-    if settings.method is Method.LEAST_SQUARES:
-        return None
     if len(given) == len(filtered):
         return given
-    is_wanted = settings.method is Method.INSTRUMENTAL_VARIABLES or _is_noisy(excitation, settings)
-    return [_delayed(run) for run in filtered] if is_wanted else None
+    return [_delayed(run) for run in filtered] if _is_noisy(excitation, settings) else None
 
 
 def _delayed(run: FilteredRun) -> FloatArray:
@@ -341,7 +346,6 @@ def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings
         np.sign(gather([run.inner_speed for run in filtered])),
         filtered,
         rows,
-        settings.method is Method.INSTRUMENTAL_VARIABLES,
     )
 
 
@@ -432,11 +436,8 @@ def _solution(equations: _Equations, chosen: Sequence[int]) -> _AxisSolution:
     """Fit by instrumental variables; if the references do not move as the axis does, by least squares."""
     columns, fit = list(chosen), None
     if equations.instruments is not None:
-        try:
+        with suppress(IdentificationError):
             fit = fit_linear(equations.regressors[:, columns], equations.force, equations.instruments[:, columns])
-        except IdentificationError:
-            if equations.is_forced:
-                raise
     method = Method.LEAST_SQUARES if fit is None else Method.INSTRUMENTAL_VARIABLES
     fit = fit or fit_linear(equations.regressors[:, columns], equations.force)
     everything = np.ones(len(equations.force), dtype=np.bool_)

@@ -20,8 +20,9 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
+from cdtool.commands.identify.axis.start_ensemble import motor_speed
 from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
+from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.recordings.recording import Contact, Recording
 
 # The load cell's axis is that of its force within this long of the onset [s].
@@ -109,7 +110,7 @@ def _press_and_release(
     inside = (run.time >= contact.start) & (run.time <= contact.end)
     if np.count_nonzero(inside) * run.period < 2.0 * _SHORTEST:
         raise RecordingError(f"{run.name}: the contact lasts {contact.end - contact.start:.2f} s", "press slowly")
-    speed = _speed(run)
+    speed = motor_speed(run)
     if not np.all(np.isfinite(run.torque[inside]) & np.isfinite(speed[inside])):
         raise RecordingError(f"{run.name}: samples are missing in the contact", "use other contacts")
     force = _smooth(np.interp(run.time, cell_time, cell_force), run.period)
@@ -146,19 +147,11 @@ def _contact_force(recording: Recording, contact: Contact, lever_arm: float) -> 
     return time, lever_arm * over @ (along / max(float(np.linalg.norm(along)), 1e-300))
 
 
-def _speed(run: AxisRun) -> FloatArray:
-    if run.speed is not None:
-        return run.speed
-    assert run.position is not None
-    speed: FloatArray = np.gradient(run.position, run.period)
-    return speed
-
-
 def _smooth(values: FloatArray, period: float) -> FloatArray:
     """Return the values (n,) through a symmetrical Gaussian low-pass; the ends are repeated."""
-    reach = max(math.ceil(3.0 * _SMOOTHING / period), 1)
-    weights = np.exp(-0.5 * (period * np.arange(-reach, reach + 1, dtype=np.float64) / _SMOOTHING) ** 2)
-    return np.convolve(np.pad(values, reach, mode="edge"), weights / np.sum(weights), mode="valid")
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(values, _SMOOTHING / period, mode="nearest", truncate=3.0))
 
 
 def _directions(force: FloatArray, loaded: BoolArray, period: float) -> FloatArray:

@@ -10,7 +10,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.commands.identify.axis.excitation import Excitation, excitation_of
-from cdtool.commands.identify.estimate import Missing
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 
@@ -33,23 +32,9 @@ class JointMotion:
     highest: float
 
     @property
-    def range(self) -> float:
-        """Return the distance between the lowest and the highest position [rad, m]."""
-        return self.highest - self.lowest
-
-    @property
     def is_moving(self) -> bool:
         """Return whether the joint moves at all."""
         return self.excitation.moving_time > 0.0
-
-    @property
-    def missing(self) -> tuple[Missing, ...]:
-        """Return what the motion does not have for the joint's friction: speeds, directions; empty if it has all."""
-        if not self.is_moving:
-            return (Missing.OTHER_MOTION,)
-        missing = [] if len(self.excitation.speeds) > 1 else [Missing.SECOND_SPEED]
-        missing += [Missing.REVERSALS] if self.excitation.is_one_way else []
-        return tuple(missing)
 
 
 def measure_joint_motion(runs: Sequence[RobotRun], machine: CoupledMachine) -> tuple[JointMotion, ...]:

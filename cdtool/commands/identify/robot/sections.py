@@ -12,7 +12,6 @@ from cdtool.commands.identify.words import (
     listed_numbers,
     short_number,
     words_of_decision,
-    words_of_needs,
     words_of_robot,
 )
 from cdtool.report.html.page_tables import visible
@@ -103,12 +102,6 @@ def _motion_section(done: IdentifiedMachine) -> PageSection:
             lambda item: Cell(percent(item[1].excitation.forward_share) if item[1].is_moving else NOTHING),
         ),
         (Heading("moving time [s]", numeric=True), lambda item: number_cell(item[1].excitation.moving_time)),
-        (
-            Heading("missing for its friction"),
-            lambda item: Cell(
-                words_of_needs(item[1].missing) or "nothing", tone="unknown" if item[1].missing else "good"
-            ),
-        ),
     )
     table = tabulate("motion", "Logged motion of each joint", fields, moved)
     return PageSection("Excitation, joints", (table,))

@@ -29,10 +29,10 @@ def test_speeds_directions_and_range_are_those_of_the_motion() -> None:
     assert moved.excitation.speeds == pytest.approx((0.25, 0.5, 1.0), rel=0.02)
     assert moved.excitation.forward_share == pytest.approx(2.0 / 3.0, abs=0.02)
     assert moved.excitation.moving_time == pytest.approx(6.0, abs=0.3)
-    assert moved.range == pytest.approx(2.5, abs=0.02)
+    assert moved.highest == pytest.approx(2.5, abs=0.02)
     assert moved.lowest == pytest.approx(0.0, abs=1e-9)
     assert not still.is_moving
-    assert still.range == 0.0
+    assert still.lowest == still.highest == 0.4
 
 
 def test_noise_of_the_speed_at_rest_is_no_motion() -> None:
@@ -48,6 +48,6 @@ def test_samples_without_a_value_are_left_out_and_a_short_run_has_no_motion() ->
     moved, _ = measure_joint_motion([replace(run, speed=speed, position=position)], ARM)
     # 0.08 s are lost at each end and at each edge of the gap.
     assert moved.excitation.moving_time == pytest.approx(1.5 - 4 * 0.08, abs=0.05)
-    assert math.isfinite(moved.range)
+    assert math.isfinite(moved.lowest + moved.highest)
     short = replace(run, torque=run.torque[:5], position=run.position[:5], speed=run.speed[:5])
     assert not any(motion.is_moving for motion in measure_joint_motion([short], ARM))
