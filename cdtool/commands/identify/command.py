@@ -18,7 +18,6 @@ from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption,
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.identify.estimate import NotIdentifiable
     from cdtool.commands.identify.identifying import IdentifiedMachine
     from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
     from cdtool.commands.identify.joint import JointIdentification
@@ -191,10 +190,17 @@ def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
     if is_named:
         typer.echo(f"joint {plain(joint.joint)}")
     _show_quality(joint)
-    for item in joint.not_identifiable:
-        typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
+    _show_missing(joint, "")
     for method, reason in joint.refused.items():
         typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
+
+
+def _show_missing(joint: JointIdentification, name: str) -> None:
+    from cdtool.commands.identify.words import words_of_needs
+
+    for item in joint.not_identifiable:
+        needs = words_of_needs(item.missing)
+        typer.echo(f"{name}not identifiable: {item.section}.{item.key}{f': add {needs}' if needs else ''}")
 
 
 def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
@@ -218,7 +224,7 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
     from cdtool.commands.identify.words import words_of_decision, words_of_robot
 
     rows = []
-    for joint, friction, floor in zip(done.joints, robot.joints, robot.repeated.floor.tolist(), strict=True):
+    for joint, friction, floor in robot.rows:
         errors = [number(item) for item in (friction.torque, friction.before, friction.after, floor)]
         rows.append([joint.joint, joint.units[1], *errors, words_of_decision(friction)])
     headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
@@ -228,8 +234,7 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
         table(columns, rows)
     for joint in done.joints:
         name = plain(joint.joint)
-        for item in joint.not_identifiable:
-            typer.echo(f"{name}: not identifiable: {item.section}.{item.key}{_needed(item)}")
+        _show_missing(joint, f"{name}: ")
         for reason in joint.refused.values():
             typer.echo(f"{name}: {plain(reason)}")
     for line in words_of_robot(robot, done.joints, len(done.runs)):
@@ -259,8 +264,3 @@ def _show_quality(joint: JointIdentification) -> None:
         way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
         force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
         typer.echo(f"friction {way} at {speed}: {force}")
-
-
-def _needed(item: NotIdentifiable) -> str:
-    needs = ", ".join(missing.value for missing in item.missing)
-    return f": add {needs}" if needs else ""

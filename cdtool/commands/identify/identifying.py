@@ -166,7 +166,7 @@ def identify(
     robot = _identify_robot(machine_file, recordings, given, payload, reading)
     presses = read_presses(press_logs, machine_file) if press_logs else Presses()
     if robot is not None:
-        joints = robot.by_joint
+        joints = robot.joints
     else:
         count = len(machine_file.machine.joints)
         joints = tuple(_identify_joint(machine_file, joint, recordings, presses) for joint in range(count))

@@ -24,8 +24,8 @@ from cdtool.commands.identify.words import (
 )
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
-from cdtool.report.number_text import NOTHING, number, percent
-from cdtool.report.table import Cell, Heading, Table, number_cell, tabulate
+from cdtool.report.number_text import NOTHING, percent
+from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
 
 
 def identification_html(done: IdentifiedMachine) -> str:
@@ -36,7 +36,7 @@ def identification_html(done: IdentifiedMachine) -> str:
     sections = [PageSection("Changes", (_changes_table(done.changes),), note=_ORIGIN)]
     for joint in done.joints:
         sections += _joint_sections(joint, f"{joint.joint}: " if len(done.joints) > 1 else "")
-    sections[1:1] = robot_sections(done)
+    sections[1:1] = [*robot_sections(done), PageSection("Excitation", (_excitation_table(done.joints),))]
     sections += left_out_sections(done.skipped, done.findings)
     return SectionsPage(
         "Identification",
@@ -58,7 +58,6 @@ _ORIGIN = (
 def _joint_sections(joint: JointIdentification, name: str) -> list[PageSection]:
     return [
         PageSection(f"{name}Not identifiable", (_missing_table(joint),) if joint.not_identifiable else ()),
-        PageSection(f"{name}Excitation", (_excitation_table(joint),) if joint.rigid or joint.two_mass else ()),
         *(_axis_sections(joint, name) if joint.rigid or joint.two_mass or joint.controller else ()),
         PageSection(f"{name}Methods not used", (_refused_table(joint),) if joint.refused else ()),
     ]
@@ -97,28 +96,26 @@ def _missing_table(joint: JointIdentification) -> Table:
     return tabulate("missing", "Not identifiable from these logs", fields, joint.not_identifiable)
 
 
-def _excitation_table(joint: JointIdentification) -> Table:
-    travel, rows = joint.units[2], []
-    if joint.rigid is not None:
-        found = joint.rigid.excitation
-        speeds = f"{listed_numbers(found.speeds)} {travel}/s" if found.speeds else "none"
-        rows += [
-            ("speeds that are held", speeds),
-            ("highest speed", f"{number(found.highest_speed)} {travel}/s"),
-            ("moving time forward", percent(found.forward_share)),
-            ("acceleration while moving, RMS", f"{number(found.acceleration)} {travel}/s²"),
-            ("of which noise", f"{number(found.acceleration_noise)} {travel}/s²"),
-            ("highest acceleration", f"{number(found.highest_acceleration)} {travel}/s²"),
-            ("moving time", f"{number(found.moving_time)} s"),
-            ("condition number, rigid axis", number(joint.rigid.condition_number)),
-        ]
-    if joint.two_mass is not None:
-        rows += [
-            ("condition number, two masses", number(joint.two_mass.condition_number)),
-            ("largest wind-up of the drive", f"{number(joint.two_mass.largest_wind_up)} {travel}"),
-        ]
-    cells = [[Cell(name), Cell(value)] for name, value in rows]
-    return Table("excitation", "What the logged motion excites", (Heading("quantity"), Heading("value")), cells)
+def _excitation_table(joints: Sequence[JointIdentification]) -> Table:
+    def range_of(joint: JointIdentification) -> str:
+        if joint.evidence is None:
+            return NOTHING
+        return f"{short_number(joint.evidence.motion.lowest)} to {short_number(joint.evidence.motion.highest)}"
+
+    fields = (
+        (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
+        (Heading("unit"), lambda item: Cell(item[0].units[2])),
+        (Heading("range"), lambda item: Cell(range_of(item[0]))),
+        (Heading("speeds that are held [/s]"), lambda item: Cell(listed_numbers(item[1].speeds, 2) or NOTHING)),
+        (Heading("highest speed [/s]", numeric=True), lambda item: number_cell(item[1].highest_speed)),
+        (Heading("highest acceleration [/s²]", numeric=True), lambda item: number_cell(item[1].highest_acceleration)),
+        (Heading("acceleration, RMS [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration)),
+        (Heading("of which noise [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration_noise)),
+        (Heading("forward"), lambda item: Cell(percent(item[1].forward_share) if item[1].moving_time else NOTHING)),
+        (Heading("moving time [s]", numeric=True), lambda item: number_cell(item[1].moving_time)),
+    )
+    rows = [(joint, joint.excitation) for joint in joints if joint.excitation]
+    return tabulate("excitation", "What the logged motion excites", fields, rows)
 
 
 def _axis_sections(joint: JointIdentification, name: str) -> list[PageSection]:

@@ -37,7 +37,7 @@ def test_all_outputs_are_written_together(identified: IdentifiedMachine, tmp_pat
         "Not identifiable from these logs",
         "Prediction of unseen runs",
         "machine.viscous_friction",
-        "condition number",
+        "What the logged motion excites",
     ):
         assert words in page
     assert "<script" not in page
@@ -108,7 +108,7 @@ def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_writ
     assert f"written: {tmp_path / 'arm.toml'} (machine file)" in done.out
     page = (tmp_path / "arm.html").read_text(encoding="utf-8")
     assert "Torque that is not explained" in page
-    assert "Logged motion of each joint" in page
+    assert "What the logged motion excites" in page
     assert page.count("data:image/png;base64,") == 2
     assert "forearm" in page
     assert (tmp_path / "arm.toml").exists()

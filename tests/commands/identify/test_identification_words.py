@@ -65,6 +65,6 @@ def test_a_decision_states_why_the_old_friction_stays(answer: FrictionAnswer, wo
     before = math.nan if answer is FrictionAnswer.NOT_MOVED else 4.0
     form = FrictionForm.FRICTION_ALONE if answer is FrictionAnswer.NEW else FrictionForm.PREVIOUS
     errors = {FrictionForm.FRICTION_ALONE: 3.0, FrictionForm.PREVIOUS: before}
-    friction = JointFriction(0, form, Identified(()), (), errors, 30.0)
+    friction = JointFriction(0, form, FrictionForm.FRICTION_ALONE, Identified(()), (), errors, 30.0)
     assert friction.answer is answer
     assert words_of_decision(friction) == words

@@ -479,8 +479,7 @@ def _answers(
 ) -> list[Estimate | NotIdentifiable]:
     answers = [
         _load_mass(solution, excitation, motor_mass, settings),
-        _viscous(solution, excitation, settings),
-        *_coulomb(solution, excitation, settings),
+        *_frictions(solution, excitation, settings),
     ]
     if lag.is_found:
         time, error = lag.lag.time, settings.lag_form * lag.lag.time
@@ -524,50 +523,39 @@ def _speed_numbers(solution: _AxisSolution, excitation: Excitation) -> dict[str,
     return numbers
 
 
-def _viscous(
+def _frictions(
     solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
-) -> Estimate | NotIdentifiable:
-    numbers = _speed_numbers(solution, excitation)
-    if "viscous" not in solution.names:
-        return NotIdentifiable("machine", "viscous_friction", (Missing.SECOND_SPEED,), numbers)
-    value, error = solution.value(viscous=1.0)
-    _, force, travel = settings.units
-    if _is_certain(value, error, settings.largest_viscous_error):
-        return Estimate("machine", "viscous_friction", value, error, f"{force} s/{travel}", solution.method)
-    numbers |= {"value": value, "standard_error": error}
-    return NotIdentifiable("machine", "viscous_friction", (Missing.MORE_RECORDINGS,), numbers)
+) -> list[Estimate | NotIdentifiable]:
+    numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
+    speeds = () if "viscous" in solution.names else (Missing.SECOND_SPEED,)
+    reversals = (Missing.REVERSALS,) if excitation.is_one_way else ()
+    force, unit = settings.units[1], f"{settings.units[1]} s/{settings.units[2]}"
+    answers: list[Estimate | NotIdentifiable] = []
+    for section, key, shares in _FRICTIONS:
+        value, error = solution.value(**shares)
+        if key == "viscous_friction":
+            missing, most, is_possible = speeds, settings.largest_viscous_error, value > 0.0
+        elif key == "constant_force":
+            missing, most, is_possible = reversals, math.inf, math.isfinite(error)
+        else:
+            missing, most, is_possible = (*speeds, *reversals), settings.largest_coulomb_error, value > 0.0
+        if not missing and is_possible and error <= most * abs(value):
+            answers.append(
+                Estimate(section, key, value, error, unit if key == "viscous_friction" else force, solution.method)
+            )
+            continue
+        uncertain = {} if missing else {"value": value, "standard_error": error}
+        answers.append(NotIdentifiable(section, key, missing or (Missing.MORE_RECORDINGS,), numbers | uncertain))
+    return answers
 
 
-_COULOMB_KEYS = (
+_FRICTIONS = (
+    ("machine", "viscous_friction", {"viscous": 1.0}),
     ("machine", "coulomb_friction", {"coulomb": 1.0}),
     ("model.friction", "coulomb_forward", {"coulomb": 1.0, "constant": 1.0}),
     ("model.friction", "coulomb_backward", {"coulomb": 1.0, "constant": -1.0}),
+    ("machine", "constant_force", {"constant": 1.0}),
 )
-
-
-def _coulomb(
-    solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
-) -> list[Estimate | NotIdentifiable]:
-    missing = [Missing.SECOND_SPEED] if "viscous" not in solution.names else []
-    missing += [Missing.REVERSALS] if excitation.is_one_way else []
-    numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
-    force = settings.units[1]
-    answers: list[Estimate | NotIdentifiable] = []
-    for section, key, shares in _COULOMB_KEYS:
-        value, error = solution.value(**shares)
-        if not missing and _is_certain(value, error, settings.largest_coulomb_error):
-            answers.append(Estimate(section, key, value, error, force, solution.method))
-            continue
-        uncertain = {} if missing else {"value": value, "standard_error": error}
-        needed = tuple(missing) or (Missing.MORE_RECORDINGS,)
-        answers.append(NotIdentifiable(section, key, needed, numbers | uncertain))
-    value, error = solution.value(constant=1.0)
-    if excitation.is_one_way or not math.isfinite(error):
-        needed = (Missing.REVERSALS,) if excitation.is_one_way else (Missing.MORE_RECORDINGS,)
-        answers.append(NotIdentifiable("machine", "constant_force", needed, numbers))
-    else:
-        answers.append(Estimate("machine", "constant_force", value, error, force, solution.method))
-    return answers
 
 
 def _position_curves(equations: _Equations, residual: FloatArray) -> dict[int, FrictionCurve]:

@@ -12,7 +12,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve, friction_curve, speed_edges
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
-from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, Window, window_of_column
+from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, Window, rigid_torque, window_of_column
 from cdtool.commands.identify.robot.robot_excitation import JointMotion
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
@@ -157,9 +157,8 @@ class _Joint:
 
     def _rigid_torque(self, run: RobotRun, window: Window) -> FloatArray:
         """Return the torque (K,) of inertia and gravity of the joint: the machine's own, and what the fit changed."""
-        machine, regressor = self.fit.machine, regressor_of(self.fit.machine)
-        momentum, velocity_force, gravity = machine.momentum_terms(run.position, run.speed)
-        total = (window.rate(momentum) + window.average(gravity - velocity_force))[:, self.joint]
+        regressor = regressor_of(self.fit.machine)
+        total = rigid_torque(run, self.fit.machine, window)[:, self.joint]
         change = self.fit.parameters - regressor.values
         for column in np.flatnonzero(change).tolist():
             if regressor.columns[column].group in (ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA):

@@ -32,7 +32,7 @@ def panel(answer: FrictionAnswer, name: str = "elbow", floor: float = math.nan) 
     )
     curve = JointFrictionCurve(points, form, speed, 4.0 * np.sign(speed), 2.0 * np.sign(speed))
     used = form if answer is FrictionAnswer.NEW else FrictionForm.PREVIOUS
-    friction = JointFriction(0, used, Identified(()), (), {form: 1.0, FrictionForm.PREVIOUS: 3.0}, 10.0)
+    friction = JointFriction(0, used, form, Identified(()), (), {form: 1.0, FrictionForm.PREVIOUS: 3.0}, 10.0)
     motion = JointMotion(0, excitation_of(*np.zeros((4, 0))), 0.0, 0.0)
     evidence = RobotJointEvidence(motion, unseen, curve)
     units = ("kg m2", "N m", "rad", "N m s/rad")
