@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdtool.base.errors import UsageError
-from cdtool.base.plain_text import counted, digits
+from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
 from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption, QuietOption
@@ -242,17 +242,13 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
 
 
 def _show_changes(done: IdentifiedMachine) -> None:
+    from cdtool.commands.identify.machine_update import values_text
+
     rows = []
     for change in done.changes:
-        old = "-" if change.old[0] is None else _numbers([item or 0.0 for item in change.old])
-        errors = _numbers([float(f"{item:.2g}") for item in change.standard_errors])
-        rows.append((f"{change.section}.{change.key}", old, _numbers(change.values), errors, change.unit))
+        texts = (values_text(change.old), values_text(change.values), values_text(change.standard_errors, 2))
+        rows.append((f"{change.section}.{change.key}", *texts, change.unit))
     table([(heading, "left") for heading in ("key", "old", "new", "standard error", "unit")], rows)
-
-
-def _numbers(values: Any) -> str:
-    texts = [digits(float(f"{value:.6g}")) if math.isfinite(value) else "-" for value in values]
-    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
 def _show_quality(joint: JointIdentification) -> None:

@@ -121,8 +121,8 @@ def _free_name(target: Path) -> Path:
 
 
 def _comment(change: MachineChange, before: Any, origin: str) -> str:
-    errors = [digits(float(f"{item:.2g}")) if math.isfinite(item) else "-" for item in change.standard_errors]
-    spread = errors[0] if len(set(errors)) == 1 else f"[{', '.join(errors)}]"
+    errors = values_text(change.standard_errors, 2)
+    spread = f"[{errors}]" if "," in errors else errors
     parts = [f"+- {spread} {change.unit}" if spread != "-" else change.unit, change.method.value, origin]
     was = ""
     if before is not None:
@@ -176,6 +176,13 @@ def _as_in_file(machine: Machine, estimate: Estimate) -> tuple[str, str, tuple[f
     # Dry friction has no sign.
     ratios = [abs(ratio) if key == "coulomb_friction" else ratio for ratio in machine.transmission_ratio]
     return str(name), unit, tuple(ratio**power for ratio in ratios)
+
+
+def values_text(values: Sequence[float | None], significant: int = _DIGITS) -> str:
+    """Return the values of all joints, one if they are alike; a dash for one that is not known."""
+    known = [math.nan if value is None else value for value in values]
+    texts = [digits(float(f"{value:.{significant}g}")) if math.isfinite(value) else "-" for value in known]
+    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
 def described_runs(count: int, day: str) -> str:

@@ -5,7 +5,6 @@ Text from logs and files is escaped by the template. A content security policy a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -13,7 +12,7 @@ from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.commands.identify.joint import JointIdentification
-from cdtool.commands.identify.machine_update import MachineChange
+from cdtool.commands.identify.machine_update import MachineChange, values_text
 from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
 from cdtool.commands.identify.robot.sections import robot_sections
 from cdtool.commands.identify.words import (
@@ -66,25 +65,14 @@ def _joint_sections(joint: JointIdentification, name: str) -> list[PageSection]:
 def _changes_table(changes: Sequence[MachineChange]) -> Table:
     fields = (
         (Heading("key"), lambda item: Cell(f"{item.section}.{item.key}")),
-        (Heading("old", numeric=True), lambda item: Cell(_old(item))),
-        (Heading("new", numeric=True), lambda item: Cell(_values(item.values, 6))),
-        (Heading("standard error", numeric=True), lambda item: Cell(_values(item.standard_errors, 2))),
+        (Heading("old", numeric=True), lambda item: Cell(values_text(item.old))),
+        (Heading("new", numeric=True), lambda item: Cell(values_text(item.values))),
+        (Heading("standard error", numeric=True), lambda item: Cell(values_text(item.standard_errors, 2))),
         (Heading("unit"), lambda item: Cell(item.unit)),
         (Heading("origin"), lambda item: Cell(item.method.value)),
         (Heading("valid"), lambda item: Cell("alone" if item.is_known_alone else "only with its table")),
     )
     return tabulate("changes", "Values of the machine file", fields, changes)
-
-
-def _old(change: MachineChange) -> str:
-    if all(value is None for value in change.old):
-        return NOTHING
-    return _values(tuple(math.nan if value is None else value for value in change.old), 6)
-
-
-def _values(values: Sequence[float], significant: int) -> str:
-    texts = [short_number(value, significant) if math.isfinite(value) else NOTHING for value in values]
-    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
 def _missing_table(joint: JointIdentification) -> Table:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.commands.identify.axis.filtered_regression import known_sections
 from cdtool.commands.identify.axis.observed_slope import observed_slope
 from cdtool.commands.identify.axis.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.commands.identify.estimate import (
@@ -586,8 +587,7 @@ def _known_differences(known: BoolArray) -> BoolArray:
 def _cut(known: BoolArray, rows: Sequence[FloatArray], fewest: int) -> list[FloatArray]:
     """Return the uninterrupted known sections of the rows, each (rows, samples), that are long enough."""
     stacked = np.vstack(rows)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
-    return [stacked[:, a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= fewest]
+    return [stacked[:, a:b] for a, b in known_sections(known) if b - a >= fewest]
 
 
 def _values(run: AxisRun, channel: str, used: bool = True) -> FloatArray:
