@@ -9,7 +9,6 @@ machines drawn at random, each identified by `cdtool identify` from 14 strokes.
 
 python benchmarks/injection.py                # 5 seeds, with and without references, 8 pairs each: 8 min
 python benchmarks/injection.py --seeds 1 --pairs 4
-python benchmarks/injection.py --contacts 3   # only: identified, and three stiff contacts with a load cell added
 python benchmarks/injection.py --plain 10     # only: plain gates, six pairs per obstacle: 8 min
 """
 
@@ -35,8 +34,6 @@ from cdtool.alarms.activation import Activation  # noqa: E402
 from cdtool.alarms.pipeline import detect_operation, run_detector  # noqa: E402
 from cdtool.commands.identify.axis.speed_controller import identify_controller  # noqa: E402
 from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
-from cdtool.commands.identify.contact.contact_fit import ContactSettings, identify_contacts, with_contacts  # noqa: E402
-from cdtool.commands.identify.contact.load_cell_contact import load_cell_contact  # noqa: E402
 from cdtool.commands.identify.identifying import IdentifiedMachine  # noqa: E402
 from cdtool.commands.inject.assumption import ControllerReaction, assumptions_of  # noqa: E402
 from cdtool.commands.inject.axis_contact import axis_contact  # noqa: E402
@@ -56,8 +53,6 @@ from cdtool.recordings.operations import operations_of  # noqa: E402
 from cdtool.recordings.recording import Recording  # noqa: E402
 from cdtool.results.agreement import with_model_error  # noqa: E402
 from cdtool.thresholds.signature import Signature  # noqa: E402
-from cdtool.truth.onset import find_contacts  # noqa: E402
-from cdtool.truth.onset_rule import OnsetRule  # noqa: E402
 from tests.machines.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle  # noqa: E402
 from tests.synthetic import plain_gate  # noqa: E402
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, free_recording, without_references  # noqa: E402
@@ -66,7 +61,7 @@ SEEDS, PAIRS, LEARNED = 5, 8, 14
 FIRST_SEED = 7000
 KINDS: tuple[Impact, ...] = ("stiff", "soft")
 # Of the mean paired difference: share of the true latency, and [ms].
-LIMITS = {"true": (0.05, 2.0), "identified": (0.12, 4.0), "contacts": (0.10, 3.0)}
+LIMITS = {"true": (0.05, 2.0), "identified": (0.12, 4.0)}
 WITH_REFERENCES = ("desired_dynamics", "torque_deviation")
 LEFT_OUT = ("torque_deviation",)  # the gate's torque follows its reference closely, hit or not: it misses both
 PLAIN_DETECTORS = ("inertial_momentum", "friction_ekf", "momentum", "pure_torque")
@@ -140,8 +135,8 @@ def loaded(recording: Recording, references: bool) -> Recording:
     return ON_LOAD_SIDE.referred_to_load(recording if references else without_references(recording))
 
 
-def identified_model(seed: int, references: bool, contacts: int = 0) -> AxisModel:
-    """The gate's model from its impact-free runs and from real contacts, with what a data sheet states."""
+def identified_model(seed: int, references: bool) -> AxisModel:
+    """The gate's model from its impact-free runs, with what a data sheet states."""
     recordings = [free_recording(GATE, seed, number, references=references) for number in range(LEARNED)]
     runs = [axis_run(ON_LOAD_SIDE.referred_to_load(recording)) for recording in recordings]
     sensors = Sensors(
@@ -163,17 +158,7 @@ def identified_model(seed: int, references: bool, contacts: int = 0) -> AxisMode
     if of_controller is not None and controller is not None:
         slope = {item.key: item.numbers for item in of_controller.identified.not_identifiable}.get("slew_limit", {})
         controller = replace(controller, observed_slope=slope.get("largest_n_per_s", 0.0))
-    model = replace(model, drive=drive, controller=controller)
-    if not contacts:
-        return model
-    struck = []
-    for number in range(contacts):
-        hit = simulate_gate_run(GATE, np.random.default_rng([seed, 2000 + number]), "stiff")
-        recording = loaded(as_recording(hit, f"contact {number}", GATE), references)
-        struck.append(load_cell_contact(recording, find_contacts(recording, OnsetRule())[0], model))
-    stiffness_error = fit.identified["stiffness"].relative_error
-    settings = ContactSettings(largest_wind_up=fit.largest_wind_up, stiffness_error=stiffness_error)
-    return with_contacts(model, identify_contacts(struck, model, settings))
+    return replace(model, drive=drive, controller=controller)
 
 
 @dataclass(frozen=True)
@@ -341,17 +326,15 @@ def measure_plain(machines: int) -> bool:
     return len(outside) <= 0.05 * means
 
 
-def measure(seeds: int, pairs: int, contacts: int) -> bool:
+def measure(seeds: int, pairs: int) -> bool:
     met = True
     for parameters, (share, least) in LIMITS.items():
-        if (parameters == "contacts") != (contacts > 0):
-            continue
         for references in (True, False):
             for kind in KINDS:
                 merged: dict[str, list[Latencies]] = {}
                 for seed in range(FIRST_SEED, FIRST_SEED + seeds):
                     is_true = parameters == "true"
-                    model = gate_as_model(GATE) if is_true else identified_model(seed, references, contacts)
+                    model = gate_as_model(GATE) if is_true else identified_model(seed, references)
                     for name, item in compare_gate(seed, model, kind, references, pairs).items():
                         merged.setdefault(name, []).append(item)
                 print(f"\n{parameters} parameters, {'with' if references else 'without'} references, {kind}")
@@ -377,10 +360,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--pairs", type=int, default=PAIRS)
-    parser.add_argument("--contacts", type=int, default=0, help="real contacts with a load cell to identify from")
     parser.add_argument("--plain", type=int, default=0, help="machines of the other simulator")
     chosen = parser.parse_args()
     if chosen.plain:
         main("injected and true latencies of plain gates", lambda: measure_plain(chosen.plain))
     else:
-        main("injected and true latencies", lambda: measure(chosen.seeds, chosen.pairs, chosen.contacts))
+        main("injected and true latencies", lambda: measure(chosen.seeds, chosen.pairs))

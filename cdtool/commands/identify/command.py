@@ -6,23 +6,22 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdtool.base.errors import UsageError
-from cdtool.base.plain_text import counted, digits
+from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
 from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
-    from cdtool.commands.identify.estimate import NotIdentifiable
     from cdtool.commands.identify.identifying import IdentifiedMachine
     from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
     from cdtool.commands.identify.joint import JointIdentification
+    from cdtool.commands.identify.presses import PressLogs
     from cdtool.execution.workers import Workers
 
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
@@ -66,10 +65,6 @@ def identify(
         str | None,
         typer.Option("--payload-centre", help="Its centre of mass in the link's frame [m]. Default: not known."),
     ] = None,
-    contacts: Annotated[
-        list[str] | None,
-        typer.Option("--contacts", help="Of an axis: logs of stiff hits on a load cell, for its drive; repeatable."),
-    ] = None,
     presses: Annotated[
         list[str] | None,
         typer.Option("--presses", help="Logs of slow press and release on a load cell, for the torque's scale."),
@@ -84,8 +79,8 @@ def identify(
 ) -> None:
     """Identify the model of an axis or robot from impact-free logs, with honest standard errors.
 
-    Of an axis: mass, drive, friction and controller; with --contacts its drive beyond the starts, with --presses the
-    scale of its torque. Of a robot: friction, inertias, torque constants.
+    Of an axis: mass, drive, friction and controller; with --presses the scale of its torque. Of a robot: friction,
+    inertias, torque constants.
     Every change of the machine file is shown; old values remain in its comments.
 
     Example: cdtool identify 'sample_logs/gate/free/*.csv' -m sample_logs/gate/machine.toml -o machine.toml
@@ -96,10 +91,10 @@ def identify(
     targets = output or []
     check_identification_files(targets, machine, force=force)
     loaded = _loaded_runs(loaded_logs, payload, payload_link, payload_centre)
-    struck = _contact_logs(contacts or (), presses or (), lever_arm)
-    if loaded is not None and struck is not None:
-        raise UsageError("--loaded-logs with --contacts or --presses", "these are for robots, those for axes")
-    _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
+    pressed = _press_logs(presses or (), lever_arm)
+    if loaded is not None and pressed is not None:
+        raise UsageError("--loaded-logs with --presses", "these are for robots, those for axes")
+    _identify_machine(logs, machine, targets, Workers(jobs), loaded or pressed, as_json=as_json, quiet=quiet)
 
 
 def _loaded_runs(
@@ -122,17 +117,17 @@ def _loaded_runs(
     return LoadedRuns(tuple(logs), mass, link or "", _centre(centre))
 
 
-def _contact_logs(contacts: Sequence[str], presses: Sequence[str], lever_arm: float | None) -> ContactLogs | None:
-    """Return the logs with a load cell; None without any. Raises UsageError for a lever arm that does not fit."""
-    from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
+def _press_logs(presses: Sequence[str], lever_arm: float | None) -> PressLogs | None:
+    """Return the logs with presses; None without any. Raises UsageError for a lever arm that does not fit."""
+    from cdtool.commands.identify.presses import PressLogs
 
     if lever_arm is not None and not 0.0 < lever_arm < math.inf:
         raise UsageError(f"--lever-arm is {lever_arm:g}", "give it in m, above 0")
-    if not contacts and not presses:
-        if lever_arm is not None:
-            raise UsageError("--lever-arm without --contacts or --presses", "give logs of contacts too")
-        return None
-    return ContactLogs(tuple(contacts), tuple(presses), lever_arm)
+    if presses:
+        return PressLogs(tuple(presses), lever_arm)
+    if lever_arm is not None:
+        raise UsageError("--lever-arm without --presses", "give logs of presses too")
+    return None
 
 
 def _centre(text: str | None) -> tuple[float, float, float] | None:
@@ -153,7 +148,7 @@ def _identify_machine(
     machine: Path,
     targets: Sequence[Path],
     workers: Workers,
-    other_logs: LoadedRuns | ContactLogs | None,
+    other_logs: LoadedRuns | PressLogs | None,
     *,
     as_json: bool,
     quiet: bool,
@@ -192,17 +187,20 @@ def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Pa
 
 
 def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
-    from cdtool.commands.identify.words import words_of_plan
-
     if is_named:
         typer.echo(f"joint {plain(joint.joint)}")
     _show_quality(joint)
-    for item in joint.not_identifiable:
-        typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
-    for plan in joint.plan:
-        typer.echo(f"plan: {words_of_plan(plan, joint.units[2])}: for {', '.join(plan.keys)}")
+    _show_missing(joint, "")
     for method, reason in joint.refused.items():
         typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
+
+
+def _show_missing(joint: JointIdentification, name: str) -> None:
+    from cdtool.commands.identify.words import words_of_needs
+
+    for item in joint.not_identifiable:
+        needs = words_of_needs(item.missing)
+        typer.echo(f"{name}not identifiable: {item.section}.{item.key}{f': add {needs}' if needs else ''}")
 
 
 def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
@@ -223,10 +221,10 @@ def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Seque
 
 def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: bool) -> None:
     """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
-    from cdtool.commands.identify.words import words_of_decision, words_of_joint_plan, words_of_robot
+    from cdtool.commands.identify.words import words_of_decision, words_of_robot
 
     rows = []
-    for joint, friction, floor in zip(done.joints, robot.joints, robot.repeated.floor.tolist(), strict=True):
+    for joint, friction, floor in robot.rows:
         errors = [number(item) for item in (friction.torque, friction.before, friction.after, floor)]
         rows.append([joint.joint, joint.units[1], *errors, words_of_decision(friction)])
     headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
@@ -236,10 +234,7 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
         table(columns, rows)
     for joint in done.joints:
         name = plain(joint.joint)
-        for item in joint.not_identifiable:
-            typer.echo(f"{name}: not identifiable: {item.section}.{item.key}{_needed(item)}")
-        for plan in joint.plan:
-            typer.echo(f"{name}: plan: {words_of_joint_plan(plan, joint)}: for {', '.join(plan.keys)}")
+        _show_missing(joint, f"{name}: ")
         for reason in joint.refused.values():
             typer.echo(f"{name}: {plain(reason)}")
     for line in words_of_robot(robot, done.joints, len(done.runs)):
@@ -247,19 +242,13 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
 
 
 def _show_changes(done: IdentifiedMachine) -> None:
-    rows = [("key", "old", "new", "standard error", "unit")]
+    from cdtool.commands.identify.machine_update import values_text
+
+    rows = []
     for change in done.changes:
-        old = "-" if change.old[0] is None else _numbers([item or 0.0 for item in change.old])
-        errors = _numbers([float(f"{item:.2g}") for item in change.standard_errors])
-        rows.append((f"{change.section}.{change.key}", old, _numbers(change.values), errors, change.unit))
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        typer.echo("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
-
-
-def _numbers(values: Any) -> str:
-    texts = [digits(float(f"{value:.6g}")) if math.isfinite(value) else "-" for value in values]
-    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
+        texts = (values_text(change.old), values_text(change.values), values_text(change.standard_errors, 2))
+        rows.append((f"{change.section}.{change.key}", *texts, change.unit))
+    table([(heading, "left") for heading in ("key", "old", "new", "standard error", "unit")], rows)
 
 
 def _show_quality(joint: JointIdentification) -> None:
@@ -271,8 +260,3 @@ def _show_quality(joint: JointIdentification) -> None:
         way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
         force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
         typer.echo(f"friction {way} at {speed}: {force}")
-
-
-def _needed(item: NotIdentifiable) -> str:
-    needs = ", ".join(missing.value for missing in item.missing)
-    return f": add {needs}" if needs else ""

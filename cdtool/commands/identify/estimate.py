@@ -21,7 +21,7 @@ class Method(Enum):
     LEAST_SQUARES = "least squares"
     INSTRUMENTAL_VARIABLES = "instrumental variables"
     OUTPUT_ERROR = "output error"
-    CONTACTS = "contacts with a load cell"
+    PRESSES = "presses on a load cell"
     LOADED_RUNS = "runs with and without a known payload"
     FEASIBLE_LEAST_SQUARES = "physically consistent least squares"
 
@@ -29,7 +29,7 @@ class Method(Enum):
 class Missing(Enum):
     """What the recordings would need so that a parameter could be identified."""
 
-    SECOND_SPEED = "runs at a second speed"
+    SECOND_SPEED = "runs at other speeds"
     REVERSALS = "runs in both directions"
     ACCELERATION = "runs with stronger acceleration"
     START_UP = "recordings that begin at rest and contain the start of the motion"
@@ -40,9 +40,8 @@ class Missing(Enum):
     MOTOR_INERTIA = "the motor inertia from its data sheet"
     OTHER_MOTION = "a motion that excites this joint independently of the others"
     MORE_RECORDINGS = "more recordings"
-    CONTACTS = "contacts with a load cell"
     HIGHER_RATE = "a higher sampling rate"
-    GENTLER_START = "starts with less acceleration, which wind the drive up less, or contacts with a load cell"
+    GENTLER_START = "starts with less acceleration, which wind the drive up less"
     POSITION = "the position channel"
     FINER_MOTION = "a speed or position channel with less noise or finer steps"
     OTHER_CONTROLLER = "references of a P or PI speed controller, alone or under a P position controller"
@@ -94,6 +93,14 @@ class NotIdentifiable:
     missing: tuple[Missing, ...]
     numbers: Mapping[str, float] = field(default_factory=dict)
     joint: int = 0
+
+    @property
+    def relative_error(self) -> float:
+        """Return the relative standard error of a parameter that is too uncertain; NaN where it is not known."""
+        if "relative_standard_error" in self.numbers:
+            return self.numbers["relative_standard_error"]
+        value = abs(self.numbers.get("value", 0.0))
+        return self.numbers.get("standard_error", math.nan) / value if value > 0.0 else math.nan
 
     @property
     def summary(self) -> dict[str, Any]:

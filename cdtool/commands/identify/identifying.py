@@ -18,21 +18,13 @@ from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
 from cdtool.commands.identify.axis.speed_controller import ControllerSettings, identify_controller
-from cdtool.commands.identify.axis.torque_constant import TorqueScale
+from cdtool.commands.identify.axis.torque_constant import TorqueScale, identify_torque_scale
 from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass
-from cdtool.commands.identify.contact.identifying_contacts import (
-    ContactLogs,
-    LoadCellLogs,
-    identify_struck,
-    read_contacts,
-    scale_estimates,
-    scaled,
-    torque_scale,
-)
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification, identify_joints
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.machine_update import MachineChange, changes_of, described_runs, robot_files, updated_text
+from cdtool.commands.identify.presses import Presses, PressLogs, read_presses, scale_estimates, scaled
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, Runs, find_logs, load_runs, several_logs
@@ -92,7 +84,6 @@ class IdentifiedMachine:
     @property
     def summary(self) -> dict[str, Any]:
         """Return everything but the samples as JSON values."""
-        plan = self.robot.plan if self.robot else None
         return {
             "tool": "cdtool identify",
             "machine": self.machine,
@@ -103,7 +94,6 @@ class IdentifiedMachine:
             "findings": [asdict(item) for item in self.findings],
             "written": self.written or None,
             "robot": self.robot.summary if self.robot else None,
-            "inertia_plan": plan and asdict(plan),
         }
 
 
@@ -115,7 +105,7 @@ def identify(
     force: bool = False,
     workers: Workers | None = None,
     progress: Progress | None = None,
-    other_logs: LoadedRuns | ContactLogs | None = None,
+    other_logs: LoadedRuns | PressLogs | None = None,
 ) -> IdentifiedMachine:
     """Identify the parameters of a machine's model from impact-free logs, and update its machine file.
 
@@ -136,10 +126,9 @@ def identify(
         How the logs are read.
     progress : callable, optional
         Called after each log with the number done and the total.
-    other_logs : LoadedRuns or ContactLogs, optional
+    other_logs : LoadedRuns or PressLogs, optional
         Of a robot: logs of motion with a known payload, which show the torque constants of its joints. Of an axis: logs
-        of contacts with a load cell, which show its drive beyond the starts and its load, and of slow presses, which
-        show the scale of its torque.
+        of slow presses on a load cell, which show the scale of its torque.
 
     Returns
     -------
@@ -155,7 +144,7 @@ def identify(
     SignatureError
         No log is left.
     UsageError
-        The output exists, a payload is given for an axis, or contacts for a robot or several joints.
+        The output exists, a payload is given for an axis, or presses for a robot or several joints.
 
     Examples
     --------
@@ -170,23 +159,23 @@ def identify(
     if target is not None and target.exists() and not force and target.resolve() != path.resolve():
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
-    payload, contacts = _for_this_machine(other_logs, machine_file)
+    payload, press_logs = _for_this_machine(other_logs, machine_file)
     paths, reading = read_until(logs, "LOGS", workers)
     runs, recordings = _impact_free(paths, machine_file, replace(reading, progress=progress))
     given = read_toml(path, "a machine file")
     robot = _identify_robot(machine_file, recordings, given, payload, reading)
+    presses = read_presses(press_logs, machine_file) if press_logs else Presses()
     if robot is not None:
-        joints = robot.by_joint
+        joints = robot.joints
     else:
         count = len(machine_file.machine.joints)
-        struck = read_contacts(contacts, machine_file) if contacts else LoadCellLogs()
-        joints = tuple(_identify_joint(machine_file, joint, recordings, struck) for joint in range(count))
+        joints = tuple(_identify_joint(machine_file, joint, recordings, presses) for joint in range(count))
     estimates = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.estimates]
     together = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.together]
     if robot is not None and robot.gains is not None:
         estimates += robot.gains.estimates
-    for number, joint in enumerate(joints):
-        estimates += scale_estimates(joint.torque_scale, given, number) if joint.torque_scale else []
+    for joint in joints:
+        estimates += scale_estimates(joint.torque_scale, given) if joint.torque_scale else []
     if not estimates and not together and not _was_compared(joints):
         raise IdentificationError(
             f"nothing can be identified from {counted(len(recordings), 'log')}: {'; '.join(_reasons(joints))}",
@@ -201,7 +190,7 @@ def identify(
         changes,
         text,
         tuple(recording.name for recording in recordings),
-        (*runs.skipped, *(struck.skipped if robot is None else ())),
+        (*runs.skipped, *presses.skipped),
         runs.findings,
         robot=robot,
         source=path,
@@ -214,16 +203,16 @@ def identify(
 
 
 def _for_this_machine(
-    logs: LoadedRuns | ContactLogs | None, machine_file: MachineFile
-) -> tuple[LoadedRuns | None, ContactLogs | None]:
-    """Return the runs with a payload of a robot, and the contacts of an axis; raises UsageError if they do not fit."""
+    logs: LoadedRuns | PressLogs | None, machine_file: MachineFile
+) -> tuple[LoadedRuns | None, PressLogs | None]:
+    """Return the runs with a payload of a robot, and the presses of an axis; raises UsageError if they do not fit."""
     machine = machine_file.machine
     if isinstance(logs, LoadedRuns):
         if not isinstance(machine, CoupledMachine):
             raise UsageError("a payload is given for an axis", "press and release a load cell to identify its torque")
         return logs, None
     if logs is not None and (isinstance(machine, CoupledMachine) or len(machine.joints) > 1):
-        raise UsageError("contacts with a load cell are given for several joints", "they are used for one axis only")
+        raise UsageError("presses on a load cell are given for several joints", "they are used for one axis only")
     return None, logs
 
 
@@ -293,12 +282,12 @@ def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
 
 
 def _identify_joint(
-    machine_file: MachineFile, joint: int, recordings: Sequence[Recording], struck: LoadCellLogs
+    machine_file: MachineFile, joint: int, recordings: Sequence[Recording], presses: Presses
 ) -> JointIdentification:
     machine: Any = machine_file.machine
     name = machine.joints[joint]
     refused: dict[str, str] = {}
-    scale, recordings, struck = _by_presses(recordings, struck, float(machine.nominal_inertia[joint]), refused)
+    scale, recordings = _by_presses(recordings, presses, float(machine.nominal_inertia[joint]), refused)
     runs: list[AxisRun] = []
     for recording in recordings:
         try:
@@ -343,7 +332,7 @@ def _identify_joint(
             reason = "the torque falls where the acceleration rises: check the signs (scale) of torque and speed"
             return JointIdentification(name, refused={"sign": reason})
     units = (mass, force, travel, f"{force} s/{travel}")
-    identified = JointIdentification(
+    return JointIdentification(
         name,
         units=units,
         has_torque_filter="torque_filter_time" in stated,
@@ -351,7 +340,6 @@ def _identify_joint(
         torque_scale=scale,
         **found,
     )
-    return _with_contacts(identified, struck, machine_file, joint) if struck.struck else identified
 
 
 def _has_opposite_sign(fit: RigidAxisFit | None) -> bool:
@@ -379,30 +367,14 @@ def _refuse_constant_force(fit: RigidAxisFit | None, unit: str) -> None:
 
 
 def _by_presses(
-    recordings: Sequence[Recording], logs: LoadCellLogs, total_mass: float, refused: dict[str, str]
-) -> tuple[TorqueScale | None, Sequence[Recording], LoadCellLogs]:
+    recordings: Sequence[Recording], presses: Presses, total_mass: float, refused: dict[str, str]
+) -> tuple[TorqueScale | None, Sequence[Recording]]:
     """Return the scale of the torque that presses show, and the recordings with torques by it."""
+    if not presses.recordings:
+        return None, recordings
     try:
-        scale = torque_scale(logs, total_mass, 0)
+        scale = identify_torque_scale(presses.recordings, total_mass, lever_arm=presses.lever_arm)
     except CdtoolError as fault:
         refused["torque_scale"] = str(fault)
-        return None, recordings, logs
-    if scale is None:
-        return None, recordings, logs
-    struck = tuple((scaled(item, scale.factor, 0), contact) for item, contact in logs.struck)
-    return scale, [scaled(item, scale.factor, 0) for item in recordings], replace(logs, struck=struck)
-
-
-def _with_contacts(
-    identified: JointIdentification, logs: LoadCellLogs, machine_file: MachineFile, joint: int
-) -> JointIdentification:
-    """Return an axis with what its contacts show, or with the reason why they show nothing."""
-    refused = dict(identified.refused)
-    if identified.two_mass is None:
-        refused["contacts"] = f"contacts need the drive that starts show: {refused.get('two_mass', '')}"
-        return replace(identified, refused=refused)
-    try:
-        fits = (identified.two_mass, identified.controller)
-        return replace(identified, contacts=identify_struck(logs, machine_file, joint, fits, identified.units[:3]))
-    except CdtoolError as fault:
-        return replace(identified, refused={**refused, "contacts": str(fault)})
+        return None, recordings
+    return scale, [scaled(item, scale.factor) for item in recordings]

@@ -25,14 +25,11 @@ from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_
 from cdtool.commands.identify.robot.robot_dynamics import (
     RobotFit,
     identify_robot,
+    is_prismatic,
     joint_estimates,
 )
-from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence, joint_evidence
-from cdtool.commands.identify.robot.robot_excitation import (
-    PlannedRobotMotion,
-    measure_joint_motion,
-    plan_robot_motion,
-)
+from cdtool.commands.identify.robot.robot_evidence import joint_evidence
+from cdtool.commands.identify.robot.robot_excitation import measure_joint_motion
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
@@ -92,47 +89,25 @@ class InertiaIdentification:
 
 @dataclass(frozen=True, eq=False)
 class RobotIdentification:
-    """What was identified of a robot; `joints` and `refused` (reason by method) in the order of the machine's joints.
+    """What was identified of a robot; `joints` in the order of the machine's joints.
 
-    `gains`: torque constants, None without loaded runs; with them the
-    logged torques were multiplied. `unexplained_share`: of the equations left out, because no friction explains their
-    torque. `evidence`: what the outputs show of each joint. `urdf`: the text of the updated URDF, empty if it stays as
-    it is.
+    `gains`: torque constants, None without loaded runs; with them the logged torques were multiplied.
+    `unexplained_share`: of the equations left out, because no friction explains their torque. `urdf`: the text of the
+    updated URDF, empty if it stays as it is.
     """
 
-    machine: CoupledMachine
-    joints: tuple[JointFriction, ...]
-    refused: tuple[Mapping[str, str], ...]
+    joints: tuple[JointIdentification, ...]
     inertias: InertiaIdentification
     gains: Identified | None
     repeated: RepeatedRuns
     unexplained_share: float
-    evidence: tuple[RobotJointEvidence, ...]
     urdf: str
 
     @property
-    def by_joint(self) -> tuple[JointIdentification, ...]:
-        """Return the joints of the machine with what was identified of each."""
-        machine = self.machine
-        slides = [False] * len(machine.joints)
-        if isinstance(machine, UrdfRobot):
-            prismatic = {joint.name: joint.prismatic for joint in machine.tree.joints}
-            slides = [prismatic[name] for name in machine.tree.order]
-        rows = zip(machine.joints, slides, self.refused, self.joints, self.evidence, strict=True)
-        return tuple(
-            JointIdentification(
-                name, units=_PRISMATIC if is_slide else _REVOLUTE, refused=refused, robot=friction, evidence=evidence
-            )
-            for name, is_slide, refused, friction, evidence in rows
-        )
-
-    @property
-    def plan(self) -> PlannedRobotMotion | None:
-        """Return the motion that would show the inertias of all links; None if nothing is missing, or nothing moves."""
-        for refused in self.inertias.not_identifiable:
-            count = int(refused.numbers.get("base_parameters", 0.0))
-            return plan_robot_motion([item.motion for item in self.evidence], count)
-        return None
+    def rows(self) -> list[tuple[JointIdentification, JointFriction, float]]:
+        """Return each joint with its friction and the deviation between equal runs, as all outputs show them."""
+        floors = self.repeated.floor.tolist()
+        return [(joint, joint.robot, floor) for joint, floor in zip(self.joints, floors, strict=True) if joint.robot]
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -221,11 +196,13 @@ def identify_joints(
         joints, refused = _refuse_unexplained(joints, machine)
     floor = repeated_runs(runs)
     fits = {**fits, FrictionForm.WITH_INERTIAS: whole}
-    evidence = tuple(
-        joint_evidence(motion, friction.compared, fits, explained.runs)
-        for motion, friction in zip(measure_joint_motion(runs, machine), joints, strict=True)
-    )
-    return RobotIdentification(machine, joints, refused, inertias, gains, floor, explained.share, evidence, urdf)
+    identified = []
+    for motion, friction, reasons in zip(measure_joint_motion(runs, machine), joints, refused, strict=True):
+        units = _PRISMATIC if is_prismatic(machine, friction.joint) else _REVOLUTE
+        shown = joint_evidence(motion, friction.compared, fits, explained.runs)
+        name = machine.joints[friction.joint]
+        identified.append(JointIdentification(name, units=units, refused=reasons, robot=friction, evidence=shown))
+    return RobotIdentification(tuple(identified), inertias, gains, floor, explained.share, urdf)
 
 
 def _runs_of(recordings: Sequence[Recording]) -> tuple[list[RobotRun], str]:
@@ -364,6 +341,7 @@ def _joints_with_inertias(
             replace(
                 item,
                 form=FrictionForm.WITH_INERTIAS,
+                compared=FrictionForm.WITH_INERTIAS,
                 identified=Identified((*own, *known), missing),
                 together=together,
                 errors=errors,

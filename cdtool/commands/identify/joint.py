@@ -1,4 +1,4 @@
-"""What was identified of one joint by all methods, what is missing, and the motion that would add it."""
+"""What was identified of one joint by all methods, and what is missing."""
 
 from __future__ import annotations
 
@@ -7,20 +7,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion, plan_motions
+from cdtool.commands.identify.axis.excitation import Excitation
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerFit
 from cdtool.commands.identify.axis.torque_constant import TorqueScale
 from cdtool.commands.identify.axis.two_mass import TwoMassFit
-from cdtool.commands.identify.contact.contact_fit import ContactFit
-from cdtool.commands.identify.estimate import Estimate, Method, Missing, NotIdentifiable
+from cdtool.commands.identify.estimate import Estimate, Method, NotIdentifiable
 from cdtool.commands.identify.robot.friction_choice import JointFriction
 from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence
 from cdtool.machines.axis_model.model_table import finite_values
 
 _CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
-# A motor's inertia below this share of the total is not given [-].
-_NO_MASS = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +25,8 @@ class JointIdentification:
     """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
 
     `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`
-    and `evidence`: of a joint of a robot or planar arm, which has none of the others. `contacts`: what contacts with a
-    load cell add. `torque_scale`: the factor by which all torques were multiplied before; None without presses.
+    and `evidence`: of a joint of a robot or planar arm, which has none of the others. `torque_scale`: the factor by
+    which all torques were multiplied before; None without presses.
     """
 
     joint: str
@@ -41,19 +38,17 @@ class JointIdentification:
     refused: Mapping[str, str] = field(default_factory=dict)
     robot: JointFriction | None = None
     evidence: RobotJointEvidence | None = None
-    contacts: ContactFit | None = None
     torque_scale: TorqueScale | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Return the estimates that the machine file gets.
 
-        The load's mass is that of the contacts, else that of the elastic drive if there is one, else that of the rigid
-        axis. Friction is rather that of several speeds than that of the starts. Friction of the load that the contacts
-        show to act on the motor is among the values known only together.
+        The load's mass is that of the elastic drive if there is one, else that of the rigid axis. Friction is rather
+        that of several speeds than that of the starts.
         """
         found: dict[tuple[str, str], Estimate] = {}
-        for fit in (self.two_mass, self.rigid, self.controller, self.robot, self.contacts):
+        for fit in (self.two_mass, self.rigid, self.controller, self.robot):
             for estimate in fit.identified.estimates if fit else ():
                 if fit is not self.rigid or not (self.two_mass and estimate.key == "load_mass"):
                     found[estimate.section, estimate.key] = estimate
@@ -62,8 +57,6 @@ class JointIdentification:
         if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
             # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
             found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
-        for item in self.contacts.together if self.contacts else ():
-            found.pop((item.section, item.key), None)
         return tuple(map(self._with_scale_error, found.values()))
 
     def _with_scale_error(self, estimate: Estimate) -> Estimate:
@@ -76,15 +69,14 @@ class JointIdentification:
     @property
     def together(self) -> tuple[Estimate, ...]:
         """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
-        of_contacts = self.contacts.together if self.contacts else ()
-        known = {(item.section, item.key) for item in (*self.estimates, *of_contacts)}
+        known = {(item.section, item.key) for item in self.estimates}
         found: list[Estimate] = [*(self.robot.together if self.robot else ()), *self._friction_of_starts()]
         found += [*self._of_starts(), *self._of_controller()]
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
         known |= {(item.section, item.key) for item in self.not_identifiable if not self.robot}
-        return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
+        return tuple(item for item in found if (item.section, item.key) not in known)
 
     def _friction_of_starts(self) -> list[Estimate]:
         """Return Coulomb and viscous friction where only their sum is known: without both a model has neither."""
@@ -100,10 +92,9 @@ class JointIdentification:
         """Return what the starts show together with the identified values: how far they go."""
         if not self.two_mass:
             return []
-        found, identified, drive = [], self.two_mass.identified, self.contacts.drive if self.contacts else None
-        if drive or "stiffness" in identified:
-            wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
-            found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
+        found, identified = [], self.two_mass.identified
+        if "stiffness" in identified:
+            found.append(_exact("model.drive", "observed_wind_up", self.two_mass.largest_wind_up, self.units[2]))
         if "static" in identified:
             values, unit = vars(self.two_mass.model.friction), f"{self.units[2]}/s"
             found += [_exact("model.friction", key, values[key], unit) for key in ("stribeck_speed", "smoothing_speed")]
@@ -128,11 +119,9 @@ class JointIdentification:
     @property
     def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
         """Return the parameters that no method could identify."""
-        known = {(item.section, item.key) for item in self.estimates}
-        together = (*self._friction_of_starts(), *(self.contacts.together if self.contacts else ()))
-        known |= {(item.section, item.key) for item in together}
+        known = {(item.section, item.key) for item in (*self.estimates, *self._friction_of_starts())}
         found: dict[tuple[str, str], NotIdentifiable] = {}
-        for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
+        for fit in (self.rigid, self.two_mass, self.controller, self.robot):
             for item in fit.identified.not_identifiable if fit else ():
                 if (item.section, item.key) not in known:
                     found.setdefault((item.section, item.key), item)
@@ -146,70 +135,27 @@ class JointIdentification:
         return self.rigid.excitation if self.rigid else None
 
     @property
-    def plan(self) -> tuple[PlannedMotion, ...]:
-        """Return the motions that would make the other parameters identifiable; empty if nothing is missing."""
-        rate = math.nan
-        if self.two_mass is not None:
-            rate = 1.0 / self.two_mass.starts[0].ensemble.period
-        elif self.controller is not None and self.controller.controller is not None:
-            rate = 1.0 / self.controller.controller.period
-        return plan_motions((*self.not_identifiable, *self._needs_of_the_drive()), self.excitation, rate)
-
-    def _needs_of_the_drive(self) -> tuple[NotIdentifiable, ...]:
-        """Return the motor's inertia if the stiffness of a drive was not identified because it is not given.
-
-        It is what the rigid axis has more than its load. Another refusal, as of a fit that ends at a bound, needs no
-        other motion: its own text says what to do.
-        """
-        if self.rigid is None or "two_mass" not in self.refused or "load_mass" not in self.rigid.identified:
-            return ()
-        motor = self.rigid.total_mass - self.rigid.identified["load_mass"].value
-        if motor > _NO_MASS * self.rigid.total_mass:
-            return ()
-        return (NotIdentifiable("model.drive", "stiffness", (Missing.MOTOR_INERTIA,)),)
-
-    @property
     def summary(self) -> dict[str, Any]:
         """Return everything but the samples as JSON values."""
-        methods = (_of_rigid(self.rigid), _of_methods(self), _of_robot(self))
-        plan = [{**asdict(plan), "missing": plan.missing.name.lower()} for plan in self.plan]
         values = {
             "joint": self.joint,
             "estimates": [item.summary for item in self.estimates],
             "not_identifiable": [item.summary for item in self.not_identifiable],
             "refused": dict(self.refused),
-            "plan": plan,
+            "torque_scale": self.torque_scale and asdict(self.torque_scale),
         }
-        return values | {key: value for method in methods for key, value in method.items()}
+        return {**values, **_of_axis(self), **_of_robot(self)}
 
 
 def _exact(section: str, key: str, value: float, unit: str) -> Estimate:
     return Estimate(section, key, value, math.nan, unit, Method.OUTPUT_ERROR)
 
 
-def _of_rigid(fit: RigidAxisFit | None) -> dict[str, Any]:
-    if fit is None:
-        return {"force_error_on_unseen_runs": None, "friction_at_speed": []}
-    validation = fit.cross_validation
-    unseen = validation and {
-        "error": validation.error,
-        "floor": validation.floor,
-        "repeats": validation.repeats,
-        "worst_run": validation.worst.run,
-        "error_of_worst_run": validation.worst.error,
-        "of_runs": validation.worst.of_runs,
-    }
-    return {
-        "force_error_on_unseen_runs": unseen,
-        "friction_at_speed": [asdict(level) for level in fit.levels],
-        "excitation": asdict(fit.excitation),
-        "condition_number": fit.condition_number,
-    }
-
-
-def _of_methods(joint: JointIdentification) -> dict[str, Any]:
-    two_mass, controller, contacts = joint.two_mass, joint.controller, joint.contacts
-    return {
+def _of_axis(joint: JointIdentification) -> dict[str, Any]:
+    rigid, two_mass, controller = joint.rigid, joint.two_mass, joint.controller
+    values: dict[str, Any] = {
+        "force_error_on_unseen_runs": rigid and rigid.cross_validation and rigid.cross_validation.summary,
+        "friction_at_speed": [asdict(level) for level in rigid.levels] if rigid else [],
         "two_mass": two_mass
         and {
             "condition_number": two_mass.condition_number,
@@ -217,25 +163,18 @@ def _of_methods(joint: JointIdentification) -> dict[str, Any]:
             "largest_wind_up": two_mass.largest_wind_up,
         },
         "controller": controller and {"kind": controller.kind.value, "residual_rms": controller.residual_rms},
-        "contacts": contacts
-        and {
-            "condition_number": contacts.condition_number,
-            "relative_error": dict(contacts.relative_error),
-            "delays_of_load_cell": list(contacts.delays),
-            "largest_wind_up": contacts.wind_up,
-            "largest_drive_force": contacts.drive_force,
-        },
-        "torque_scale": joint.torque_scale and asdict(joint.torque_scale),
     }
+    if rigid:
+        values |= {"excitation": asdict(rigid.excitation), "condition_number": rigid.condition_number}
+    return values
 
 
 def _of_robot(joint: JointIdentification) -> dict[str, Any]:
     friction, evidence = joint.robot, joint.evidence
     if friction is None or evidence is None:
         return {}
-    motion = evidence.motion
     return {
         "friction_decision": friction.summary,
         "unseen_run": evidence.unseen and evidence.unseen.summary,
-        "motion": {**asdict(motion), "missing": [missing.name.lower() for missing in motion.missing]},
+        "motion": asdict(evidence.motion),
     }

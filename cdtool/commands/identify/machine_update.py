@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import joined, relative_name
@@ -56,18 +56,17 @@ def changes_of(
     not_alone = {(estimate.section, estimate.key) for estimate in together}
     changes = []
     for (section, name), by_joint in grouped.items():
-        key = _key_in_file(machine, section, name)
+        first = next(iter(by_joint.values()))
+        key, unit, factors = _as_in_file(machine, first)
         old = _old_values(given, section, key, joints)
         values, errors = [], []
         for joint in range(joints):
             estimate_here = by_joint.get(joint)
-            factor = _factor(machine, section, name, joint)
+            factor = factors[joint]
             error = math.nan if estimate_here is None else estimate_here.standard_error * abs(factor)
             kept = old[joint] or 0.0
             values.append(kept if estimate_here is None else _rounded(estimate_here.value * factor, error))
             errors.append(error)
-        first = next(iter(by_joint.values()))
-        unit = _unit_in_file(machine, section, name, first.unit)
         alone = (section, name) not in not_alone
         changes.append(MachineChange(section, key, old, tuple(values), tuple(errors), unit, first.method, alone))
     return tuple(changes)
@@ -122,8 +121,8 @@ def _free_name(target: Path) -> Path:
 
 
 def _comment(change: MachineChange, before: Any, origin: str) -> str:
-    errors = [digits(float(f"{item:.2g}")) if math.isfinite(item) else "-" for item in change.standard_errors]
-    spread = errors[0] if len(set(errors)) == 1 else f"[{', '.join(errors)}]"
+    errors = values_text(change.standard_errors, 2)
+    spread = f"[{errors}]" if "," in errors else errors
     parts = [f"+- {spread} {change.unit}" if spread != "-" else change.unit, change.method.value, origin]
     was = ""
     if before is not None:
@@ -143,12 +142,6 @@ def _rounded(value: float, error: float) -> float:
     return float(f"{value:.{max(needed, _DIGITS)}g}")
 
 
-def _key_in_file(machine: Machine, section: str, name: str) -> str:
-    if (section, name) == ("machine", "drive_inertia") and not isinstance(machine, UrdfRobot):
-        return "motor_inertia"
-    return str(getattr(machine, "inertia_key", name)) if (section, name) == ("machine", "load_mass") else name
-
-
 def _old_values(given: Mapping[str, Any], section: str, key: str, joints: int) -> tuple[float | None, ...]:
     table: Any = given
     for name in section.split("."):
@@ -159,27 +152,37 @@ def _old_values(given: Mapping[str, Any], section: str, key: str, joints: int) -
     return (None if value is None else float(value),) * joints
 
 
-# How a load-side value of [machine] is written in motor coordinates: times the transmission ratio to this power.
-_POWERS = {"viscous_friction": 2, "coulomb_friction": 1, "constant_force": 1, "drive_inertia": 2}
-_MOTOR_UNITS = {"viscous_friction": "N m s/rad", "drive_inertia": "kg m2"}
+# A load-side value of [machine] in motor coordinates: times the transmission ratio to this power, and its unit.
+_AT_MOTOR = {
+    "viscous_friction": (2, "N m s/rad"),
+    "coulomb_friction": (1, "N m"),
+    "constant_force": (1, "N m"),
+    "drive_inertia": (2, "kg m2"),
+}
 
 
-def _factor(machine: Machine, section: str, name: str, joint: int) -> float:
-    if not _is_at_motor(machine, section, name):
-        return 1.0
-    ratio = machine.transmission_ratio[joint]
-    return {2: ratio**2, 1: abs(ratio) if name == "coulomb_friction" else ratio}.get(_POWERS.get(name, 0), 1.0)
+def _as_in_file(machine: Machine, estimate: Estimate) -> tuple[str, str, tuple[float, ...]]:
+    """Return key and unit of an estimate in the file, and the factor of each joint; the drives of a URDF stay as is."""
+    key, ones = estimate.key, (1.0,) * len(machine.joints)
+    if estimate.section != "machine":
+        return key, estimate.unit, ones
+    is_rotor = key == "drive_inertia" and not isinstance(machine, UrdfRobot)
+    name = "motor_inertia" if is_rotor else getattr(machine, "inertia_key", key) if key == "load_mass" else key
+    if not isinstance(machine, JointMachine) or machine.coordinates != "motor" or key not in _AT_MOTOR:
+        return str(name), estimate.unit, ones
+    if key == "drive_inertia" and not is_rotor:
+        return str(name), estimate.unit, ones
+    power, unit = _AT_MOTOR[key]
+    # Dry friction has no sign.
+    ratios = [abs(ratio) if key == "coulomb_friction" else ratio for ratio in machine.transmission_ratio]
+    return str(name), unit, tuple(ratio**power for ratio in ratios)
 
 
-def _unit_in_file(machine: Machine, section: str, name: str, unit: str) -> str:
-    return _MOTOR_UNITS.get(name, "N m") if _is_at_motor(machine, section, name) else unit
-
-
-def _is_at_motor(machine: Machine, section: str, name: str) -> TypeGuard[JointMachine]:
-    """Return whether the file has a value of [machine] at the motor; the drives of a URDF are on the load side."""
-    if not isinstance(machine, JointMachine) or machine.coordinates != "motor":
-        return False
-    return section == "machine" and name in _POWERS and not (name == "drive_inertia" and isinstance(machine, UrdfRobot))
+def values_text(values: Sequence[float | None], significant: int = _DIGITS) -> str:
+    """Return the values of all joints, one if they are alike; a dash for one that is not known."""
+    known = [math.nan if value is None else value for value in values]
+    texts = [digits(float(f"{value:.{significant}g}")) if math.isfinite(value) else "-" for value in known]
+    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
 def described_runs(count: int, day: str) -> str:

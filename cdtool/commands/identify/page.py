@@ -5,40 +5,37 @@ Text from logs and files is escaped by the template. A content security policy a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import partial
 
 from cdtool.base.plain_text import counted
-from cdtool.commands.identify.axis.excitation import PlannedMotion
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.commands.identify.joint import JointIdentification
-from cdtool.commands.identify.machine_update import MachineChange
+from cdtool.commands.identify.machine_update import MachineChange, values_text
 from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
 from cdtool.commands.identify.robot.sections import robot_sections
 from cdtool.commands.identify.words import (
     listed_numbers,
     short_number,
-    words_of_joint_plan,
     words_of_needs,
     words_of_reason,
 )
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
-from cdtool.report.number_text import NOTHING, number, percent
-from cdtool.report.table import Cell, Heading, Table, number_cell, tabulate
+from cdtool.report.number_text import NOTHING, percent
+from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
 
 
 def identification_html(done: IdentifiedMachine) -> str:
-    """Return the page of one machine: changes, what is not identifiable, plan, errors and misfit."""
+    """Return the page of one machine: changes, what is not identifiable, errors and misfit."""
     missing = sum(len(joint.not_identifiable) for joint in done.joints)
     known = sum(len(joint.estimates) for joint in done.joints)
     together = sum(len(joint.together) for joint in done.joints)
     sections = [PageSection("Changes", (_changes_table(done.changes),), note=_ORIGIN)]
     for joint in done.joints:
         sections += _joint_sections(joint, f"{joint.joint}: " if len(done.joints) > 1 else "")
-    sections[1:1] = robot_sections(done)
+    sections[1:1] = [*robot_sections(done), PageSection("Excitation", (_excitation_table(done.joints),))]
     sections += left_out_sections(done.skipped, done.findings)
     return SectionsPage(
         "Identification",
@@ -58,15 +55,8 @@ _ORIGIN = (
 
 
 def _joint_sections(joint: JointIdentification, name: str) -> list[PageSection]:
-    plan = joint.plan
     return [
         PageSection(f"{name}Not identifiable", (_missing_table(joint),) if joint.not_identifiable else ()),
-        PageSection(
-            f"{name}Excitation plan",
-            (_plan_table(joint, plan),) if plan else (),
-            note="Speeds and accelerations are derived from the highest ones in these logs." if plan else "",
-        ),
-        PageSection(f"{name}Excitation", (_excitation_table(joint),) if joint.rigid or joint.two_mass else ()),
         *(_axis_sections(joint, name) if joint.rigid or joint.two_mass or joint.controller else ()),
         PageSection(f"{name}Methods not used", (_refused_table(joint),) if joint.refused else ()),
     ]
@@ -75,25 +65,14 @@ def _joint_sections(joint: JointIdentification, name: str) -> list[PageSection]:
 def _changes_table(changes: Sequence[MachineChange]) -> Table:
     fields = (
         (Heading("key"), lambda item: Cell(f"{item.section}.{item.key}")),
-        (Heading("old", numeric=True), lambda item: Cell(_old(item))),
-        (Heading("new", numeric=True), lambda item: Cell(_values(item.values, 6))),
-        (Heading("standard error", numeric=True), lambda item: Cell(_values(item.standard_errors, 2))),
+        (Heading("old", numeric=True), lambda item: Cell(values_text(item.old))),
+        (Heading("new", numeric=True), lambda item: Cell(values_text(item.values))),
+        (Heading("standard error", numeric=True), lambda item: Cell(values_text(item.standard_errors, 2))),
         (Heading("unit"), lambda item: Cell(item.unit)),
         (Heading("origin"), lambda item: Cell(item.method.value)),
         (Heading("valid"), lambda item: Cell("alone" if item.is_known_alone else "only with its table")),
     )
     return tabulate("changes", "Values of the machine file", fields, changes)
-
-
-def _old(change: MachineChange) -> str:
-    if all(value is None for value in change.old):
-        return NOTHING
-    return _values(tuple(math.nan if value is None else value for value in change.old), 6)
-
-
-def _values(values: Sequence[float], significant: int) -> str:
-    texts = [short_number(value, significant) if math.isfinite(value) else NOTHING for value in values]
-    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
 def _missing_table(joint: JointIdentification) -> Table:
@@ -105,38 +84,26 @@ def _missing_table(joint: JointIdentification) -> Table:
     return tabulate("missing", "Not identifiable from these logs", fields, joint.not_identifiable)
 
 
-def _plan_table(joint: JointIdentification, plan: Sequence[PlannedMotion]) -> Table:
+def _excitation_table(joints: Sequence[JointIdentification]) -> Table:
+    def range_of(joint: JointIdentification) -> str:
+        if joint.evidence is None:
+            return NOTHING
+        return f"{short_number(joint.evidence.motion.lowest)} to {short_number(joint.evidence.motion.highest)}"
+
     fields = (
-        (Heading("add"), lambda item: Cell(words_of_joint_plan(item, joint))),
-        (Heading("makes identifiable"), lambda item: Cell(", ".join(item.keys))),
+        (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
+        (Heading("unit"), lambda item: Cell(item[0].units[2])),
+        (Heading("range"), lambda item: Cell(range_of(item[0]))),
+        (Heading("speeds that are held [/s]"), lambda item: Cell(listed_numbers(item[1].speeds, 2) or NOTHING)),
+        (Heading("highest speed [/s]", numeric=True), lambda item: number_cell(item[1].highest_speed)),
+        (Heading("highest acceleration [/s²]", numeric=True), lambda item: number_cell(item[1].highest_acceleration)),
+        (Heading("acceleration, RMS [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration)),
+        (Heading("of which noise [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration_noise)),
+        (Heading("forward"), lambda item: Cell(percent(item[1].forward_share) if item[1].moving_time else NOTHING)),
+        (Heading("moving time [s]", numeric=True), lambda item: number_cell(item[1].moving_time)),
     )
-    return tabulate("plan", "Motion that would make the other parameters identifiable", fields, plan)
-
-
-def _excitation_table(joint: JointIdentification) -> Table:
-    travel, rows = joint.units[2], []
-    if joint.rigid is not None:
-        found = joint.rigid.excitation
-        speeds = f"{listed_numbers(found.speeds)} {travel}/s" if found.speeds else "none"
-        rows += [
-            ("speeds that are held", speeds),
-            ("highest speed", f"{number(found.highest_speed)} {travel}/s"),
-            ("moving time forward", percent(found.forward_share)),
-            ("acceleration while moving, RMS", f"{number(found.acceleration)} {travel}/s²"),
-            ("of which noise", f"{number(found.acceleration_noise)} {travel}/s²"),
-            ("highest acceleration", f"{number(found.highest_acceleration)} {travel}/s²"),
-            ("travel", f"{number(found.travel)} {travel}"),
-            ("moving time", f"{number(found.moving_time)} s"),
-            ("strokes, reversals", f"{found.strokes}, {found.reversals}"),
-            ("condition number, rigid axis", number(joint.rigid.condition_number)),
-        ]
-    if joint.two_mass is not None:
-        rows += [
-            ("condition number, two masses", number(joint.two_mass.condition_number)),
-            ("largest wind-up of the drive", f"{number(joint.two_mass.largest_wind_up)} {travel}"),
-        ]
-    cells = [[Cell(name), Cell(value)] for name, value in rows]
-    return Table("excitation", "What the logged motion excites", (Heading("quantity"), Heading("value")), cells)
+    rows = [(joint, joint.excitation) for joint in joints if joint.excitation]
+    return tabulate("excitation", "What the logged motion excites", fields, rows)
 
 
 def _axis_sections(joint: JointIdentification, name: str) -> list[PageSection]:

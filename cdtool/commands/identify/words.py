@@ -1,4 +1,4 @@
-"""What an identification says in words: why a parameter is not identifiable, and the motion that would change that."""
+"""What an identification says in words: why a parameter is not identifiable, and what it needs."""
 
 from __future__ import annotations
 
@@ -6,16 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 
 from cdtool.base.plain_text import counted, digits
-from cdtool.commands.identify.axis.excitation import PlannedMotion, relative_error
 from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.commands.identify.identifying_robot import RobotIdentification
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, JointFriction
 from cdtool.commands.identify.robot.robot_dynamics import FEWEST_RUNS
-from cdtool.commands.identify.robot.robot_excitation import PlannedRobotMotion
 from cdtool.report.number_text import number, percent
-
-_BOTH = 2
 
 
 def short_number(value: float, significant: int = 3) -> str:
@@ -27,42 +23,6 @@ def listed_numbers(values: tuple[float, ...], significant: int = 3) -> str:
     """Return numbers as 0.06, 0.11 and 0.2."""
     texts = [short_number(value, significant) for value in values]
     return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
-
-
-def words_of_plan(plan: PlannedMotion, travel_unit: str) -> str:
-    """Return a planned motion in one line: runs, speeds, directions and acceleration in numbers.
-
-    A plan that is not a motion, or for which the logs have no basis, names what is missing.
-    """
-    if math.isfinite(plan.rate):
-        return f"logs with at least {short_number(plan.rate)} samples per second"
-    if not plan.runs:
-        return plan.missing.value
-    more = "more " if plan.missing is Missing.MORE_RECORDINGS else ""
-    way = "in each direction" if len(plan.directions) == _BOTH else "forward" if plan.directions == (1,) else "backward"
-    each = " each" if len(plan.speeds) > 1 else ""
-    words = f"{counted(plan.runs, f'{more}run')} {way} at {listed_numbers(plan.speeds)} {travel_unit}/s{each}"
-    if plan.logged_speeds and plan.speeds != plan.logged_speeds:
-        words += f", beside those at {listed_numbers(plan.logged_speeds)} {travel_unit}/s"
-    if math.isfinite(plan.acceleration):
-        words += f", with an acceleration of at least {short_number(plan.acceleration, 2)} {travel_unit}/s²"
-        words += f" (logged: {short_number(plan.logged_acceleration, 2)})"
-    if math.isfinite(plan.rest):
-        words += f", from a rest of at least {short_number(plan.rest)} s and until {short_number(plan.motion)} s later"
-    if plan.missing in (Missing.SECOND_SPEED, Missing.REVERSALS) and math.isfinite(plan.travel):
-        words += f", over {short_number(plan.travel, 2)} {travel_unit}"
-    return words
-
-
-def words_of_joint_plan(plan: PlannedMotion, joint: JointIdentification) -> str:
-    """Return a planned motion of a joint in one line; of a robot with the logged one unless it is a series of runs."""
-    travel = joint.units[2]
-    words = words_of_plan(plan, travel)
-    if plan.runs or joint.evidence is None or not joint.evidence.motion.is_moving:
-        return words
-    motion = joint.evidence.motion
-    speed = short_number(motion.excitation.highest_speed)
-    return f"{words} (logged: {short_number(motion.range)} {travel}, up to {speed} {travel}/s)"
 
 
 def words_of_decision(friction: JointFriction) -> str:
@@ -90,26 +50,10 @@ def words_of_base_set(item: NotIdentifiable) -> str:
     )
 
 
-def words_of_robot_plan(plan: PlannedRobotMotion, joints: Sequence[JointIdentification]) -> str:
-    """Return the motion that would show the inertias of all links: duration, and range and speed of each joint."""
-    parts = []
-    for demand in plan.joints:
-        name, unit = joints[demand.joint].joint, joints[demand.joint].units[2]
-        logged = f"{short_number(demand.logged_range, 2)} {unit}, {short_number(demand.logged_speed, 2)} {unit}/s"
-        wanted = f"{short_number(demand.range, 2)} {unit} at up to {short_number(demand.speed, 2)} {unit}/s"
-        parts.append(f"{name} over {wanted} ({f'logged: {logged}' if demand.is_more else 'as logged'})")
-    return (
-        f"{short_number(plan.duration)} s of all joints at once, each at its own frequencies "
-        f"(logged: {short_number(plan.logged_duration, 2)} s): {'; '.join(parts)}"
-    )
-
-
 def words_of_robot(robot: RobotIdentification, joints: Sequence[JointIdentification], runs: int) -> list[str]:
     """Return what is known of a whole robot from so many runs, a line each: inertias, torque constants, and so on."""
     inertias = robot.inertias
     lines = [words_of_base_set(item) for item in inertias.not_identifiable]
-    if robot.plan is not None:
-        lines.append(f"plan: {words_of_robot_plan(robot.plan, joints)}")
     if inertias.refused:
         lines.append(f"inertias kept: {inertias.refused}")
     if inertias.is_new:
@@ -143,7 +87,7 @@ def words_of_reason(item: NotIdentifiable) -> str:
     """Return why a parameter is not identifiable, with the numbers that show it."""
     reasons = [_REASONS.get(kind, f"not in these logs: {kind.value}") for kind in item.missing]
     numbers = [text.format(item.numbers[key]) for key, text in _NUMBERS.items() if key in item.numbers]
-    if math.isfinite(relative := relative_error(item)):
+    if math.isfinite(relative := item.relative_error):
         numbers.append(f"its standard error is {percent(relative)} of its value")
     words = "; ".join(reasons) or "these logs show only its sum with another parameter"
     return f"{words} ({', '.join(numbers)})" if numbers else words

@@ -12,14 +12,10 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import UsageError
-from cdtool.commands.identify.axis.rigid_axis import identify_rigid_axis
-from cdtool.commands.identify.estimate import Missing
 from cdtool.commands.identify.files import check_identification_files, write_identification
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from tests.command import cdtool as command
 from tests.data_folder import DATA, needs_data
-from tests.synthetic.gate_runs import GATE as PARAMETERS
-from tests.synthetic.gate_runs import free_runs
 
 ROOT = Path(__file__).parents[3]
 GATE = ROOT / "sample_logs" / "gate"
@@ -31,40 +27,24 @@ def identified() -> IdentifiedMachine:
     return cdtool.identify(LOGS, GATE / "machine.toml")
 
 
-def test_the_plan_of_the_gate_names_speeds_and_the_other_direction(identified: IdentifiedMachine) -> None:
-    (joint,) = identified.joints
-    plans = {plan.missing: plan for plan in joint.plan}
-    assert plans[Missing.SECOND_SPEED].directions == (1, -1)
-    assert all(0.05 < speed < 0.2 for speed in plans[Missing.SECOND_SPEED].speeds)
-    assert plans[Missing.REVERSALS].directions == (-1,)
-    assert plans[Missing.REVERSALS].travel == pytest.approx(1.43, rel=0.1)
-
-
-def test_a_drive_without_the_motors_inertia_has_it_in_the_plan_and_another_refusal_has_no_motion(
-    identified: IdentifiedMachine,
-) -> None:
-    (joint,) = identified.joints
-    runs = free_runs(PARAMETERS, 404, 3)
-    for motor_mass, wanted in ((0.0, [Missing.MOTOR_INERTIA]), (PARAMETERS.motor_mass, [])):
-        refused = replace(
-            joint, rigid=identify_rigid_axis(runs, motor_mass), two_mass=None, refused={"two_mass": "ends at a bound"}
-        )
-        plans = [plan for plan in refused.plan if "model.drive.stiffness" in plan.keys]
-        assert [plan.missing for plan in plans] == wanted
-
-
 def test_all_outputs_are_written_together(identified: IdentifiedMachine, tmp_path: Path) -> None:
     targets = [tmp_path / f"identified{suffix}" for suffix in (".toml", ".html", ".json")]
     write_identification(identified, targets)
     toml, page, values = (target.read_text(encoding="utf-8") for target in targets)
     assert toml == identified.text
     assert page.count("data:image/png;base64,") == 4
-    for words in ("Excitation plan", "Prediction of unseen runs", "machine.viscous_friction", "condition number"):
+    for words in (
+        "Not identifiable from these logs",
+        "Prediction of unseen runs",
+        "machine.viscous_friction",
+        "What the logged motion excites",
+    ):
         assert words in page
     assert "<script" not in page
     assert not re.search(r"(src|href)=\"(?!data:|#)", page)
     joint = json.loads(values)["joints"][0]
-    assert joint["plan"][0]["missing"] == "second_speed"
+    (viscous,) = [item for item in joint["not_identifiable"] if item["key"] == "viscous_friction"]
+    assert viscous["missing"] == ["second_speed"]
     assert joint["force_error_on_unseen_runs"]["error_of_worst_run"] > 0.0
     assert joint["excitation"]["speeds"] == pytest.approx([0.2], rel=0.05)
     # A report and a JSON may be rewritten, a machine file may not.
@@ -114,7 +94,7 @@ def test_a_machine_without_fits_has_a_page_too(identified: IdentifiedMachine, tm
     bare = replace(identified, joints=(replace(identified.joints[0], rigid=None, two_mass=None, controller=None),))
     write_identification(bare, [tmp_path / "page.html"])
     assert "data:image" not in (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert bare.summary["joints"][0]["plan"] == []
+    assert bare.summary["joints"][0]["not_identifiable"] == []
 
 
 def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_written(tmp_path: Path) -> None:
@@ -124,11 +104,11 @@ def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_writ
     assert done.status == 0
     assert "new: viscous and Coulomb friction" in done.out
     assert "old: the joint does not move" in done.out
-    assert "plan: 4 runs backward at " in done.out
+    assert "not identifiable: machine.constant_force: add runs in both directions" in done.out
     assert f"written: {tmp_path / 'arm.toml'} (machine file)" in done.out
     page = (tmp_path / "arm.html").read_text(encoding="utf-8")
     assert "Torque that is not explained" in page
-    assert "Logged motion of each joint" in page
+    assert "What the logged motion excites" in page
     assert page.count("data:image/png;base64,") == 2
     assert "forearm" in page
     assert (tmp_path / "arm.toml").exists()

@@ -1,65 +1,19 @@
-"""An excitation plan and the reasons in words, with the numbers of the logs."""
+"""The reasons in words, with the numbers of the logs."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
-from cdtool.commands.identify.axis.excitation import Excitation, PlannedMotion
 from cdtool.commands.identify.estimate import Identified, Missing, NotIdentifiable
-from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction
-from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence
-from cdtool.commands.identify.robot.robot_excitation import JointDemand, JointMotion, PlannedRobotMotion
 from cdtool.commands.identify.words import (
     listed_numbers,
     words_of_base_set,
     words_of_decision,
-    words_of_joint_plan,
-    words_of_plan,
     words_of_reason,
-    words_of_robot_plan,
 )
-
-EXCITATION = Excitation((0.25,), 1.0, 0.26, 0.08, 0.003, 14.0, 70.0, 10, 0, 0.3)
-RUNS = PlannedMotion(Missing.SECOND_SPEED, ("machine.viscous_friction",), 4, (0.06, 0.1), (0.25,), (1, -1), travel=1.4)
-
-
-@pytest.mark.parametrize(
-    ("plan", "words"),
-    [
-        (RUNS, "4 runs in each direction at 0.06 and 0.1 m/s each, beside those at 0.25 m/s, over 1.4 m"),
-        (
-            replace(RUNS, missing=Missing.REVERSALS, speeds=(0.25,), directions=(-1,)),
-            "4 runs backward at 0.25 m/s, over 1.4 m",
-        ),
-        (
-            PlannedMotion(
-                Missing.ACCELERATION, ("machine.load_mass",), 4, (0.25,), (0.25,), (1,), 0.6, logged_acceleration=0.3
-            ),
-            "4 runs forward at 0.25 m/s, with an acceleration of at least 0.6 m/s² (logged: 0.3)",
-        ),
-        (
-            PlannedMotion(
-                Missing.START_UP, ("model.drive.stiffness",), 4, (0.25,), (0.25,), (1,), rest=0.3, motion=2.0
-            ),
-            "4 runs forward at 0.25 m/s, from a rest of at least 0.3 s and until 2 s later",
-        ),
-        (
-            PlannedMotion(Missing.MORE_RECORDINGS, ("model.friction.static",), 18, (0.25,), (0.25,), (1,)),
-            "18 more runs forward at 0.25 m/s",
-        ),
-        (
-            PlannedMotion(Missing.HIGHER_RATE, ("model.drive.stiffness",), rate=1000.0),
-            "logs with at least 1000 samples per second",
-        ),
-        (PlannedMotion(Missing.MOTOR_INERTIA, ("model.drive.stiffness",)), "the motor inertia from its data sheet"),
-    ],
-)
-def test_a_plan_states_its_numbers(plan: PlannedMotion, words: str) -> None:
-    assert words_of_plan(plan, "m") == words
 
 
 @pytest.mark.parametrize(
@@ -111,19 +65,6 @@ def test_a_decision_states_why_the_old_friction_stays(answer: FrictionAnswer, wo
     before = math.nan if answer is FrictionAnswer.NOT_MOVED else 4.0
     form = FrictionForm.FRICTION_ALONE if answer is FrictionAnswer.NEW else FrictionForm.PREVIOUS
     errors = {FrictionForm.FRICTION_ALONE: 3.0, FrictionForm.PREVIOUS: before}
-    friction = JointFriction(0, form, Identified(()), (), errors, 30.0)
+    friction = JointFriction(0, form, FrictionForm.FRICTION_ALONE, Identified(()), (), errors, 30.0)
     assert friction.answer is answer
     assert words_of_decision(friction) == words
-
-
-def test_the_plan_of_a_robot_has_its_numbers() -> None:
-    plan = PlannedRobotMotion((JointDemand(0, 2.0, 0.56, 0.32, 0.56), JointDemand(1, 3.0, 1.0, 3.0, 1.0)), 23.0, 4.9)
-    units = {"elbow": ("kg m2", "N m", "rad", "N m s/rad"), "lift": ("kg", "N", "m", "N s/m")}
-    motion = RobotJointEvidence(JointMotion(0, EXCITATION, 0.5, 1.25))
-    joints = [JointIdentification(name, units=unit, evidence=motion) for name, unit in units.items()]
-    assert words_of_robot_plan(plan, joints) == (
-        "23 s of all joints at once, each at its own frequencies (logged: 4.9 s): "
-        "elbow over 2 rad at up to 0.56 rad/s (logged: 0.32 rad, 0.56 rad/s); lift over 3 m at up to 1 m/s (as logged)"
-    )
-    other = PlannedMotion(Missing.OTHER_MOTION, ("machine.constant_force",))
-    assert words_of_joint_plan(other, joints[0]).endswith("(logged: 0.75 rad, up to 0.26 rad/s)")

@@ -145,15 +145,14 @@ def _convolved(signal: FloatArray, weights: FloatArray) -> FloatArray:
 
 def shifted(signal: FloatArray, samples: float) -> FloatArray:
     """Return the signal (n,) that many samples, or parts of one, earlier; NaN where it is not known."""
-    before = math.floor(samples)
-    share = samples - before
-    index = np.arange(len(signal)) + before
-    first = np.where((index >= 0) & (index < len(signal)), signal[np.clip(index, 0, len(signal) - 1)], np.nan)
-    if share == 0.0:
-        return np.asarray(first, dtype=np.float64)
-    index += 1
-    after = np.where((index >= 0) & (index < len(signal)), signal[np.clip(index, 0, len(signal) - 1)], np.nan)
-    return np.asarray((1.0 - share) * first + share * after, dtype=np.float64)
+    index = np.arange(len(signal), dtype=np.float64)
+    return np.asarray(np.interp(index + samples, index, signal, left=np.nan, right=np.nan))
+
+
+def known_sections(known: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first sample and end of each uninterrupted section of known samples (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def white_noise(signal: FloatArray) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
+from cdtool.commands.identify.axis.filtered_regression import known_sections
 from cdtool.machines.axis_model.axis_run import AxisRun
 
 # The median of the magnitude of normal noise over its standard deviation.
@@ -41,11 +42,10 @@ def _of_run(run: AxisRun, is_command: bool, lag: float) -> float:
         return _largest(np.diff(values)) / run.period
     shortest = max(_FEWEST_SAMPLES, round(_LAGS * lag / run.period) if math.isfinite(lag) else 0)
     known = np.isfinite(values)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
     # A long window has little noise, a short one sees a short rise: each is a bound, and the highest counts.
     slopes = [
         _rise(values[a:b], window) / (window * run.period)
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
+        for a, b in known_sections(known)
         for window in (shortest * factor for factor in _WINDOWS)
         if b - a > 3 * window
     ]

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,14 +47,12 @@ from cdtool.machines.axis_model.axis_run import AxisRun
 class RigidAxisSettings:
     """How a rigid axis is identified.
 
-    `low_pass_hz`: corner of the low-pass of every term. `method`: LEAST_SQUARES or INSTRUMENTAL_VARIABLES; None is the
-    latter if every run has a reference, or if the acceleration is noisy. Without references the instruments are the
-    measured signals, delayed. `units`: of inertia, force and travel. `torque_filter_time` [s]: of the low-pass through
-    which the torque was logged, 0 for none; None if it is not known: a lag that the runs show is then undone.
+    `low_pass_hz`: corner of the low-pass of every term. `units`: of inertia, force and travel. `torque_filter_time`
+    [s]: of the low-pass through which the torque was logged, 0 for none; None if it is not known: a lag that the runs
+    show is then undone.
     """
 
     low_pass_hz: float = 20.0
-    method: Method | None = None
     units: tuple[str, str, str] = ("kg", "N", "m")
     torque_filter_time: float | None = None
     #: Fewer equations identify nothing.
@@ -118,6 +118,12 @@ class CrossValidation:
     def left_over(self) -> float:
         """Return the error over the floor; NaN without a floor."""
         return self.error / self.floor if self.floor > 0.0 else math.nan
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return the errors as JSON values."""
+        worst = {"worst_run": self.worst.run, "error_of_worst_run": self.worst.error, "of_runs": self.worst.of_runs}
+        return {"error": self.error, "floor": self.floor, "repeats": self.repeats, **worst}
 
 
 @dataclass(frozen=True)
@@ -271,7 +277,6 @@ class _Equations:
     direction: FloatArray
     filtered: Sequence[FilteredRun]
     rows: Sequence[IntArray]
-    is_forced: bool
 
     @property
     def block(self) -> IntArray:
@@ -295,14 +300,14 @@ def _is_noisy(excitation: Excitation, settings: RigidAxisSettings) -> bool:
 def _instruments(
     filtered: Sequence[FilteredRun], excitation: Excitation, settings: RigidAxisSettings
 ) -> list[FloatArray] | None:
-    """Return the instruments of each run (n, 4): of the reference, or the delayed columns; None for least squares."""
+    """Return the instruments of each run (n, 4): of its reference, if every run has one, else none for least squares.
+
+    A noisy acceleration needs some: then they are the measured signals, delayed.
+    """
     given = [run.instruments for run in filtered if run.instruments is not None]
-    if settings.method is Method.LEAST_SQUARES:
-        return None
     if len(given) == len(filtered):
         return given
-    is_wanted = settings.method is Method.INSTRUMENTAL_VARIABLES or _is_noisy(excitation, settings)
-    return [_delayed(run) for run in filtered] if is_wanted else None
+    return [_delayed(run) for run in filtered] if _is_noisy(excitation, settings) else None
 
 
 def _delayed(run: FilteredRun) -> FloatArray:
@@ -341,7 +346,6 @@ def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings
         np.sign(gather([run.inner_speed for run in filtered])),
         filtered,
         rows,
-        settings.method is Method.INSTRUMENTAL_VARIABLES,
     )
 
 
@@ -432,11 +436,8 @@ def _solution(equations: _Equations, chosen: Sequence[int]) -> _AxisSolution:
     """Fit by instrumental variables; if the references do not move as the axis does, by least squares."""
     columns, fit = list(chosen), None
     if equations.instruments is not None:
-        try:
+        with suppress(IdentificationError):
             fit = fit_linear(equations.regressors[:, columns], equations.force, equations.instruments[:, columns])
-        except IdentificationError:
-            if equations.is_forced:
-                raise
     method = Method.LEAST_SQUARES if fit is None else Method.INSTRUMENTAL_VARIABLES
     fit = fit or fit_linear(equations.regressors[:, columns], equations.force)
     everything = np.ones(len(equations.force), dtype=np.bool_)
@@ -478,8 +479,7 @@ def _answers(
 ) -> list[Estimate | NotIdentifiable]:
     answers = [
         _load_mass(solution, excitation, motor_mass, settings),
-        _viscous(solution, excitation, settings),
-        *_coulomb(solution, excitation, settings),
+        *_frictions(solution, excitation, settings),
     ]
     if lag.is_found:
         time, error = lag.lag.time, settings.lag_form * lag.lag.time
@@ -523,50 +523,39 @@ def _speed_numbers(solution: _AxisSolution, excitation: Excitation) -> dict[str,
     return numbers
 
 
-def _viscous(
+def _frictions(
     solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
-) -> Estimate | NotIdentifiable:
-    numbers = _speed_numbers(solution, excitation)
-    if "viscous" not in solution.names:
-        return NotIdentifiable("machine", "viscous_friction", (Missing.SECOND_SPEED,), numbers)
-    value, error = solution.value(viscous=1.0)
-    _, force, travel = settings.units
-    if _is_certain(value, error, settings.largest_viscous_error):
-        return Estimate("machine", "viscous_friction", value, error, f"{force} s/{travel}", solution.method)
-    numbers |= {"value": value, "standard_error": error}
-    return NotIdentifiable("machine", "viscous_friction", (Missing.MORE_RECORDINGS,), numbers)
+) -> list[Estimate | NotIdentifiable]:
+    numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
+    speeds = () if "viscous" in solution.names else (Missing.SECOND_SPEED,)
+    reversals = (Missing.REVERSALS,) if excitation.is_one_way else ()
+    force, unit = settings.units[1], f"{settings.units[1]} s/{settings.units[2]}"
+    answers: list[Estimate | NotIdentifiable] = []
+    for section, key, shares in _FRICTIONS:
+        value, error = solution.value(**shares)
+        if key == "viscous_friction":
+            missing, most, is_possible = speeds, settings.largest_viscous_error, value > 0.0
+        elif key == "constant_force":
+            missing, most, is_possible = reversals, math.inf, math.isfinite(error)
+        else:
+            missing, most, is_possible = (*speeds, *reversals), settings.largest_coulomb_error, value > 0.0
+        if not missing and is_possible and error <= most * abs(value):
+            answers.append(
+                Estimate(section, key, value, error, unit if key == "viscous_friction" else force, solution.method)
+            )
+            continue
+        uncertain = {} if missing else {"value": value, "standard_error": error}
+        answers.append(NotIdentifiable(section, key, missing or (Missing.MORE_RECORDINGS,), numbers | uncertain))
+    return answers
 
 
-_COULOMB_KEYS = (
+_FRICTIONS = (
+    ("machine", "viscous_friction", {"viscous": 1.0}),
     ("machine", "coulomb_friction", {"coulomb": 1.0}),
     ("model.friction", "coulomb_forward", {"coulomb": 1.0, "constant": 1.0}),
     ("model.friction", "coulomb_backward", {"coulomb": 1.0, "constant": -1.0}),
+    ("machine", "constant_force", {"constant": 1.0}),
 )
-
-
-def _coulomb(
-    solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
-) -> list[Estimate | NotIdentifiable]:
-    missing = [Missing.SECOND_SPEED] if "viscous" not in solution.names else []
-    missing += [Missing.REVERSALS] if excitation.is_one_way else []
-    numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
-    force = settings.units[1]
-    answers: list[Estimate | NotIdentifiable] = []
-    for section, key, shares in _COULOMB_KEYS:
-        value, error = solution.value(**shares)
-        if not missing and _is_certain(value, error, settings.largest_coulomb_error):
-            answers.append(Estimate(section, key, value, error, force, solution.method))
-            continue
-        uncertain = {} if missing else {"value": value, "standard_error": error}
-        needed = tuple(missing) or (Missing.MORE_RECORDINGS,)
-        answers.append(NotIdentifiable(section, key, needed, numbers | uncertain))
-    value, error = solution.value(constant=1.0)
-    if excitation.is_one_way or not math.isfinite(error):
-        needed = (Missing.REVERSALS,) if excitation.is_one_way else (Missing.MORE_RECORDINGS,)
-        answers.append(NotIdentifiable("machine", "constant_force", needed, numbers))
-    else:
-        answers.append(Estimate("machine", "constant_force", value, error, force, solution.method))
-    return answers
 
 
 def _position_curves(equations: _Equations, residual: FloatArray) -> dict[int, FrictionCurve]:

@@ -2,7 +2,7 @@
 
 The controller is simulated with the logged references and speeds, and its force compared with the logged one (output
 error). The loop through the machine stays open in this: noise of the force sensor does not bias the gains. A structure
-with more (a limit, a delay, an offset of the error, another source of the error) is taken if it explains more by one
+with more (a limit, a delay, another source of the error) is taken if it explains more by one
 criterion, see `_is_better`.
 
 Where the command is not logged, the measured force is compared, through a first-order lag that is fitted too.
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.commands.identify.axis.filtered_regression import known_sections
 from cdtool.commands.identify.axis.observed_slope import observed_slope
 from cdtool.commands.identify.axis.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.commands.identify.estimate import (
@@ -45,7 +46,6 @@ _DEFAULTS = {
     "force_limit": math.inf,
     "speed_filter_hz": math.inf,
     "speed_filter_order": 0.0,
-    "error_offset": 0.0,
     "lag": 0.0,
     "delay_samples": 0.0,
     "substeps": 1.0,
@@ -356,51 +356,32 @@ def _scale(sections: _Sections, model: _Model, name: str) -> float:
     if name == "integral_gain":
         return max(value, abs(model.values["speed_gain"]))
     defaults = {"position_gain": 10.0, "anti_windup_rate": 10.0, "lag": 10.0 * sections.period}
-    if name == "error_offset":
-        return max(1e-3 * float(np.ptp(sections.inputs[2])), 1e-9)
     return max(value, defaults.get(name, 1e-9))
 
 
 def _lowest(name: str, period: float) -> float:
     # At 0 neither a lag nor a corner has an effect that shows which way to go.
     bounds = {"lag": _LEAST_LAG * period, "speed_filter_hz": 1e-3 / period}
-    return -math.inf if name in (*_GAINS, "error_offset") else bounds.get(name, 0.0)
+    return -math.inf if name in _GAINS else bounds.get(name, 0.0)
 
 
 def _highest(name: str, period: float) -> float:
     return {"speed_filter_hz": 1.0 / period, "lag": _LONGEST_LAG}.get(name, math.inf)
 
 
-@dataclass(frozen=True)
-class _Uncertainty:
-    """Standard errors of a fit's free parameters (free,).
+def _standard_errors(fit: _Fit, is_command: bool) -> FloatArray:
+    """Return the standard errors of a fit's free parameters (free,), to a command or to a measured torque.
 
-    `statistical`: the larger of two: from the residual's autocorrelation, and from the scatter between blocks.
-    `systematic`: the larger of two: how far the part of the residual that no noise explains could move the parameter,
-    and by how much other weightings of the residual move it. A wrong structure, or noise in the logged speed, acts
-    differently on slow and fast, accelerated and settled samples.
+    The statistical part is the larger of two: from the residual's autocorrelation, and from the scatter between blocks.
+    The systematic one is the larger of two: how far the part of the residual that no noise explains could move the
+    parameter, and by how much other weightings of the residual move it. A wrong structure, or noise in the logged
+    speed, acts differently on slow and fast, accelerated and settled samples.
     """
-
-    statistical: FloatArray
-    systematic: FloatArray
-
-    @property
-    def total(self) -> FloatArray:
-        return np.hypot(self.statistical, self.systematic)
-
-    def and_moved(self, distance: FloatArray) -> _Uncertainty:
-        """Return the errors with how far another assumption moves the parameters (free,)."""
-        return replace(self, systematic=np.hypot(self.systematic, distance))
-
-
-def _uncertainty(fit: _Fit, is_command: bool) -> _Uncertainty:
-    """Return the standard errors of a fit to a command, which is a digital value, or to a measured torque."""
     scale = np.sqrt(np.maximum(np.sum(fit.jacobian**2, axis=0), 1e-300))
     jacobian = fit.jacobian / scale
     information = jacobian.T @ jacobian
     if np.linalg.cond(information) > 1e12:
-        unknown = np.full(len(scale), math.inf)
-        return _Uncertainty(unknown, np.zeros(len(scale)))
+        return np.full(len(scale), math.inf)
     inverse = np.linalg.inv(information)
     blocks = _blocks(fit.sections)
     influence = np.add.reduceat(jacobian * fit.residual[:, np.newaxis], blocks, axis=0) @ inverse
@@ -416,7 +397,7 @@ def _uncertainty(fit: _Fit, is_command: bool) -> _Uncertainty:
         moved = np.abs(np.sum(other_influence, axis=0))
         scatter = np.sqrt(degrees * np.sum((other_influence - influence) ** 2, axis=0))
         systematic = np.maximum(systematic, np.where(moved > _SIGNIFICANT * scatter, moved, 0.0))
-    return _Uncertainty(statistical / scale, systematic / scale)
+    return np.asarray(np.hypot(statistical, systematic) / scale)
 
 
 def _model_error(fit: _Fit, is_command: bool) -> float:
@@ -606,8 +587,7 @@ def _known_differences(known: BoolArray) -> BoolArray:
 def _cut(known: BoolArray, rows: Sequence[FloatArray], fewest: int) -> list[FloatArray]:
     """Return the uninterrupted known sections of the rows, each (rows, samples), that are long enough."""
     stacked = np.vstack(rows)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
-    return [stacked[:, a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= fewest]
+    return [stacked[:, a:b] for a, b in known_sections(known) if b - a >= fewest]
 
 
 def _values(run: AxisRun, channel: str, used: bool = True) -> FloatArray:
@@ -639,40 +619,27 @@ def _quantum(values: FloatArray) -> float:
     return float(np.min(steps, initial=math.inf)) if len(steps) else 0.0
 
 
-@dataclass(frozen=True)
-class _Search:
-    """A fit on part of the runs, and its source of errors and outputs."""
-
-    source: _Source
-    fit: _Fit
-
-    @property
-    def needs_no_other(self) -> bool:
-        """Whether no other source of the error can explain much more: what is left is noise of the torque."""
-        is_noise = not self.source.is_command and _model_error(self.fit, False) == 0.0
-        return self.fit.explains_all or (is_noise and self.fit.unexplained < ControllerSettings.most_unexplained)
-
-
-def _search(runs: Sequence[AxisRun], settings: ControllerSettings) -> _Search | None:
-    """Return the structure that explains the output best; None without sections in which all is known."""
-    found: _Search | None = None
+def _search(runs: Sequence[AxisRun], settings: ControllerSettings) -> tuple[_Source, _Fit] | None:
+    """Return the source and the structure, on part of the runs, that explain the output best; None without sections."""
+    found: tuple[_Source, _Fit] | None = None
     for source in _sources(runs):
         sections = _sections_of(runs, source, settings)
         if sections is None:
             continue
         sections = sections.part(settings.compared_samples)
-        fits = [_first_fit(sections, _starting_model(sections, source, order), source) for order in source.orders]
+        fits = [_OutputError(sections, _starting_model(sections, source, n)).fit(_CHOSEN) for n in source.orders]
         fit = _improved(min(fits, key=lambda fit: fit.cost), source, settings)
-        if found is None or fit.residual_rms**2 < _share_needed(source, found.source) * found.fit.residual_rms**2:
-            found = _Search(source, fit)
-        if found.needs_no_other:
+        if found is not None:
+            # A less plausible source must explain much more.
+            share = 1.0 if source.from_position == found[0].from_position else _OTHER_SOURCE_SHARE
+            if fit.residual_rms**2 >= share * found[1].residual_rms ** 2:
+                continue
+        found = source, fit
+        # What is left is noise of the torque, which no other source explains.
+        is_noise = not source.is_command and _model_error(fit, False) == 0.0
+        if fit.explains_all or (is_noise and fit.unexplained < settings.most_unexplained):
             break
     return found
-
-
-def _share_needed(source: _Source, before: _Source) -> float:
-    """Return the cost ratio below which a less plausible source is preferred."""
-    return 1.0 if source.from_position == before.from_position else _OTHER_SOURCE_SHARE
 
 
 def _starting_model(sections: _Sections, source: _Source, order: int) -> _Model:
@@ -701,23 +668,8 @@ def _starting_model(sections: _Sections, source: _Source, order: int) -> _Model:
     return _Model(values, tuple(free))
 
 
-def _first_fit(sections: _Sections, model: _Model, source: _Source) -> _Fit:
-    """Return the fit without limits, or with those that plateaus of a command show if they explain more."""
-    fit = _OutputError(sections, model).fit(_CHOSEN)
-    change: FloatArray = np.abs(np.diff(sections.output))
-    change[sections.starts[1:-1] - 1] = 0.0
-    slew, force = _plateau(change), _plateau(np.abs(sections.output))
-    limits = {"slew_limit": slew / sections.period} if slew is not None else {}
-    limits |= {"force_limit": force} if force is not None else {}
-    if not (source.is_command and limits):
-        return fit
-    limited = model.with_values({**limits, "anti_windup_rate": _FIRST_ANTI_WINDUP}, (*limits, "anti_windup_rate"))
-    other = _OutputError(sections, limited).fit(_CHOSEN)
-    return other if _is_better(other, fit) else fit
-
-
 def _improved(fit: _Fit, source: _Source, settings: ControllerSettings) -> _Fit:
-    """Return the fit with what explains most, one after another: another delay, limits, an offset of the error."""
+    """Return the fit with what explains most, one after another: another delay, limits."""
     while not fit.is_exact:
         trials = [_OutputError(fit.sections, model).fit(_TRIAL, 1e-4) for model in _more(fit, source, settings)]
         trials = [trial for trial in trials if not (source.is_command and _exceeds_its_limit(trial))]
@@ -745,8 +697,6 @@ def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[
         # In a measured torque, which lags, a delay shows from sample to sample only.
         if delay != present and (source.is_command or abs(delay - present) <= 1.0):
             yield model.with_values({**filtered, "delay_samples": float(delay)})
-    if "error_offset" not in model.free:  # as a bias of the logged speed has it
-        yield model.with_values({}, ("error_offset",))
 
 
 def _exceeds_its_limit(fit: _Fit) -> bool:
@@ -755,8 +705,14 @@ def _exceeds_its_limit(fit: _Fit) -> bool:
 
 
 def _slew_candidates(fit: _Fit, source: _Source) -> list[float]:
-    """Return slew limits to try [N/s]: high quantiles of the slope over several samples, so that noise is less."""
+    """Return slew limits to try [N/s]: a plateau of a command, else high quantiles of the slope."""
     sections = fit.sections
+    if source.is_command:
+        change: FloatArray = np.abs(np.diff(sections.output))
+        change[sections.starts[1:-1] - 1] = 0.0
+        plateau = _plateau(change)
+        if plateau is not None:
+            return [plateau / sections.period]
     lags = min(fit.model.values["lag"] / sections.period, _LONGEST_FIRST_LAG)
     window = 4 if source.is_command else max(4, round(3.0 * lags))
     if window >= len(sections) // 4:
@@ -766,9 +722,11 @@ def _slew_candidates(fit: _Fit, source: _Source) -> list[float]:
     return [float(value) for value in np.quantile(slope, (0.8, 0.95, 0.99)) if value > 0.0]
 
 
-def _force_candidates(fit: _Fit, _: _Source) -> list[float]:
-    """Return a force limit to try [N]: that above which only noise is."""
-    largest = float(np.quantile(np.abs(fit.sections.output), 0.995))
+def _force_candidates(fit: _Fit, source: _Source) -> list[float]:
+    """Return a force limit to try [N]: a plateau of a command, else that above which only noise is."""
+    size = np.abs(fit.sections.output)
+    plateau = _plateau(size) if source.is_command else None
+    largest = float(np.quantile(size, 0.995)) if plateau is None else plateau
     return [largest] if largest > 0.0 else []
 
 
@@ -830,20 +788,20 @@ def identify_controller(runs: Sequence[AxisRun], settings: ControllerSettings | 
             "no section of the logs has torque, speed and a reference: gains show only in the answer to one",
             "log the speed reference, or the position reference and the position",
         )
-    source = search.source
+    source, fit = search
     sections = _sections_of(runs, source, settings)
     assert sections is not None
-    fit = _OutputError(sections.part(settings.most_samples), search.fit.model).fit(_LAST, 1e-12)
-    fit, uncertainty = _without_zeros(fit, source.is_command)
-    fit, uncertainty = _with_unknown_rate(fit, uncertainty, source.is_command)
+    fit = _OutputError(sections.part(settings.most_samples), fit.model).fit(_LAST, 1e-12)
+    fit, errors = _without_zeros(fit, source.is_command)
+    fit, errors = _with_unknown_rate(fit, errors, source.is_command)
     if not (source.is_command or source.from_position):
-        uncertainty = _with_noisy_speed(fit, uncertainty)
-    if fit.model.values["speed_gain"] < -_SIGNIFICANT * uncertainty.total[fit.model.free.index("speed_gain")]:
+        errors = np.hypot(errors, _moved_by_noise(fit))
+    if fit.model.values["speed_gain"] < -_SIGNIFICANT * errors[fit.model.free.index("speed_gain")]:
         raise IdentificationError(
             f"{runs[0].name}: the controller's output falls where the speed error rises",
             "check the signs (scale) of torque, speed and references in [channels]",
         )
-    return _reported(runs, source, fit, uncertainty, settings)
+    return _reported(runs, source, fit, errors, settings)
 
 
 def _check(runs: Sequence[AxisRun], settings: ControllerSettings) -> None:
@@ -857,43 +815,40 @@ def _check(runs: Sequence[AxisRun], settings: ControllerSettings) -> None:
         )
 
 
-def _without_zeros(fit: _Fit, is_command: bool) -> tuple[_Fit, _Uncertainty]:
-    """Return the fit without the gains that are compatible with zero and a lag of nothing, and its uncertainty."""
+def _without_zeros(fit: _Fit, is_command: bool) -> tuple[_Fit, FloatArray]:
+    """Return the fit without the gains that are compatible with zero and a lag of nothing, and its errors."""
     if fit.model.values["lag"] < 1.01 * _LEAST_LAG * fit.sections.period and "lag" in fit.model.free:
         fit = _OutputError(fit.sections, fit.model.without("lag")).fit(_LAST, 1e-12)
-    uncertainty = _uncertainty(fit, is_command)
-    for name in ("error_offset", "position_gain", "integral_gain"):
-        if name not in fit.model.free:
-            continue
-        value = fit.model.values[name]
-        if abs(value) > _SIGNIFICANT * uncertainty.total[fit.model.free.index(name)]:
-            continue
-        fit = _OutputError(fit.sections, fit.model.without(name)).fit(_LAST, 1e-12)
-        uncertainty = _uncertainty(fit, is_command)
-    return fit, uncertainty
+    errors = _standard_errors(fit, is_command)
+    for name in ("position_gain", "integral_gain"):
+        free, value = fit.model.free, abs(fit.model.values[name])
+        if name in free and not value > _SIGNIFICANT * errors[free.index(name)]:
+            fit = _OutputError(fit.sections, fit.model.without(name)).fit(_LAST, 1e-12)
+            errors = _standard_errors(fit, is_command)
+    return fit, errors
 
 
-def _with_unknown_rate(fit: _Fit, uncertainty: _Uncertainty, is_command: bool) -> tuple[_Fit, _Uncertainty]:
-    """Return the better fit of two, a controller as fast as the log and a faster one, with their difference.
+def _with_unknown_rate(fit: _Fit, errors: FloatArray, is_command: bool) -> tuple[_Fit, FloatArray]:
+    """Return the better fit of two, a controller as fast as the log and a faster one, errors with their difference.
 
     The difference is a systematic error where the data does not decide. Where it decides for the faster one, its true
     rate remains unknown.
     """
     if fit.is_exact:
-        return fit, uncertainty
+        return fit, errors
     faster = _OutputError(fit.sections, fit.model.with_values({"substeps": _SUBSTEPS})).fit(_LAST, 1e-9)
     moved = _distance(fit, faster)
     if fit.cost < _OTHER_SOURCE_SHARE * faster.cost:
-        return fit, uncertainty
+        return fit, errors
     if faster.cost < fit.cost:
         decided = faster.cost < _OTHER_SOURCE_SHARE * fit.cost
-        fit, uncertainty = faster, _uncertainty(faster, is_command)
+        fit, errors = faster, _standard_errors(faster, is_command)
         moved = moved / _SUBSTEPS if decided else moved
-    return fit, uncertainty.and_moved(moved)
+    return fit, np.hypot(errors, moved)
 
 
-def _with_noisy_speed(fit: _Fit, uncertainty: _Uncertainty) -> _Uncertainty:
-    """Return the uncertainty with what noise of the logged speed may have done, which the controller never saw.
+def _moved_by_noise(fit: _Fit) -> FloatArray:
+    """Return how far noise of the logged speed may have moved the parameters (free,), which the controller never saw.
 
     As much noise again moves the parameters about as far (Cook and Stefanski's simulation extrapolation). Its level is
     that of white noise with the fourth differences of the logged speed, so at least what it is.
@@ -902,12 +857,10 @@ def _with_noisy_speed(fit: _Fit, uncertainty: _Uncertainty) -> _Uncertainty:
     fourth = np.diff(sections.inputs[2], 4)
     # Median, as at the edges of sections the differences are large; 70 is the sum of the squared weights.
     deviation = float(np.median(np.abs(fourth))) / (0.6745 * math.sqrt(70.0))
-    if deviation <= 0.0:
-        return uncertainty
     inputs = sections.inputs.copy()
     inputs[2] += deviation * np.random.default_rng(0).standard_normal(len(sections))
     noisier = _OutputError(replace(sections, inputs=inputs), fit.model).fit(_LAST, 1e-9)
-    return uncertainty.and_moved(_distance(fit, noisier))
+    return _distance(fit, noisier)
 
 
 def _distance(fit: _Fit, other: _Fit) -> FloatArray:
@@ -924,12 +877,13 @@ class _Measured:
 
 
 def _reported(
-    runs: Sequence[AxisRun], source: _Source, fit: _Fit, uncertainty: _Uncertainty, settings: ControllerSettings
+    runs: Sequence[AxisRun], source: _Source, fit: _Fit, errors: FloatArray, settings: ControllerSettings
 ) -> ControllerFit:
     """Return a fit's parameters as estimates, or as not identifiable with what is missing."""
     model, period = fit.model, fit.sections.period
-    errors = dict(zip(model.free, uncertainty.total.tolist(), strict=True))
-    fitted = {name: _Measured(model.values[name], errors[name]) for name in model.free}
+    fitted = {
+        name: _Measured(model.values[name], error) for name, error in zip(model.free, errors.tolist(), strict=True)
+    }
     speed_filter, order = fitted.get("speed_filter_hz"), int(model.values["speed_filter_order"])
     # A logged speed that is later than the controller's went through other filters.
     if not source.from_position:
@@ -1065,15 +1019,13 @@ def _speed_filter(runs: Sequence[AxisRun], settings: ControllerSettings) -> tupl
             known, nothing = _known_differences(run.known("speed", "position")), np.zeros(len(run))
             rows = (nothing, nothing, -_rate(run, _values(run, "position")), _values(run, "speed"), nothing)
             pieces += _cut(known, rows, settings.fewest_samples)
-    if not pieces:
-        return None, 0
-    sections = _joined(pieces, runs, settings).part(settings.compared_samples)
-    values = {**_DEFAULTS, "speed_gain": 1.0, "speed_filter_hz": _FIRST_CORNER / sections.period}
+    first = _FIRST_CORNER / float(np.mean([run.period for run in runs]))
+    values = {**_DEFAULTS, "speed_gain": 1.0, "speed_filter_hz": first}
     models = [_Model({**values, "speed_filter_order": order}, ("speed_filter_hz",)) for order in (1.0, 2.0)]
-    fit = min((_OutputError(sections, model).fit(_LAST, 1e-12) for model in models), key=lambda fit: fit.cost)
-    if fit.unexplained > settings.unexplained_speed:
+    fit = _transfer(pieces, runs, models, settings.unexplained_speed, settings)
+    if fit is None:
         return None, 0
-    corner = _Measured(fit.model.values["speed_filter_hz"], float(_uncertainty(fit, True).total[0]))
+    corner = _Measured(fit.model.values["speed_filter_hz"], float(_standard_errors(fit, True)[0]))
     return corner, int(fit.model.values["speed_filter_order"])
 
 
@@ -1084,11 +1036,24 @@ def _force_lag(runs: Sequence[AxisRun], settings: ControllerSettings) -> _Measur
         command, nothing = _values(run, "reference_torque"), np.zeros(len(run))
         rows = (command, nothing, nothing, run.torque, command)
         pieces += _cut(run.known("torque", "reference_torque"), rows, settings.fewest_samples)
+    first = 5.0 * float(np.mean([run.period for run in runs]))
+    model = _Model({**_DEFAULTS, "speed_gain": 1.0, "lag": first}, ("speed_gain", "lag"))
+    fit = _transfer(pieces, runs, [model], settings.most_unexplained, settings)
+    if fit is None:
+        return _Measured(math.nan, math.nan)
+    return _Measured(fit.model.values["lag"], float(_standard_errors(fit, False)[1]))
+
+
+def _transfer(
+    pieces: Sequence[FloatArray],
+    runs: Sequence[AxisRun],
+    models: Sequence[_Model],
+    most: float,
+    settings: ControllerSettings,
+) -> _Fit | None:
+    """Return the best fit of a filter between two channels; None if it leaves more than a share of the output."""
     if not pieces:
-        return _Measured(math.nan, math.nan)
+        return None
     sections = _joined(pieces, runs, settings).part(settings.compared_samples)
-    values = {**_DEFAULTS, "speed_gain": 1.0, "lag": 5.0 * sections.period}
-    fit = _OutputError(sections, _Model(values, ("speed_gain", "lag"))).fit(_LAST)
-    if fit.unexplained >= settings.most_unexplained:
-        return _Measured(math.nan, math.nan)
-    return _Measured(fit.model.values["lag"], float(_uncertainty(fit, False).total[1]))
+    fit = min((_OutputError(sections, model).fit(_LAST, 1e-12) for model in models), key=lambda fit: fit.cost)
+    return fit if fit.unexplained <= most else None

@@ -3,7 +3,7 @@
 Per period h, with the raw speed v_raw (logged, or the position's difference)::
 
     v     = LP(LP(v_raw))                      order 0, 1 or 2, held-input low-passes
-    e     = v_ref + position_gain (x_ref - x) - v + error_offset
+    e     = v_ref + position_gain (x_ref - x) - v
     w     = speed_gain e + I
     u    += clip(w - u, +-slew_limit h), then clipped to +-force_limit
     I    += (integral_gain e + anti_windup_rate (u - w)) h
@@ -27,7 +27,7 @@ Indices = npt.NDArray[np.int64]
 # fmt: off
 PARAMETER_ORDER = (
     "period", "speed_gain", "integral_gain", "position_gain", "anti_windup_rate", "slew_limit", "force_limit",
-    "speed_filter_hz", "speed_filter_order", "error_offset", "lag", "delay_samples", "substeps",
+    "speed_filter_hz", "speed_filter_order", "lag", "delay_samples", "substeps",
 )
 # fmt: on
 """The numbers that the kernel unpacks."""
@@ -37,7 +37,7 @@ INPUTS = ("reference_speed", "position_error", "raw_speed")
 
 
 @kernel(
-    "void(UniTuple(float64, 13), int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1])",
+    "void(UniTuple(float64, 12), int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1])",
 )
 def simulate_controller(
     parameters: tuple[float, ...], starts: Indices, integrals: Array, commands: Array, inputs: Array, output: Array
@@ -59,7 +59,6 @@ def simulate_controller(
         force_limit,
         speed_filter_hz,
         speed_filter_order,
-        error_offset,
         lag,
         delay_samples,
         substeps,
@@ -91,7 +90,7 @@ def simulate_controller(
                 measured_speed = speed_keep * measured_speed + (1.0 - speed_keep) * once_filtered
             else:
                 measured_speed = once_filtered
-            error = inputs[0, source] + position_gain * inputs[1, source] - measured_speed + error_offset
+            error = inputs[0, source] + position_gain * inputs[1, source] - measured_speed
             if sample == first:
                 error_before = error
                 command = speed_gain * error + integral

@@ -130,11 +130,9 @@ def _channels(run: AxisRun, part: slice, rest: int) -> dict[str, FloatArray]:
             continue
         index = np.arange(len(values))
         filled: FloatArray = np.interp(index, index[known], values[known])
-        if name.endswith("position"):
-            filled = filled - np.mean(filled[:rest])
-        if name == "acceleration":
-            filled = filled - np.mean(filled[:rest])  # bias and gravity
-        channels[name] = filled
+        # Of an acceleration bias and gravity.
+        has_rest_level = name == "acceleration" or name.endswith("position")
+        channels[name] = filled - np.mean(filled[:rest]) if has_rest_level else filled
     return channels
 
 

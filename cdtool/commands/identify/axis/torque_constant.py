@@ -20,11 +20,13 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.commands.identify.contact.load_cell_contact import contact_force
+from cdtool.commands.identify.axis.start_ensemble import motor_speed
 from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
+from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.recordings.recording import Contact, Recording
 
+# The load cell's axis is that of its force within this long of the onset [s].
+_BEGINNING = 0.2
 # Standard deviation of the low-pass of all channels [s].
 _SMOOTHING = 0.05
 # Force counts above this share of the peak; press and release must have this share of the peak in common.
@@ -104,11 +106,11 @@ def _press_and_release(
     recording: Recording, contact: Contact, total_mass: float, joint: int, lever_arm: float
 ) -> _PressAndRelease:
     run = axis_run(recording, joint)
-    cell_time, cell_force = contact_force(recording, contact, lever_arm)
+    cell_time, cell_force = _contact_force(recording, contact, lever_arm)
     inside = (run.time >= contact.start) & (run.time <= contact.end)
     if np.count_nonzero(inside) * run.period < 2.0 * _SHORTEST:
         raise RecordingError(f"{run.name}: the contact lasts {contact.end - contact.start:.2f} s", "press slowly")
-    speed = _speed(run)
+    speed = motor_speed(run)
     if not np.all(np.isfinite(run.torque[inside]) & np.isfinite(speed[inside])):
         raise RecordingError(f"{run.name}: samples are missing in the contact", "use other contacts")
     force = _smooth(np.interp(run.time, cell_time, cell_force), run.period)
@@ -129,19 +131,27 @@ def _press_and_release(
     return _PressAndRelease(direction * torque[used], force[used], sign[used], run.period)
 
 
-def _speed(run: AxisRun) -> FloatArray:
-    if run.speed is not None:
-        return run.speed
-    assert run.position is not None
-    speed: FloatArray = np.gradient(run.position, run.period)
-    return speed
+def _contact_force(recording: Recording, contact: Contact, lever_arm: float) -> tuple[FloatArray, FloatArray]:
+    """Return times [s] and force over the rest level before the contact, positive in the contact [N, N m]."""
+    if "force" not in recording:
+        raise RecordingError(f"{recording.name}: no load cell", "map its channel 'force' in [channels]")
+    series = recording["force"]
+    known = np.all(np.isfinite(series.values), axis=1)
+    time, values = series.time[known], series.values[known]
+    before = (time > contact.start - 0.5) & (time < contact.start - 0.02)
+    within = (time >= contact.start) & (time <= contact.start + _BEGINNING)
+    if np.count_nonzero(before) < 3 or np.count_nonzero(within) < 3:
+        raise RecordingError(f"{recording.name}: the load cell does not cover the contact", "use other contacts")
+    over = values - np.median(values[before], axis=0)
+    along = np.mean(over[within], axis=0)
+    return time, lever_arm * over @ (along / max(float(np.linalg.norm(along)), 1e-300))
 
 
 def _smooth(values: FloatArray, period: float) -> FloatArray:
     """Return the values (n,) through a symmetrical Gaussian low-pass; the ends are repeated."""
-    reach = max(math.ceil(3.0 * _SMOOTHING / period), 1)
-    weights = np.exp(-0.5 * (period * np.arange(-reach, reach + 1, dtype=np.float64) / _SMOOTHING) ** 2)
-    return np.convolve(np.pad(values, reach, mode="edge"), weights / np.sum(weights), mode="valid")
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(values, _SMOOTHING / period, mode="nearest", truncate=3.0))
 
 
 def _directions(force: FloatArray, loaded: BoolArray, period: float) -> FloatArray:

@@ -26,6 +26,7 @@ from cdtool.commands.identify.axis.filtered_regression import (
     TorqueLag,
     block_covariance,
     fit_linear,
+    known_sections,
     shifted,
 )
 
@@ -118,10 +119,9 @@ def _lagged(motion: FilteredRun, chosen: list[int], lag: TorqueLag) -> FloatArra
 
     keep = math.exp(-period / lag.time) if lag.time > 0.0 else 0.0
     settling = round(_SETTLING * lag.time / period)
-    known = np.isfinite(columns).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False])).astype(np.int8)))
+    known = np.asarray(np.isfinite(columns).all(axis=1))
     result = np.full_like(columns, np.nan)
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
+    for first, end in known_sections(known):
         if end - first > settling:
             piece = columns[first:end]
             passed, _ = lfilter([1.0 - keep], [1.0, -keep], piece, axis=0, zi=keep * piece[:1])

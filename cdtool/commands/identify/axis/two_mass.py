@@ -174,14 +174,11 @@ class _Problem:
             self.ensembles += (replace(item, mean=mean),)
         self.settings = settings
         self.start = _rough_values(self.ensembles[0], settings)
-        self.scales = [_scales(item, settings.least_share) for item in self.ensembles]
+        self.scales = [_scales(item, settings) for item in self.ensembles]
         self.travelled = [_travelled(item) for item in self.ensembles]
         self.profiles = [friction_profile(runs, item, settings.motor_mass) for item in self.ensembles]
         self.known = [profile.at(way) for profile, way in zip(self.profiles, self.travelled, strict=True)]
         self._weigh(friction_shares(self.start["load_mass"], math.inf, 0.0))
-        self.compared = ["torque", "speed", "position"]
-        if settings.sensors.accelerometer_hz > 0.0:
-            self.compared.append("acceleration")
         logarithms = [math.log(self.start[name]) for name in PARAMETERS[:_ONE_STIFFNESS]]
         ends = np.cumsum([len(PARAMETERS), *map(len, self.prior)])
         self.of_knots = [slice(*pair) for pair in pairwise(ends)]
@@ -254,11 +251,6 @@ class _Problem:
             )
         return {name: values for name, values in channels.items() if name in ensemble.mean}
 
-    def measured(self, number: int) -> dict[str, FloatArray]:
-        """Return the means of the channels of an ensemble that are compared."""
-        mean = self.ensembles[number].mean
-        return {name: mean[name] for name in self.compared if name in mean}
-
     def errors(self, vector: FloatArray) -> FloatArray:
         """Return the scaled errors of all channels, of what is guessed and of the knots' forces.
 
@@ -277,7 +269,7 @@ class _Problem:
         try:
             found = self.scaled_errors(number, self.model(vector), friction)
         except ConfigurationError:
-            found = np.full(sum(map(len, self.measured(number).values())), 1e3)
+            found = np.full(len(self.scales[number]) * len(self.ensembles[number]), 1e3)
         return np.nan_to_num(found, nan=1e3, posinf=1e3, neginf=-1e3)
 
     def scaled_errors(self, number: int, model: AxisModel, friction: FloatArray) -> FloatArray:
@@ -285,8 +277,7 @@ class _Problem:
         ensemble, scales = self.ensembles[number], self.scales[number]
         weight = math.sqrt(self.settings.independent * ensemble.count / len(ensemble))
         channels = self.channels(self.simulated(model, number, friction), ensemble)
-        measured = self.measured(number)
-        return np.concatenate([(channels[name] - measured[name]) / scales[name] * weight for name in measured])
+        return np.concatenate([(channels[name] - ensemble.mean[name]) / scales[name] * weight for name in scales])
 
     def solve(self) -> FloatArray:
         """Return the logarithms of the parameters, from the best of a grid of stiffnesses; refuse a rigid drive."""
@@ -317,10 +308,8 @@ class _Problem:
         self._refuse_rigid(vector, min(cost, lower))
         if lower < cost:
             self.load_change = float(np.exp(other[0]) - np.exp(vector[0]))
-        independent = sum(
-            self.settings.independent * item.count * len(self.measured(n)) for n, item in enumerate(self.ensembles)
-        )
-        self.is_described = min(cost, lower) < self.settings.clearly_worse * independent
+        channels = sum(item.count * len(scales) for item, scales in zip(self.ensembles, self.scales, strict=True))
+        self.is_described = min(cost, lower) < self.settings.clearly_worse * self.settings.independent * channels
         return other if lower < self.settings.second_stiffness * cost else vector
 
     def _fitted(self, first: FloatArray, free: IntArray, tolerance: float, calls: int) -> tuple[FloatArray, float]:
@@ -433,7 +422,7 @@ class _Problem:
             parts = []
             for number, (friction, left) in enumerate(zip(frictions, base, strict=True)):
                 moved = self.scaled_errors(number, model, friction + drawn[number][surrogate]) - left
-                channels = np.split(left, len(self.measured(number)))
+                channels = np.split(left, len(self.scales[number]))
                 parts.append(moved + np.concatenate([random_phases(item, rng) for item in channels]))
             change = np.concatenate((*parts, rng.standard_normal(len(_GUESSED_WITHIN))))
             rows.append(inverse[:, : len(change)] @ change)
@@ -530,10 +519,11 @@ def _travelled(ensemble: StartEnsemble) -> FloatArray:
     return ensemble.direction * np.cumsum(ensemble.mean["speed"]) * ensemble.period
 
 
-def _scales(ensemble: StartEnsemble, least_share: float) -> dict[str, float]:
-    """Return in what each channel's error counts: its run-to-run deviation, at least 1 % of its largest value."""
-    scales = {}
-    for name, mean in ensemble.mean.items():
-        spread = float(np.sqrt(np.mean(ensemble.deviation[name] ** 2)))
-        scales[name] = max(spread, least_share * float(np.max(np.abs(mean))), 1e-300)
+def _scales(ensemble: StartEnsemble, settings: TwoMassSettings) -> dict[str, float]:
+    """Return in what the error of each channel that is compared counts: its deviation, at least 1 % of it."""
+    scales, accelerometer = {}, ("acceleration",) if settings.sensors.accelerometer_hz > 0.0 else ()
+    for name in ("torque", "speed", "position", *accelerometer):
+        if name in ensemble.mean:
+            spread = float(np.sqrt(np.mean(ensemble.deviation[name] ** 2)))
+            scales[name] = max(spread, settings.least_share * float(np.max(np.abs(ensemble.mean[name]))), 1e-300)
     return scales

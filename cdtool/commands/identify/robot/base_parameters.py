@@ -162,5 +162,4 @@ def condition_number(rows: FloatArray) -> float:
         return 1.0
     if not scale.all() or len(rows) < len(scale):
         return float("inf")
-    values = np.linalg.svd(np.asarray(np.linalg.qr(rows * scale, mode="r")), compute_uv=False)
-    return float(values[0] / values[-1]) if values[-1] > 0.0 else float("inf")
+    return float(np.linalg.cond(np.asarray(np.linalg.qr(rows * scale, mode="r"))))

@@ -42,13 +42,12 @@ _TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
 class ConsistentFit:
     """A fit whose links are physical.
 
-    `fit` with the consistent `parameters`; `robot` with them. `is_repaired`: least squares alone gave none that are
-    consistent. `residual_rise`: relative rise of the RMS of the weighted residual; 0 if nothing was repaired.
+    `fit` with the consistent `parameters`; `robot` with them. `residual_rise`: relative rise of the RMS of the weighted
+    residual, about 0 if the parameters of least squares are consistent.
     """
 
     fit: RobotFit
     robot: UrdfRobot
-    is_repaired: bool
     residual_rise: float
 
 
@@ -95,14 +94,11 @@ def consistent_fit(fit: RobotFit) -> ConsistentFit:
         raise UsageError("the inertial parameters were not free", "identify with free INERTIAL columns")
     solver = _solver()
     problem = _InertiaProblem(fit, solver)
-    values = problem.nearest_without_rise()
-    is_repaired = values is None
-    if values is None:
-        values = problem.least_rise()
+    values = problem.least_rise()
     parameters = fit.parameters.copy()
     parameters[list(fit.grouping.columns)] = values
     repaired = replace(fit, parameters=parameters)
-    return ConsistentFit(repaired, fitted_robot(repaired), is_repaired, problem.rise(values) if is_repaired else 0.0)
+    return ConsistentFit(repaired, fitted_robot(repaired), problem.rise(values))
 
 
 def _solver() -> Any:
@@ -140,15 +136,6 @@ class _InertiaProblem:
         # K pi, with pi in these units.
         self._combination = fit.grouping.combination * self._scale
         self._size = max(float(np.linalg.norm(self._target)), 1e-300)
-
-    def nearest_without_rise(self) -> FloatArray | None:
-        """Return the consistent parameters nearest to the machine's with the residual of least squares; None: none."""
-        sizes = np.linalg.norm(self._combination, axis=1)
-        wanted = self._fit.base.values / sizes
-        pi, constraints = self._variables()
-        constraints.append((self._combination / sizes[:, np.newaxis]) @ pi == wanted)
-        objective = self._cvxpy.Minimize(self._cvxpy.sum_squares(pi - self._prior))
-        return self._solved(objective, constraints, pi)
 
     def least_rise(self) -> FloatArray:
         """Return the consistent parameters of the least residual; raises IdentificationError if the solver fails."""

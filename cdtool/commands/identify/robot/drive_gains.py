@@ -78,32 +78,28 @@ def drive_gains(
     loaded: Sequence[RobotRun],
     payload: Payload,
     machine: CoupledMachine,
-    scale: Sequence[float] | None = None,
+    scale: Sequence[float],
 ) -> Identified:
     """Return the torque constant of each joint: section "channels.torque", key "scale".
 
     `unloaded`, `loaded`: contact-free runs without and with the payload. `scale`: the present scale of the torque
-    channel, one per joint; without it the estimates are factors of the logged torque. NotIdentifiable for a joint that
+    channel, one per joint. NotIdentifiable for a joint that
     the payload does not load, or not independently of its other torques, as with an unknown centre of mass. Raises
     IdentificationError without runs of both kinds, ConfigurationError for an unknown link.
     """
     if not unloaded or not loaded:
         raise IdentificationError("torque constants need runs with and without the payload", "give both")
-    present = np.ones(len(machine.joints)) if scale is None else np.array(scale, dtype=np.float64)
-    if present.shape != (len(machine.joints),):
-        raise UsageError(f"{len(present)} values of scale", f"the machine has {len(machine.joints)} joints")
+    if len(scale) != len(machine.joints):
+        raise UsageError(f"{len(scale)} values of scale", f"the machine has {len(machine.joints)} joints")
     regressor = regressor_of(machine)
     columns = _payload_columns(machine, regressor, payload)
     parts = [_part(run, index, regressor, index >= len(unloaded)) for index, run in enumerate((*unloaded, *loaded))]
     joints = [_JointWindows.of(joint, parts, regressor, columns) for joint in range(len(machine.joints))]
     most = max(float(np.linalg.norm(joint.load)) for joint in joints)
-    unit = "N m/A" if scale is not None else "1"
-    found = [
-        item.constant(float(value), unit, most, has_centre=payload.centre is not None)
-        for item, value in zip(joints, present, strict=True)
-    ]
-    estimates = tuple(item for item in found if isinstance(item, Estimate))
-    return Identified(estimates, tuple(item for item in found if isinstance(item, NotIdentifiable)))
+    has_centre = payload.centre is not None
+    return Identified.of(
+        [item.constant(float(value), most, has_centre) for item, value in zip(joints, scale, strict=True)]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +163,7 @@ class _JointWindows:
         everything = np.column_stack((plain, loaded @ free.T))
         return cls(joint, everything, loaded @ columns.mass, loaded @ columns.shifts.T, equations)
 
-    def constant(self, present: float, unit: str, most: float, *, has_centre: bool) -> Estimate | NotIdentifiable:
+    def constant(self, present: float, most: float, has_centre: bool) -> Estimate | NotIdentifiable:
         """Return the torque constant; `most`: the norm of the load of the joint with the largest."""
         load, torques = self.load, self.equations.torques
         size = float(np.linalg.norm(load))
@@ -189,8 +185,8 @@ class _JointWindows:
         if not error < _WORST_ERROR * inverse:
             return self._refused(Missing.PAYLOAD, {"inverse": inverse, "standard_error_of_inverse": error})
         value = present / inverse
-        relative = error / inverse
-        return Estimate("channels.torque", "scale", value, abs(value) * relative, unit, Method.LOADED_RUNS, self.joint)
+        error *= abs(value) / inverse
+        return Estimate("channels.torque", "scale", value, error, "N m/A", Method.LOADED_RUNS, self.joint)
 
     def _refused(self, missing: Missing, numbers: dict[str, float]) -> NotIdentifiable:
         return NotIdentifiable("channels.torque", "scale", (missing,), numbers, self.joint)

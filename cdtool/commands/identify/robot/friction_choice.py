@@ -64,13 +64,15 @@ class FrictionAnswer(Enum):
 class JointFriction:
     """The friction of a joint.
 
-    `identified`: the estimates of the `form`, and what the runs cannot show. `together`: values that are not
-    identifiable alone. `errors`: RMS [N m, N] of the torque that each form does not explain in parts left out of its
-    fit; NaN: no motion. `torque`: RMS of the joint's torque in motion [N m, N]. `is_explained`: by the machine.
+    `identified`: the estimates of the `form`, and what the runs cannot show. `compared`: the new form, or the one that
+    was compared with the old one; None without any. `together`: values that are not identifiable alone. `errors`: RMS
+    [N m, N] of the torque that each form does not explain in parts left out of its fit; NaN: no motion. `torque`: RMS
+    of the joint's torque in motion [N m, N]. `is_explained`: by the machine.
     """
 
     joint: int
     form: FrictionForm
+    compared: FrictionForm | None
     identified: Identified
     together: tuple[Estimate, ...]
     errors: Mapping[FrictionForm, float]
@@ -87,18 +89,6 @@ class JointFriction:
         if not math.isfinite(self.before):
             return FrictionAnswer.NOT_MOVED
         return FrictionAnswer.NOT_BETTER if self.compared else FrictionAnswer.NOT_IDENTIFIABLE
-
-    @property
-    def compared(self) -> FrictionForm | None:
-        """Return the new form, or that which predicted best of those compared with the old one; None without any."""
-        if self.form is not FrictionForm.PREVIOUS:
-            return self.form
-        forms = (FrictionForm.FRICTION_ALONE, FrictionForm.FRICTION)
-        known = [form for form in forms if math.isfinite(self.errors.get(form, math.nan))]
-        if known:
-            return min(known, key=lambda form: self.errors[form])
-        has_offset = math.isfinite(self.errors.get(FrictionForm.OFFSET, math.nan))
-        return FrictionForm.OFFSET if has_offset else None
 
     @property
     def before(self) -> float:
@@ -164,8 +154,11 @@ def _of_joint(
     left_out = {form: fits[form].left_out for form in estimates}
     errors = {form: item.error(joint) for form, item in left_out.items()}
     whole = fits[FrictionForm.FRICTION]
-    chosen = _chosen(joint, errors, left_out)
-    known = estimates[chosen] if chosen else ()
+    compared = _compared(joint, errors, left_out)
+    is_better = False
+    if compared is not None:
+        is_better = left_out[compared].is_better(joint, whole.left_out.of_joint(joint, is_previous=True), 1.0)
+    known = estimates[compared] if compared and is_better else ()
     missing = tuple(item for item in whole.identified.not_identifiable if item.joint == joint)
     # In one direction only the sum of constant force and Coulomb friction is identifiable.
     one_way = any(Missing.REVERSALS in item.missing for item in missing)
@@ -173,7 +166,8 @@ def _of_joint(
     missing += tuple(_as_missing(item) for item in known if not one_way and _is_vague(item))
     return JointFriction(
         joint=joint,
-        form=chosen or FrictionForm.PREVIOUS,
+        form=compared if compared and is_better else FrictionForm.PREVIOUS,
+        compared=compared,
         identified=Identified(alone, missing),
         together=tuple(replace(item, standard_error=math.nan) for item in known if item not in alone),
         errors={**errors, FrictionForm.PREVIOUS: whole.left_out.error(joint, is_previous=True)},
@@ -188,10 +182,10 @@ def _estimates(form: FrictionForm, fit: RobotFit, joint: int) -> tuple[Estimate,
     return tuple(found[key] for key in keys) if all(key in found for key in keys) else ()
 
 
-def _chosen(
+def _compared(
     joint: int, errors: Mapping[FrictionForm, float], left_out: Mapping[FrictionForm, LeftOutTorque]
 ) -> FrictionForm | None:
-    """Return the form that replaces the present friction; None: it stays."""
+    """Return the form that predicts best, with a drive inertia only if that is clear; None without any."""
     simple = [form for form in (FrictionForm.FRICTION_ALONE, FrictionForm.FRICTION) if form in errors]
     chosen = FrictionForm.OFFSET if FrictionForm.OFFSET in errors else None
     if simple:
@@ -200,9 +194,8 @@ def _chosen(
         return None
     drive = left_out.get(FrictionForm.DRIVE_INERTIA)
     if drive is not None and drive.is_better(joint, left_out[chosen].of_joint(joint), 2.0):
-        chosen = FrictionForm.DRIVE_INERTIA
-    new = left_out[chosen]
-    return chosen if new.is_better(joint, new.of_joint(joint, is_previous=True), 1.0) else None
+        return FrictionForm.DRIVE_INERTIA
+    return chosen
 
 
 def _is_vague(estimate: Estimate) -> bool:

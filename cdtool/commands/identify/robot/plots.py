@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cdtool.commands.identify.joint import JointIdentification
+from cdtool.commands.identify.plots import bars, compare, thinned
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, JointFriction
-from cdtool.detectors.look import BLUE, RED
+from cdtool.detectors.look import BLUE
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure
 
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH, _COLUMNS = 9.0, 3
-_MEASURED, _UNDER, _MODEL, _RESIDUAL, _OLD, _BAND = "0.35", "0.6", BLUE, RED, "0.55", "0.85"
-_MOST_POINTS = 2000
+_MEASURED, _MODEL, _OLD = "0.35", BLUE, "0.55"
 
 
 def draw_unseen_torques(joints: Sequence[tuple[JointIdentification, JointFriction, float]]) -> Figure:
@@ -32,22 +32,15 @@ def draw_unseen_torques(joints: Sequence[tuple[JointIdentification, JointFrictio
     the residual on all parts.
     """
     with drawing():
-        columns = min(_COLUMNS, len(joints))
-        rows = math.ceil(len(joints) / columns)
+        columns, rows = min(_COLUMNS, len(joints)), math.ceil(len(joints) / _COLUMNS)
         figure = new_figure(_WIDTH, 2.7 * rows + 0.2)
         grid = figure.subplots(2 * rows, columns, squeeze=False, height_ratios=[3, 2] * rows)
-        axes: list[Axes] = []
-        for place in range(rows * columns):
-            row, column = divmod(place, columns)
-            above, below = grid[2 * row, column], grid[2 * row + 1, column]
-            if place < len(joints):
-                above.sharex(below)
-                _draw_torque(above, below, *joints[place])
-                axes += [above, below]
-            else:
-                above.set_visible(False)
-                below.set_visible(False)
-        _name_lines(figure, axes)
+        # A pair of panels per joint.
+        pairs = grid.reshape(rows, 2, columns).transpose(0, 2, 1).reshape(-1, 2)
+        for (above, below), joint in zip(pairs, joints, strict=False):
+            above.sharex(below)
+            _draw_torque(above, below, *joint)
+        _finish(figure, pairs[: len(joints)].ravel(), pairs[len(joints) :].ravel())
         return figure
 
 
@@ -57,24 +50,23 @@ def draw_joint_frictions(joints: Sequence[JointIdentification]) -> Figure:
     A model that runs past the bars is wrong in its form, or the friction depends on more than the speed.
     """
     with drawing():
-        columns = min(_COLUMNS, len(joints))
-        rows = math.ceil(len(joints) / columns)
+        columns, rows = min(_COLUMNS, len(joints)), math.ceil(len(joints) / _COLUMNS)
         figure = new_figure(_WIDTH, 2.4 * rows + 0.2)
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
         for axes, joint in zip(grid, joints, strict=False):
             _draw_friction(axes, joint)
-        for axes in grid[len(joints) :]:
-            axes.set_visible(False)
-        _name_lines(figure, list(grid[: len(joints)]))
+        _finish(figure, grid[: len(joints)], grid[len(joints) :])
         return figure
 
 
-def _name_lines(figure: Figure, axes: Sequence[Axes]) -> None:
-    """Add one legend above all panels."""
+def _finish(figure: Figure, used: Iterable[Axes], empty: Iterable[Axes]) -> None:
+    """Add one legend above all panels, and hide those that are empty."""
     named: dict[str, Any] = {}
-    for panel in axes:
+    for panel in used:
         handles, names = panel.get_legend_handles_labels()
         named = {**dict(zip(names, handles, strict=True)), **named}
+    for panel in empty:
+        panel.set_visible(False)
     figure.legend(list(named.values()), list(named), loc="outside upper left", ncols=5)
 
 
@@ -88,40 +80,23 @@ def _title(joint: JointIdentification, friction: JointFriction) -> str:
 def _draw_torque(above: Axes, below: Axes, joint: JointIdentification, friction: JointFriction, floor: float) -> None:
     assert joint.evidence is not None and joint.evidence.unseen is not None
     unseen, unit = joint.evidence.unseen, joint.units[1]
-    every = slice(None, None, max(len(unseen.time) // _MOST_POINTS, 1))
+    every = thinned(np.arange(len(unseen.time)))
     time, measured = unseen.time[every], unseen.measured[every]
     new, old = unseen.predicted[every], unseen.previous[every]
     kept, other = (new, old) if friction.answer is FrictionAnswer.NEW else (old, new)
-    above.plot(time, measured, color=_UNDER, linewidth=2.2, label="measured")
-    above.plot(time, kept, color=_MODEL, linewidth=1.0, label="model, friction in use")
-    above.set_ylabel(f"torque [{unit}]" if unit != "N" else "force [N]")
+    band = np.full(len(time), floor) if math.isfinite(floor) else None
+    axis = f"torque [{unit}]" if unit != "N" else "force [N]"
+    compare((above, below), time, (measured, kept), axis, (band, "between equal runs (± 1 st. dev.)"))
+    below.plot(time, measured - other, color=_OLD, linewidth=0.8, label="other friction", zorder=1)
     above.tick_params(axis="x", labelbottom=False)
     above.set_title(_title(joint, friction), loc="left")
-    if math.isfinite(floor):
-        below.axhspan(-floor, floor, color=_BAND, linewidth=0, label="between equal runs (± 1 st. dev.)")
-    below.plot(time, measured - other, color=_OLD, linewidth=0.8, label="residual, other friction")
-    below.plot(time, measured - kept, color=_RESIDUAL, linewidth=0.9, label="residual, friction in use")
-    below.axhline(0.0, color="0.3", linewidth=0.6)
-    below.set_ylabel(f"residual [{unit}]")
     below.set_xlabel(f"time in {label(Path(unseen.run).name, 24)} [s]")
 
 
 def _draw_friction(axes: Axes, joint: JointIdentification) -> None:
     assert joint.robot is not None and joint.evidence is not None and joint.evidence.friction is not None
     curve = joint.evidence.friction
-    points = curve.points
-    axes.errorbar(
-        points.abscissa,
-        points.mean,
-        yerr=2.0 * np.nan_to_num(points.standard_error),
-        fmt="o",
-        color=_MEASURED,
-        markersize=3,
-        linewidth=0.8,
-        capsize=1.5,
-        label="measured, mean ± 2 standard errors",
-        zorder=2,
-    )
+    bars(axes, curve.points, _MEASURED, "mean ± 2 standard errors")
     used, other = (curve.new, curve.previous)
     if joint.robot.answer is not FrictionAnswer.NEW:
         used, other = other, used
@@ -130,7 +105,7 @@ def _draw_friction(axes: Axes, joint: JointIdentification) -> None:
         if not inside.any():
             continue
         axes.plot(curve.speed[inside], other[inside], "--", color=_OLD, linewidth=1.0, label="other friction", zorder=3)
-        axes.plot(curve.speed[inside], used[inside], color=_MODEL, linewidth=1.6, label="friction in use", zorder=4)
+        axes.plot(curve.speed[inside], used[inside], color=_MODEL, linewidth=1.6, label="model", zorder=4)
     axes.set_xlabel(f"speed [{joint.units[2]}/s]")
     axes.set_ylabel(f"friction [{joint.units[1]}]")
     axes.set_title(_title(joint, joint.robot), loc="left")

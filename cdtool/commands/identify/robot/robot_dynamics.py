@@ -255,7 +255,7 @@ def joint_estimates(fit: RobotFit, joint: int, method: Method) -> tuple[tuple[Es
     for group in (ColumnGroup.VISCOUS, ColumnGroup.COULOMB, ColumnGroup.CONSTANT):
         value = float(fit.parameters[_columns_of(fit, group)[joint]])
         error = errors.get((group.value, joint), math.nan)
-        unit = _UNITS[group][_slides(fit.machine, joint)]
+        unit = _UNITS[group][is_prismatic(fit.machine, joint)]
         estimate = Estimate("machine", group.value, value, error, unit, method, joint)
         (known if math.isfinite(error) else together).append(estimate)
     return tuple(known), tuple(together)
@@ -312,7 +312,7 @@ def _windows_of(
         if run.joint_count != len(machine.joints):
             raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
         window = Window.of(half_width, run.period)
-        rigid = _rigid_torque(run, machine, window) * (ColumnGroup.INERTIAL not in free)
+        rigid = rigid_torque(run, machine, window) * (ColumnGroup.INERTIAL not in free)
         torque = window.average(run.torque) - rigid - _known_torque(run, regressor, window, free)
         rows = np.stack([window_of_column(run, regressor, window, own) for own in grouping.base], axis=2)
         valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
@@ -341,14 +341,14 @@ def window_of_column(run: RobotRun, regressor: Regressor, window: Window, column
     return window.rate(momentum) + window.average(rest)
 
 
-def _rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> FloatArray:
+def rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> FloatArray:
     """Return the windows' torques (K, J) of inertia and gravity, drives included."""
     momentum, velocity_force, gravity = machine.momentum_terms(run.position, run.speed)
     return window.rate(momentum) + window.average(gravity - velocity_force)
 
 
 def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: frozenset[ColumnGroup]) -> FloatArray:
-    """Return the windows' torques (K, J) of friction and drives that are not free, beside those of _rigid_torque."""
+    """Return the windows' torques (K, J) of friction and drives that are not free, beside those of rigid_torque."""
     values = regressor.values
     total = np.zeros_like(window.average(run.position))
     for column, item in enumerate(regressor.columns):
@@ -638,7 +638,7 @@ class _Judge:
         if unbounded < -2.0 * error and value == 0.0:
             # No noise explains this: the model, or the sign of a channel, is wrong.
             return self._refused(column, (Missing.OTHER_MOTION,), {"least_squares": unbounded, "standard_error": error})
-        slides = _slides(self.machine, column.joint)
+        slides = is_prismatic(self.machine, column.joint)
         return Estimate(
             "machine",
             column.group.value,
@@ -693,7 +693,7 @@ class _Judge:
         return [NotIdentifiable("machine", "base_parameters", needed, numbers)]
 
 
-def _slides(machine: CoupledMachine, joint: int) -> bool:
+def is_prismatic(machine: CoupledMachine, joint: int) -> bool:
     """Return whether a joint is prismatic."""
     if not isinstance(machine, UrdfRobot):
         return False

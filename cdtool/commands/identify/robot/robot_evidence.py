@@ -12,10 +12,12 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.axis.friction_curve import FrictionCurve, friction_curve, speed_edges
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
-from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, Window, window_of_column
+from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, Window, rigid_torque, window_of_column
 from cdtool.commands.identify.robot.robot_excitation import JointMotion
-from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, Regressor, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
+
+Indices = np.ndarray[tuple[int], np.dtype[np.int64]]
 
 # A line is interrupted where windows are further apart than this many usual steps.
 _GAP = 1.5
@@ -82,101 +84,81 @@ def joint_evidence(
     motion: JointMotion, form: FrictionForm | None, fits: Mapping[FrictionForm, RobotFit], runs: Sequence[RobotRun]
 ) -> RobotJointEvidence:
     """Return what the fit of a form, to these runs, shows of a joint; without a form only its motion."""
-    if form is None:
+    if form is None or not (fits[form].equations.joints == motion.joint).any():
         return RobotJointEvidence(motion)
-    shown = _Joint(motion.joint, form, fits[form], runs)
-    return RobotJointEvidence(motion, shown.unseen(), shown.friction())
+    windows = _JointWindows.of(motion.joint, fits[form], runs)
+    return RobotJointEvidence(
+        motion, _unseen(windows, form, fits[form], runs), _friction(windows, motion.joint, form, fits[form])
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class _Joint:
-    """A joint, its form of friction, the fit of it, and the runs."""
+class _JointWindows:
+    """The equations of a joint (n,): where they are in all, run, place and time of the window, averages over it.
 
-    joint: int
-    form: FrictionForm
-    fit: RobotFit
-    runs: Sequence[RobotRun]
+    `friction`: the torque less that of inertia and gravity, the machine's own and what the fit changed.
+    """
 
-    def unseen(self) -> UnseenTorque | None:
-        """Return the torque along the run that is predicted worst, relative to the torque of all runs."""
-        equations, left_out = self.fit.equations, self.fit.left_out
-        own = equations.joints.astype(np.int64) == self.joint
-        if not own.any():
-            return None
-        indices = equations.runs[own].astype(np.int64)
-        squares = np.bincount(indices, weights=left_out.residual[own] ** 2)
-        counts = np.maximum(np.bincount(indices), 1)
-        worst = int(np.argmax(squares / counts))
-        run = self.runs[worst]
-        chosen = own & (equations.runs == worst)
-        window = Window.of(HALF_WIDTH, run.period)
-        place = self._places(run, window, equations.times[chosen])
-        measured = window.average(run.torque)[place, self.joint]
-        lines = (measured, measured - left_out.residual[chosen], measured - left_out.previous[chosen])
-        time = equations.times[chosen] - run.start
-        gaps = np.flatnonzero(np.diff(place) > _GAP) + 1
-        time = np.insert(time, gaps, time[gaps])
-        broken = [np.insert(line, gaps, np.nan) for line in lines]
-        return UnseenTorque(run.name, len(self.runs), self.form, time, *broken)
+    rows: Indices
+    run: Indices
+    place: Indices
+    time: FloatArray
+    torque: FloatArray
+    speed: FloatArray
+    friction: FloatArray
 
-    def friction(self) -> JointFrictionCurve | None:
-        """Return the friction over speed, with the inertias that belong to the form."""
-        equations = self.fit.equations
-        own = equations.joints.astype(np.int64) == self.joint
-        speeds, forces = [], []
-        for index, run in enumerate(self.runs):
-            chosen = own & (equations.runs == index)
-            window = Window.of(HALF_WIDTH, run.period)
-            place = self._places(run, window, equations.times[chosen])
-            rest = window.average(run.torque)[:, self.joint] - self._rigid_torque(run, window)
-            speeds.append(window.average(run.speed)[place, self.joint])
-            forces.append(rest[place])
-        speed, force = np.concatenate(speeds), np.concatenate(forces)
-        if len(speed) < 2:
-            return None
-        order = np.argsort(equations.runs[own], kind="stable")
-        blocks = self.fit.left_out.blocks[own][order]
-        points = friction_curve(speed, force, blocks, speed_edges(speed))
-        if not len(points):
-            return None
-        reach = float(np.max(np.abs(speed)))
-        at = np.linspace(-reach if speed.min() < 0.0 else 0.0, reach if speed.max() > 0.0 else 0.0, 81)
-        before = regressor_of(self.fit.machine).values
-        return JointFrictionCurve(
-            points,
-            self.form,
-            at,
-            self._modelled(self.fit.parameters, at),
-            self._modelled(before, at),
-        )
+    @classmethod
+    def of(cls, joint: int, fit: RobotFit, runs: Sequence[RobotRun]) -> _JointWindows:
+        """Return the windows of a joint, run by run, as the equations are."""
+        equations, regressor, parts = fit.equations, regressor_of(fit.machine), []
+        change = fit.parameters - regressor.values
+        inertial = (ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA)
+        changed = [i for i in np.flatnonzero(change).tolist() if regressor.columns[i].group in inertial]
+        for index, run in enumerate(runs):
+            rows = np.flatnonzero((equations.joints == joint) & (equations.runs == index))
+            window, time = Window.of(HALF_WIDTH, run.period), equations.times[rows] - run.start
+            place = np.rint((time / run.period - len(window.weights) // 2) / window.step).astype(np.int64)
+            rigid = rigid_torque(run, fit.machine, window)[:, joint]
+            for column in changed:
+                rigid = rigid + change[column] * window_of_column(run, regressor, window, column)[:, joint]
+            torque, speed = window.average(run.torque)[place, joint], window.average(run.speed)[place, joint]
+            parts.append((rows, np.full(len(rows), index), place, time, torque, speed, torque - rigid[place]))
+        return cls(*(np.concatenate(item) for item in zip(*parts, strict=True)))
 
-    def _places(self, run: RobotRun, window: Window, times: FloatArray) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Return the indices of the windows with these centres."""
-        half = len(window.weights) // 2
-        return np.rint(((times - run.start) / run.period - half) / window.step).astype(np.int64)
 
-    def _rigid_torque(self, run: RobotRun, window: Window) -> FloatArray:
-        """Return the torque (K,) of inertia and gravity of the joint: the machine's own, and what the fit changed."""
-        machine, regressor = self.fit.machine, regressor_of(self.fit.machine)
-        momentum, velocity_force, gravity = machine.momentum_terms(run.position, run.speed)
-        total = (window.rate(momentum) + window.average(gravity - velocity_force))[:, self.joint]
-        change = self.fit.parameters - regressor.values
-        for column in np.flatnonzero(change).tolist():
-            if regressor.columns[column].group in (ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA):
-                total = total + change[column] * window_of_column(run, regressor, window, column)[:, self.joint]
-        return np.asarray(total)
+def _unseen(windows: _JointWindows, form: FrictionForm, fit: RobotFit, runs: Sequence[RobotRun]) -> UnseenTorque:
+    """Return the torque along the run that is predicted worst, relative to the torque of all runs."""
+    residual, previous = fit.left_out.residual[windows.rows], fit.left_out.previous[windows.rows]
+    worst = int(np.argmax(np.bincount(windows.run, residual**2) / np.maximum(np.bincount(windows.run), 1)))
+    own = windows.run == worst
+    time, measured = windows.time[own], windows.torque[own]
+    gaps = np.flatnonzero(np.diff(windows.place[own]) > _GAP) + 1
+    lines = (measured, measured - residual[own], measured - previous[own])
+    broken = [np.insert(line, gaps, np.nan) for line in lines]
+    return UnseenTorque(runs[worst].name, len(runs), form, np.insert(time, gaps, time[gaps]), *broken)
 
-    def _modelled(self, parameters: FloatArray, speed: FloatArray) -> FloatArray:
-        """Return the friction of the joint over the speed (n,)."""
-        machine = self.fit.machine
-        values = {
-            column.group: float(parameters[index])
-            for index, column in enumerate(regressor_of(machine).columns)
-            if column.joint == self.joint and column.group is not ColumnGroup.INERTIAL
-        }
-        slope = machine.coulomb_slope[self.joint]
-        direction = np.tanh(slope * speed) if slope else np.sign(speed)
-        total = (
-            values[ColumnGroup.VISCOUS] * speed + values[ColumnGroup.COULOMB] * direction + values[ColumnGroup.CONSTANT]
-        )
-        return np.asarray(total)
+
+def _friction(windows: _JointWindows, joint: int, form: FrictionForm, fit: RobotFit) -> JointFrictionCurve | None:
+    """Return the friction over speed, with the inertias that belong to the form."""
+    speed = windows.speed
+    points = friction_curve(speed, windows.friction, fit.left_out.blocks[windows.rows], speed_edges(speed))
+    if not len(points):
+        return None
+    reach = float(np.max(np.abs(speed)))
+    at = np.linspace(-reach if speed.min() < 0.0 else 0.0, reach if speed.max() > 0.0 else 0.0, 81)
+    regressor = regressor_of(fit.machine)
+    lines = (_modelled(regressor, joint, values, at) for values in (fit.parameters, regressor.values))
+    return JointFrictionCurve(points, form, at, *lines)
+
+
+def _modelled(regressor: Regressor, joint: int, parameters: FloatArray, speed: FloatArray) -> FloatArray:
+    """Return the friction of a joint over the speed (n,)."""
+    values = {
+        column.group: float(value)
+        for column, value in zip(regressor.columns, parameters, strict=True)
+        if column.joint == joint and column.group is not ColumnGroup.INERTIAL
+    }
+    slope = regressor.machine.coulomb_slope[joint]
+    direction = np.tanh(slope * speed) if slope else np.sign(speed)
+    viscous, coulomb = values[ColumnGroup.VISCOUS] * speed, values[ColumnGroup.COULOMB] * direction
+    return np.asarray(viscous + coulomb + values[ColumnGroup.CONSTANT])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,8 +29,7 @@ _CREEPING = 0.02
 class RobotRun:
     """The joints' channels on the load side (SI), every `period` [s] from `start` [s], in the recording's order.
 
-    `torque`, `position` and `speed` (n, J): rad or m, N m or N; NaN without a sample. `derived` names "speed" if it is
-    the derivative of the position.
+    `torque`, `position` and `speed` (n, J): rad or m, N m or N; NaN without a sample.
     """
 
     name: str
@@ -39,7 +38,6 @@ class RobotRun:
     torque: FloatArray
     position: FloatArray
     speed: FloatArray
-    derived: frozenset[str] = field(default_factory=frozenset)
 
     def __post_init__(self) -> None:
         shape = np.shape(self.torque)
@@ -89,8 +87,7 @@ class RobotRun:
     def without(self, excluded: BoolArray) -> RobotRun:
         """Return the run with NaN for the torques of the excluded samples, (n,) or (n, J)."""
         columns = excluded if excluded.ndim == 2 else excluded[:, np.newaxis]
-        torque = np.where(columns, np.nan, self.torque)
-        return RobotRun(self.name, self.start, self.period, torque, self.position, self.speed, self.derived)
+        return replace(self, torque=np.where(columns, np.nan, self.torque))
 
 
 def robot_run(recording: Recording) -> RobotRun:
@@ -112,8 +109,7 @@ def robot_run(recording: Recording) -> RobotRun:
     else:
         speed = np.column_stack([_values(axis, "speed") for axis in axes])
     torque = np.column_stack([axis.torque for axis in axes])
-    derived = frozenset({"speed"} if is_derived else ())
-    return RobotRun(recording.name, axes[0].start, axes[0].period, torque, position, speed, derived)
+    return RobotRun(recording.name, axes[0].start, axes[0].period, torque, position, speed)
 
 
 def central_derivative(values: FloatArray, period: float) -> FloatArray:
@@ -124,10 +120,9 @@ def central_derivative(values: FloatArray, period: float) -> FloatArray:
     half = max(_FEWEST_BESIDE, round(_HALF_WIDTH / period))
     if len(values) <= 2 * half:
         return np.full(values.shape, np.nan)
-    step = np.arange(-half, half + 1, dtype=np.float64)
-    # Least squares of a + b x + c x^2 + d x^3 over a symmetric window: only x and x^3 have a part in b.
-    second, fourth, sixth = (float(np.sum(step**power)) for power in (2, 4, 6))
-    weights = (sixth * step - fourth * step**3) / (second * sixth - fourth**2) / period
+    from scipy.signal import savgol_coeffs
+
+    weights = savgol_coeffs(2 * half + 1, 3, deriv=1, delta=period, use="dot")
     slope = np.full(values.shape, np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(values, 2 * half + 1, axis=0)
     slope[half:-half] = windows @ weights

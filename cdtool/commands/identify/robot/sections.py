@@ -9,15 +9,12 @@ from cdtool.commands.identify.identifying_robot import InertiaIdentification, Ro
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer
 from cdtool.commands.identify.robot.plots import draw_joint_frictions, draw_unseen_torques
 from cdtool.commands.identify.words import (
-    listed_numbers,
-    short_number,
     words_of_decision,
-    words_of_needs,
     words_of_robot,
 )
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, images_of
-from cdtool.report.number_text import NOTHING, number, percent
+from cdtool.report.number_text import number
 from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
 
 _UNSEEN = (
@@ -36,7 +33,7 @@ def robot_sections(done: IdentifiedMachine) -> list[PageSection]:
     robot = done.robot
     if robot is None:
         return []
-    sections = [_friction_section(done, robot), _motion_section(done), _inertia_section(robot.inertias)]
+    sections = [_friction_section(robot), _inertia_section(robot.inertias)]
     lines = words_of_robot(robot, done.joints, len(done.runs))
     if lines:
         table = Table("robot", "The whole robot", (Heading("finding"),), [[Cell(visible(line))] for line in lines])
@@ -44,8 +41,8 @@ def robot_sections(done: IdentifiedMachine) -> list[PageSection]:
     return sections
 
 
-def _friction_section(done: IdentifiedMachine, robot: RobotIdentification) -> PageSection:
-    rows = list(zip(done.joints, robot.joints, robot.repeated.floor.tolist(), strict=True))
+def _friction_section(robot: RobotIdentification) -> PageSection:
+    rows = robot.rows
     fields = (
         (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
         (Heading("unit"), lambda item: Cell(item[0].units[1])),
@@ -59,7 +56,7 @@ def _friction_section(done: IdentifiedMachine, robot: RobotIdentification) -> Pa
         ),
     )
     title = "Torque that is not explained in what was left out of the fit, RMS"
-    tables = (tabulate("torque", title, fields, rows), _forms_table(done, robot))
+    tables = (tabulate("torque", title, fields, rows), _forms_table(robot))
     figures = []
     unseen = [item for item in rows if item[0].evidence and item[0].evidence.unseen]
     if unseen:
@@ -70,48 +67,14 @@ def _friction_section(done: IdentifiedMachine, robot: RobotIdentification) -> Pa
     return PageSection("Prediction of unseen runs, joints", tables, images_of(figures))
 
 
-def _forms_table(done: IdentifiedMachine, robot: RobotIdentification) -> Table:
+def _forms_table(robot: RobotIdentification) -> Table:
     rows = []
-    for name, joint in zip(done.joints, robot.joints, strict=True):
-        for form, error in joint.errors.items():
-            tone = "good" if form is joint.form else ""
-            rows.append([name_cell(visible(name.joint)), Cell(form.value, tone=tone), number_cell(error)])
+    for joint, friction, _ in robot.rows:
+        for form, error in friction.errors.items():
+            tone = "good" if form is friction.form else ""
+            rows.append([name_cell(visible(joint.joint)), Cell(form.value, tone=tone), number_cell(error)])
     columns = (Heading("joint"), Heading("form of the friction"), Heading("RMS error", numeric=True))
     return Table("forms", "All forms that were compared", columns, rows)
-
-
-def _motion_section(done: IdentifiedMachine) -> PageSection:
-    moved = [(joint, joint.evidence.motion) for joint in done.joints if joint.evidence]
-    fields = (
-        (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
-        (Heading("unit"), lambda item: Cell(item[0].units[2])),
-        (
-            Heading("range"),
-            lambda item: Cell(f"{short_number(item[1].lowest)} to {short_number(item[1].highest)}"),
-        ),
-        (
-            Heading("speeds that are held [/s]"),
-            lambda item: Cell(listed_numbers(item[1].excitation.speeds, 2) or NOTHING),
-        ),
-        (Heading("highest speed [/s]", numeric=True), lambda item: number_cell(item[1].excitation.highest_speed)),
-        (
-            Heading("highest acceleration [/s²]", numeric=True),
-            lambda item: number_cell(item[1].excitation.highest_acceleration),
-        ),
-        (
-            Heading("forward"),
-            lambda item: Cell(percent(item[1].excitation.forward_share) if item[1].is_moving else NOTHING),
-        ),
-        (Heading("moving time [s]", numeric=True), lambda item: number_cell(item[1].excitation.moving_time)),
-        (
-            Heading("missing for its friction"),
-            lambda item: Cell(
-                words_of_needs(item[1].missing) or "nothing", tone="unknown" if item[1].missing else "good"
-            ),
-        ),
-    )
-    table = tabulate("motion", "Logged motion of each joint", fields, moved)
-    return PageSection("Excitation, joints", (table,))
 
 
 def _inertia_section(found: InertiaIdentification) -> PageSection:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.dom.minidom import parseString
@@ -85,6 +84,8 @@ def _placement(link: TreeLink) -> FloatArray:
 
 def _read(link: Any) -> FloatArray:
     """Return a link's pseudo-inertia in its own frame; zero without mass and inertia."""
+    from scipy.spatial.transform import Rotation
+
     matrix = np.zeros((4, 4))
     for inertial in _children(link, "inertial")[:1]:
         values = {node.tagName: node for tag in ("origin", "mass", "inertia") for node in _children(inertial, tag)[:1]}
@@ -94,25 +95,14 @@ def _read(link: Any) -> FloatArray:
         if "origin" in values:
             place, angles = (values["origin"].getAttribute(key) or "0 0 0" for key in ("xyz", "rpy"))
             transform[:3, 3] = [float(part) for part in place.split()]
-            transform[:3, :3] = _rotation([float(part) for part in angles.split()])
+            # Rz(yaw) Ry(pitch) Rx(roll), as a URDF defines rpy.
+            transform[:3, :3] = Rotation.from_euler("xyz", [float(part) for part in angles.split()]).as_matrix()
         matrix = np.asarray(transform @ about_centre @ transform.T)
     return matrix
 
 
 def _number(element: Any, key: str) -> float:
     return float(element.getAttribute(key) or "0") if element else 0.0
-
-
-def _rotation(angles: Sequence[float]) -> FloatArray:
-    """Return Rz(yaw) Ry(pitch) Rx(roll), as a URDF defines rpy."""
-    (sr, sp, sy), (cr, cp, cy) = (list(map(function, angles)) for function in (math.sin, math.cos))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 def _write(document: Any, link: Any, matrix: FloatArray, joint: str) -> None:

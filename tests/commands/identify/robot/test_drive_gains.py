@@ -40,7 +40,7 @@ def currents(
     return replace(run, torque=wrong / np.array(factors))
 
 
-def arm_gains(noise: float, seed: int = 1, scale: tuple[float, ...] | None = None) -> Identified:
+def arm_gains(noise: float, seed: int = 1, scale: tuple[float, ...] = (1.0, 1.0)) -> Identified:
     free = currents(ARM, fourier(seed, 2, 15.0), FACTORS, noise, seed)
     loaded = currents(loaded_arm(), fourier(seed + 1000, 2, 15.0), FACTORS, noise, seed + 1000)
     return drive_gains([free], [loaded], TOOL, ARM, scale)
@@ -49,14 +49,13 @@ def arm_gains(noise: float, seed: int = 1, scale: tuple[float, ...] | None = Non
 def test_the_factors_of_a_planar_arm_are_recovered() -> None:
     found = arm_gains(0.0)
     assert [item.value for item in found.estimates] == pytest.approx(FACTORS, rel=1e-4)
-    assert {(item.section, item.key, item.unit) for item in found.estimates} == {("channels.torque", "scale", "1")}
+    assert {(item.section, item.key, item.unit) for item in found.estimates} == {("channels.torque", "scale", "N m/A")}
     assert {item.method for item in found.estimates} == {Method.LOADED_RUNS}
 
 
-def test_with_the_present_scale_they_are_torque_constants() -> None:
+def test_they_multiply_the_present_scale() -> None:
     found = arm_gains(0.0, scale=(10.0, 20.0))
     assert [item.value for item in found.estimates] == pytest.approx((12.0, 16.0), rel=1e-4)
-    assert {item.unit for item in found.estimates} == {"N m/A"}
 
 
 def test_the_standard_errors_cover() -> None:
@@ -85,7 +84,7 @@ def test_a_payload_on_a_turned_link_of_a_robot(tmp_path: Path) -> None:
     loaded = replace(machine, tree=with_bodies(machine.tree, bodies))
     factors = (1.2, 0.9, 1.1, 0.8, 1.0, 1.3)
     runs = [currents(robot, fourier(seed, 6, 10.0), factors, 0.0, 1) for seed, robot in ((1, machine), (2, loaded))]
-    found = drive_gains([runs[0]], [runs[1]], payload, machine)
+    found = drive_gains([runs[0]], [runs[1]], payload, machine, (1.0,) * 6)
     assert [item.joint for item in found.estimates] == list(range(6))
     assert [item.value for item in found.estimates] == pytest.approx(factors, rel=1e-3)
 
@@ -93,7 +92,7 @@ def test_a_payload_on_a_turned_link_of_a_robot(tmp_path: Path) -> None:
 def test_a_joint_that_the_payload_does_not_load_is_refused() -> None:
     small = replace(TOOL, link="arm", centre=(0.2, 0.0, 0.0))
     runs = [currents(ARM, fourier(seed, 2, 15.0), FACTORS, 0.1, seed) for seed in (1, 2)]
-    found = drive_gains(runs[:1], runs[1:], small, ARM)
+    found = drive_gains(runs[:1], runs[1:], small, ARM, (1.0, 1.0))
     refused = {item.joint: item.missing for item in found.not_identifiable}
     assert refused[1] == (Missing.PAYLOAD,)
 
@@ -101,7 +100,7 @@ def test_a_joint_that_the_payload_does_not_load_is_refused() -> None:
 def test_a_payload_below_the_noise_is_refused() -> None:
     tiny = replace(TOOL, mass=0.001)
     runs = [currents(ARM, fourier(seed, 2, 15.0), FACTORS, 0.3, seed) for seed in (1, 2)]
-    found = drive_gains(runs[:1], runs[1:], tiny, ARM)
+    found = drive_gains(runs[:1], runs[1:], tiny, ARM, (1.0, 1.0))
     assert not found.estimates
     assert {item.missing for item in found.not_identifiable} == {(Missing.PAYLOAD,)}
 
@@ -109,11 +108,11 @@ def test_a_payload_below_the_noise_is_refused() -> None:
 def test_unloaded_runs_alone_unknown_links_and_bad_payloads_are_refused() -> None:
     run = currents(ARM, fourier(1, 2, 5.0), FACTORS, 0.0, 1)
     with pytest.raises(IdentificationError, match="with and without the payload"):
-        drive_gains([run], [], TOOL, ARM)
+        drive_gains([run], [], TOOL, ARM, (1.0, 1.0))
     with pytest.raises(ConfigurationError, match="unknown link 'tool'"):
-        drive_gains([run], [run], replace(TOOL, link="tool"), ARM)
+        drive_gains([run], [run], replace(TOOL, link="tool"), ARM, (1.0, 1.0))
     with pytest.raises(ConfigurationError, match="off the link's axis"):
-        drive_gains([run], [run], replace(TOOL, centre=(0.1, 0.0, 0.1)), ARM)
+        drive_gains([run], [run], replace(TOOL, centre=(0.1, 0.0, 0.1)), ARM, (1.0, 1.0))
     with pytest.raises(ConfigurationError, match="mass is 0"):
         replace(TOOL, mass=0.0)
     with pytest.raises(UsageError, match="3 values of scale"):

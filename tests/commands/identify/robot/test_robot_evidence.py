@@ -107,7 +107,7 @@ def test_friction_that_is_right_is_kept_with_the_error_of_the_other(tmp_path: Pa
         )
     summary = done.summary
     assert summary["joints"][0]["friction_decision"]["answer"] == "not_better"
-    assert summary["joints"][0]["motion"]["missing"] == []
+    assert len(summary["joints"][0]["motion"]["excitation"]["speeds"]) > 1
 
 
 def test_a_joint_that_rests_has_nothing_but_its_need() -> None:
@@ -118,9 +118,9 @@ def test_a_joint_that_rests_has_nothing_but_its_need() -> None:
     assert math.isnan(forearm.robot.before)
     assert forearm.evidence is not None
     assert forearm.evidence.unseen is None
-    assert forearm.evidence.motion.missing
+    assert not forearm.evidence.motion.is_moving
     # No speed is made up from the noise at rest.
-    assert all(not plan.speeds for plan in forearm.plan)
+    assert not forearm.evidence.motion.excitation.speeds
 
 
 @pytest.fixture(scope="module")
@@ -156,8 +156,8 @@ def test_the_command_states_what_the_ur10e_does_not_show(real: tuple[str, dict[s
     assert "of 36 not determined" in line
     assert out.count("old: not better by more than one standard error") == 3
     assert "errors do not contain how friction differs from day to day" in out
-    assert "joint3 over 2 rad at up to 0.56 rad/s (logged: 0.32 rad, 0.56 rad/s)" in out
-    assert values["inertia_plan"]["joints"][2]["logged_range"] == pytest.approx(0.32, abs=0.01)
+    motion = values["joints"][2]["motion"]
+    assert motion["highest"] - motion["lowest"] == pytest.approx(0.32, abs=0.01)
 
 
 def loaded_arm(mass: float, along: float) -> PlanarArm:

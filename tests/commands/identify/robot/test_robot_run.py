@@ -38,7 +38,6 @@ def test_all_joints_come_to_the_slowest_channels_clock() -> None:
     assert known.mean() > 0.99
     np.testing.assert_allclose(run.position[known], np.sin(run.time[known, np.newaxis] * RATES), atol=2e-5)
     np.testing.assert_allclose(run.torque[:, 1], 2.0 * run.torque[:, 0], rtol=1e-12)
-    assert not run.derived
 
 
 @pytest.mark.parametrize("is_in_the_log", [True, False])
@@ -50,7 +49,6 @@ def test_a_speed_from_a_causal_derivative_is_replaced_by_one_without_delay(is_in
     else:
         log = recording(speed=True)
     run = robot_run(log)
-    assert run.derived == {"speed"}
     known = np.isfinite(run.speed).all(axis=1)
     assert known.mean() > 0.95
     np.testing.assert_allclose(run.speed[known], RATES * np.cos(run.time[known, np.newaxis] * RATES), atol=2e-3)

@@ -1,4 +1,4 @@
-"""`cdtool identify` with contacts at a load cell: the drive beyond its starts, the load, the scale of the torque."""
+"""`cdtool identify` with presses on a load cell: the scale of the torque, and what depends on it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import UsageError
-from cdtool.commands.identify.contact.identifying_contacts import ContactLogs
 from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.commands.inject.assumption import Assumption, assumptions_of
+from cdtool.commands.identify.presses import PressLogs
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.machines.axis_model.model_table import axis_model
 from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction
@@ -19,7 +18,7 @@ from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 from tests.command import cdtool as command
 from tests.commands.identify.axis.test_torque_constant import SCALE, pressed
 
-GATE = Path(__file__).parents[4] / "sample_logs" / "gate"
+GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 MASS = 80.0
 AXIS = """[machine]
 type = "linear_axis"
@@ -32,27 +31,6 @@ torque = { column = "f", unit = "N" } # from a data sheet
 speed = { column = "v", unit = "m/s" }
 force = { column = "cell", unit = "N" }
 """
-
-
-def test_stiff_contacts_show_the_drive_beyond_its_starts_and_leave_no_bracket(tmp_path: Path) -> None:
-    logs = ContactLogs((str(GATE / "stiff" / "*.csv"), str(GATE / "holdout" / "03.csv")))
-    target = tmp_path / "machine.toml"
-    done = cdtool.identify([GATE / "free" / "0[3456].csv"], GATE / "model.toml", target, other_logs=logs)
-    file = read_machine_file(target)
-    model = axis_model(file.machine, file.model)  # type: ignore[arg-type]
-    drive = model.drive
-    errors = {change.key: change.standard_errors[0] for change in done.changes}
-    for key, true, most in (("load_mass", 620.0, 0.02), ("take_up_travel", 5e-3, 0.06), ("end_stiffness", 1.2e6, 0.04)):
-        found = getattr(drive, key)
-        assert found == pytest.approx(true, rel=most)
-        assert abs(found - true) < 3.0 * errors[key]
-    assert assumptions_of(model) == (Assumption(),)
-    # Part of what impact-free logs show as friction of the load acts on the motor: their sum is the same.
-    assert drive.motor_friction == pytest.approx(20.0, abs=12.0)
-    assert model.friction.coulomb_forward + drive.motor_friction == pytest.approx(166.0, rel=0.1)
-    (left_out,) = done.skipped
-    assert "the load cell shows no contact" in left_out.reason
-    assert done.summary["joints"][0]["contacts"]["relative_error"]["torque"] < 0.1
 
 
 def write_press(path: Path, seed: int) -> None:
@@ -93,9 +71,11 @@ def test_presses_correct_the_scale_of_the_torque_and_everything_that_depends_on_
     free, machine = [axis / "free*.csv"], axis / "machine.toml"
     wrong = {change.key: change.values[0] for change in cdtool.identify(free, machine).changes}
     assert wrong["load_mass"] == pytest.approx(MASS / SCALE, rel=0.03)
-    presses = ContactLogs(pressed=(str(axis / "press*.csv"),))
+    presses = PressLogs((str(axis / "press*.csv"), str(axis / "free0.csv")))
     target = axis / "identified.toml"
     done = cdtool.identify(free, machine, target, other_logs=presses)
+    (left_out,) = done.skipped
+    assert "the load cell shows no contact" in left_out.reason
     right = {change.key: change.values[0] for change in done.changes}
     assert right["scale"] == pytest.approx(SCALE, rel=0.02)
     errors = {change.key: change.standard_errors[0] for change in done.changes}
@@ -128,7 +108,7 @@ def test_an_old_friction_of_the_model_does_not_apply_with_new_values(axis: Path)
 
 
 def test_hits_do_not_show_the_torque_constant_and_the_reason_is_stated() -> None:
-    logs = ContactLogs(pressed=(str(GATE / "stiff" / "*.csv"),))
+    logs = PressLogs((str(GATE / "stiff" / "*.csv"),))
     done = cdtool.identify([GATE / "free" / "0[34].csv"], GATE / "machine.toml", other_logs=logs)
     assert "torque constant cannot be identified" in done.joints[0].refused["torque_scale"]
     assert all(change.key != "scale" for change in done.changes)
@@ -139,15 +119,15 @@ def test_a_rotary_axis_needs_the_lever_arm_of_its_load_cell(tmp_path: Path) -> N
     (tmp_path / "machine.toml").write_text(text.replace('"f", unit = "N"', '"f", unit = "N m"'), encoding="utf-8")
     write_free(tmp_path / "free.csv", 1)
     with pytest.raises(UsageError, match="lever arm"):
-        cdtool.identify([tmp_path / "free.csv"], tmp_path / "machine.toml", other_logs=ContactLogs(("x.csv",)))
+        cdtool.identify([tmp_path / "free.csv"], tmp_path / "machine.toml", other_logs=PressLogs(("x.csv",)))
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--lever-arm", "0.5"), "--lever-arm without --contacts or --presses"),
-        (("--contacts", "x.csv", "--lever-arm", "-1"), "--lever-arm is -1"),
-        (("--contacts", "x.csv", "--loaded-logs", "y.csv", "--payload", "1"), "these are for robots, those for axes"),
+        (("--lever-arm", "0.5"), "--lever-arm without --presses"),
+        (("--presses", "x.csv", "--lever-arm", "-1"), "--lever-arm is -1"),
+        (("--presses", "x.csv", "--loaded-logs", "y.csv", "--payload", "1"), "these are for robots, those for axes"),
     ],
 )
 def test_options_that_do_not_belong_together_are_one_line(axis: Path, options: tuple[str, ...], message: str) -> None:

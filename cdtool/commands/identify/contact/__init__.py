@@ -1,1 +1,0 @@
-"""Parameters of a contact from its force at the load cell."""
