@@ -33,7 +33,6 @@ FORMATS = Registry(
         "tdms": "cdtool.formats.containers.tdms:Tdms",
         "rosbag": "cdtool.formats.bags.rosbag:Rosbag",
         "rosbag2": "cdtool.formats.bags.rosbag2:Rosbag2",
-        "ulog": "cdtool.formats.containers.ulog:Ulog",
         "xlsx": "cdtool.formats.containers.xlsx:Xlsx",
     },
     contract=("name", "suffixes", "sniff", "columns"),

@@ -51,6 +51,7 @@ _KNOWN_CONTENTS = {
     b"\x1f\x8b": "gzip-compressed",
     b"(\xb5/\xfd": "zstd-compressed",
     b"\x89HDF": "an HDF5 file",
+    b"ULog\x01\x12\x35": "a ULog file of PX4",
     b"SQLite format 3": "an SQLite database, but not a ROS 2 bag",
     b"<": "HTML or XML",
     b"{": "JSON",
@@ -59,6 +60,7 @@ _KNOWN_CONTENTS = {
 _NEXT_STEPS = {
     "a ZIP archive or an Excel workbook": "unpack the archive, or save the sheet as CSV",
     "gzip-compressed": "only text tables are read compressed; unpack it first, e.g. with gunzip",
+    "a ULog file of PX4": "write its topics as CSV, with ulog2csv of pyulog",
     "zstd-compressed": "unpack it first, e.g. with unzstd",
 }
 

@@ -30,6 +30,7 @@ def test_the_first_bytes_determine_the_format_if_the_suffix_is_wrong(log, tmp_pa
         (b"PK\x03\x04\0\0", "a.xlsx", "an Excel workbook"),
         (b"SQLite format 3\0", "a.db3", "an SQLite database"),
         (b'{"a": 1}', "a.json", "it is JSON"),
+        (b"ULog\x01\x12\x35\x01" + bytes(99), "a.ulg", "it is a ULog file of PX4"),
         (b"\x89MCAP", "a.mcap", "is not a recording, nor a complete MCAP file"),
         (bytes(200), "a.dat", "is not a recording"),
         ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.csv", "contains no row of numbers"),
