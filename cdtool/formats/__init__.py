@@ -29,7 +29,6 @@ FORMATS = Registry(
         "mat": "cdtool.formats.mat:Mat",
         "parquet": "cdtool.formats.containers.parquet:Parquet",
         "hdf5": "cdtool.formats.containers.hdf5:Hdf5",
-        "mdf": "cdtool.formats.containers.mdf:Mdf",
         "tdms": "cdtool.formats.containers.tdms:Tdms",
         "rosbag": "cdtool.formats.bags.rosbag:Rosbag",
         "rosbag2": "cdtool.formats.bags.rosbag2:Rosbag2",

@@ -22,7 +22,6 @@ WRITERS = {
     ".feather": "cdtool.formats.containers.parquet_writing:write_feather",
     ".h5": "cdtool.formats.containers.hdf5_writing:write_hdf5",
     ".hdf5": "cdtool.formats.containers.hdf5_writing:write_hdf5",
-    ".mf4": "cdtool.formats.containers.mdf:write_mdf",
     ".tdms": "cdtool.formats.containers.tdms:write_tdms",
 }
 ONE_CLOCK = (".csv",)

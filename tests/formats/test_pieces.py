@@ -46,7 +46,7 @@ def same(one: Source, other: Source) -> bool:
     )
 
 
-@pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
+@pytest.mark.parametrize("suffix", [".h5", ".tdms"])
 def test_a_container_read_in_many_pieces_has_the_same_columns(suffix, tmp_path, monkeypatch):
     needs(suffix)
     path = Path(convert(two_clocks(tmp_path / "run.mcap"), tmp_path / f"run{suffix}").files[0])

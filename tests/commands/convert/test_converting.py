@@ -67,7 +67,7 @@ def test_each_of_two_clocks_gets_its_own_csv_table_without_resampling(tmp_path):
             assert series.time.tobytes() == original[name].time.tobytes()
 
 
-@pytest.mark.parametrize("suffix", [suffix for suffix in SEVERAL_CLOCKS if suffix != ".mf4"])
+@pytest.mark.parametrize("suffix", SEVERAL_CLOCKS)
 def test_the_start_of_a_log_on_an_epoch_is_kept(suffix, tmp_path):
     needs(suffix)
     log = two_clocks(tmp_path / "run.mcap", start_ns=1_700_000_000_123_456_789)
@@ -198,13 +198,6 @@ def of_hdf5(path: Path) -> dict[str, str]:
         return {key: str(value) for key, value in file.attrs.items()}
 
 
-def of_mdf(path: Path) -> dict[str, str]:
-    import asammdf
-
-    with asammdf.MDF(path) as log:
-        return dict(line.split(": ", 1) for line in str(log.header.description).splitlines())
-
-
 def of_tdms(path: Path) -> dict[str, str]:
     import nptdms
 
@@ -218,7 +211,6 @@ PROVENANCE = {
     ".feather": of_parquet,
     ".h5": of_hdf5,
     ".hdf5": of_hdf5,
-    ".mf4": of_mdf,
     ".tdms": of_tdms,
 }
 
