@@ -164,9 +164,8 @@ def cases(inputs: Path) -> list[Case]:
                 f"convert {suffix}",
                 _convert(f"{inputs}/2.csv", suffix, *machine),
                 _convert(f"{inputs}/1.csv", suffix, *machine),
-                suffix != "tdms",
             )
-            for suffix in ("csv", "mcap", "parquet", "feather", "h5", "tdms")
+            for suffix in ("csv", "mcap", "parquet", "feather")
         ),
         Case("study sensors", _sensors(machine, "0.3"), _sensors(machine, "0.2")),
         Case("study figures", ("study", "figures", "-o", "{out}/figures")),

@@ -20,9 +20,6 @@ WRITERS = {
     ".mcap": "cdtool.formats.bags.mcap_writing:write_mcap_topics",
     ".parquet": "cdtool.formats.containers.parquet_writing:write_parquet",
     ".feather": "cdtool.formats.containers.parquet_writing:write_feather",
-    ".h5": "cdtool.formats.containers.hdf5_writing:write_hdf5",
-    ".hdf5": "cdtool.formats.containers.hdf5_writing:write_hdf5",
-    ".tdms": "cdtool.formats.containers.tdms:write_tdms",
 }
 ONE_CLOCK = (".csv",)
 

@@ -34,8 +34,8 @@ def inject(
         str | None,
         typer.Option(
             "--format",
-            help="csv, mcap, parquet, feather, h5 or tdms; csv has one clock.",
-            autocompletion=completions.one_of(("csv", "mcap", "parquet", "feather", "h5", "tdms")),
+            help="csv, mcap, parquet or feather; csv has one clock.",
+            autocompletion=completions.one_of(("csv", "mcap", "parquet", "feather")),
         ),
     ] = None,
     jobs: JobsOption = 1,

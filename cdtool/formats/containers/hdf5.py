@@ -144,7 +144,6 @@ class Hdf5(SlicedFormat):
         with one_line_errors("an HDF5 file"), h5py.File(container.path, "r") as file:
             datasets = _Datasets(container, h5py, file)
             container.details = {"datasets": str(len(datasets.packings))}
-            container.origin = float(file.attrs.get("cdtool.origin_s", 0.0))
             yield
             container.findings += datasets.clocks_without_unit()
 

@@ -191,27 +191,11 @@ def of_parquet(path: Path) -> dict[str, str]:
     return {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
 
 
-def of_hdf5(path: Path) -> dict[str, str]:
-    import h5py
-
-    with h5py.File(path) as file:
-        return {key: str(value) for key, value in file.attrs.items()}
-
-
-def of_tdms(path: Path) -> dict[str, str]:
-    import nptdms
-
-    return dict(nptdms.TdmsFile.read_metadata(path).properties)
-
-
 PROVENANCE = {
     ".csv": of_csv,
     ".mcap": of_mcap,
     ".parquet": of_parquet,
     ".feather": of_parquet,
-    ".h5": of_hdf5,
-    ".hdf5": of_hdf5,
-    ".tdms": of_tdms,
 }
 
 
@@ -289,6 +273,6 @@ def test_the_kinds_of_a_label_are_kept(tmp_path):
         "t,v,k\n" + "".join(f"{i / 10},0.{i},{i % 3}\n" for i in range(9)), encoding="utf-8"
     )
     machine = read_machine_file(tmp_path / "machine.toml")
-    convert(tmp_path / "log.csv", tmp_path / "new.h5", machine=machine)
-    again = read_machine_file(tmp_path / "new.h5.machine.toml")
+    convert(tmp_path / "log.csv", tmp_path / "new.parquet", machine=machine)
+    again = read_machine_file(tmp_path / "new.parquet.machine.toml")
     assert {item.channel: item.kinds for item in again.columns.sources}["label"] == ((1.0, "hard"), (2.5, 'so"ft'))

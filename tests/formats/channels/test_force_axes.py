@@ -14,7 +14,7 @@ from cdtool.base.findings import Finding
 from cdtool.commands.convert.converting import convert
 from cdtool.formats.channels.channel_map import ChannelSource
 from cdtool.formats.channels.force_axes import on_one_clock
-from cdtool.formats.channels.reading import read_as_logged
+from cdtool.formats.channels.reading import read_as_logged, survey
 from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
@@ -145,7 +145,7 @@ def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, als
     log, machine = write_log(tmp_path, axes, time), read_machine_file(tmp_path / "machine.toml")
     found = read_as_logged(log, machine).recording["force"].values
     assert found.tolist() == (-axes[:, 2:] if also else axes).tolist()
-    for name in ("new.csv", "new.mcap", "new.h5"):
+    for name in ("new.csv", "new.mcap", "new.parquet"):
         convert(log, tmp_path / name, machine=machine)
         again = read_machine_file(tmp_path / f"{name}.machine.toml")
         assert read_as_logged(tmp_path / name, again).recording["force"].values.tolist() == found.tolist()
@@ -156,10 +156,13 @@ def test_an_infinite_value_of_an_axis_of_a_container_with_clocks_names_the_axis(
     axes[7, 1] = np.inf
     (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{TOPIC}\n", encoding="utf-8")
     log = write_log(tmp_path, np.where(np.isinf(axes), 1.0, axes), np.arange(200) * 5e-3)
-    convert(log, tmp_path / "new.h5", machine=read_machine_file(tmp_path / "machine.toml"))
-    with h5py.File(tmp_path / "new.h5", "r+") as file:
+    convert(log, tmp_path / "new.parquet", machine=read_machine_file(tmp_path / "machine.toml"))
+    with h5py.File(tmp_path / "new.h5", "w") as file:
+        for name, column in survey(tmp_path / "new.parquet").columns.items():
+            file[name] = column.values
+            file[name].attrs["unit"] = column.unit or "1"
         file["force y"][7] = np.inf
-    again = read_machine_file(tmp_path / "new.h5.machine.toml")
+    again = read_machine_file(tmp_path / "new.parquet.machine.toml")
     (found,) = (
         item for item in read_as_logged(tmp_path / "new.h5", again).recording.findings if item.severity == "loss"
     )
