@@ -63,17 +63,17 @@ def _column(
     """Return a column, with its own clock if it has one; a clock that counts days is read in seconds."""
     if column is None:  # read only where a machine file names it
         return None
-    for variable, numbers in ((section.variable, section.numbers) for section in column.sections):
-        if numbers.is_complex and container.wanted is not None:
-            raise RecordingError(f"column '{name}' is complex", "save its real part")
-        if numbers.is_complex:
-            fact = {"variable": variable, "what": "complex", "advice": ""}
-            container.findings.append(Finding("variable_left_out", "", fact))
-            return None
-        if numbers.is_across:
-            rows, width = numbers.shape
-            shape = {"thing": "variable", "name": variable, "rows": rows, "columns": width}
-            container.findings.append(Finding("rows_as_columns", "", shape))
+    variable, numbers = column.variable, column.numbers
+    if numbers.is_complex and container.wanted is not None:
+        raise RecordingError(f"column '{name}' is complex", "save its real part")
+    if numbers.is_complex:
+        fact = {"variable": variable, "what": "complex", "advice": ""}
+        container.findings.append(Finding("variable_left_out", "", fact))
+        return None
+    if numbers.is_across:
+        rows, width = numbers.shape
+        shape = {"thing": "variable", "name": variable, "rows": rows, "columns": width}
+        container.findings.append(Finding("rows_as_columns", "", shape))
     clock = clock_of(column.clock) if clock_of is not None and column.clock else None
     if not is_clock_name(name.rpartition(".")[2]) or not is_datenum(column.values):
         return SlicedColumn(column.rows, lambda start, end: column.values[start:end], clock)
