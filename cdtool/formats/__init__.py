@@ -24,7 +24,6 @@ FORMATS = Registry(
     table={
         "csv": "cdtool.formats.csv:Csv",
         "twincat_scope": "cdtool.formats.exports.twincat_scope:TwincatScope",
-        "lvm": "cdtool.formats.exports.lvm:Lvm",
         "mcap": "cdtool.formats.mcap:Mcap",
         "mat": "cdtool.formats.mat:Mat",
         "parquet": "cdtool.formats.containers.parquet:Parquet",

@@ -28,6 +28,7 @@ from cdtool.formats.csv_dialect.ambiguous_marks import (
     resolve_marks,
 )
 from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
+from cdtool.formats.csv_dialect.foreign_heads import MEASUREMENT, refuse_measurement
 from cdtool.formats.csv_dialect.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell, find_marks
@@ -248,6 +249,8 @@ def find_dialect(path: Path, pins: TablePins) -> Dialect:
     Raises RecordingError if the file is not a table, or is ambiguous.
     """
     text, stream = open_table(path, pins.encoding)
+    if stream.startswith(MEASUREMENT) and not pins.skip_lines:
+        refuse_measurement(text.decode(stream))
     dialect = _dialect(text, stream, pins)
     if dialect.marks.sure:
         return dialect
