@@ -15,10 +15,10 @@ import numpy as np
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.containers.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.containers.container_checks import library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock
 from cdtool.formats.mat import version_5, version_73
+from cdtool.formats.mat.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
 from cdtool.formats.mat.layout import MatLayout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables

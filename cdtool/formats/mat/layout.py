@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from cdtool.base.findings import Finding
-from cdtool.formats.containers.clock_beside import is_clock_name
+from cdtool.formats.mat.clock_beside import is_clock_name
 from cdtool.formats.mat.variables import MatColumn, Numbers, Value, Variables, left_out
 
 _DETAIL = 80
