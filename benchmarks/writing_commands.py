@@ -165,7 +165,7 @@ def cases(inputs: Path) -> list[Case]:
                 _convert(f"{inputs}/2.csv", suffix, *machine),
                 _convert(f"{inputs}/1.csv", suffix, *machine),
             )
-            for suffix in ("csv", "mcap", "parquet", "feather")
+            for suffix in ("csv", "mcap", "parquet")
         ),
         Case("study sensors", _sensors(machine, "0.3"), _sensors(machine, "0.2")),
         Case("study figures", ("study", "figures", "-o", "{out}/figures")),

@@ -19,9 +19,8 @@ WRITERS = {
     ".csv": "cdtool.formats.exports.csv_writing:write_csv_table",
     ".mcap": "cdtool.formats.bags.mcap_writing:write_mcap_topics",
     ".parquet": "cdtool.formats.containers.parquet_writing:write_parquet",
-    ".feather": "cdtool.formats.containers.parquet_writing:write_feather",
 }
-ONE_CLOCK = (".csv",)
+ONE_CLOCK = (".csv", ".parquet")
 
 
 def writer_of(target: Path) -> GroupWriter:

@@ -21,7 +21,7 @@ def convert(
         Place,
         typer.Argument(
             parser=location,
-            help="The file to write: .csv, .mcap, .parquet or .feather.",
+            help="The file to write: .csv, .mcap or .parquet.",
             metavar="OUT",
         ),
     ],

@@ -184,10 +184,9 @@ def of_mcap(path: Path) -> dict[str, str]:
 
 
 def of_parquet(path: Path) -> dict[str, str]:
-    import pyarrow.feather
     import pyarrow.parquet
 
-    table = pyarrow.parquet.read_table(path) if path.suffix == ".parquet" else pyarrow.feather.read_table(path)
+    table = pyarrow.parquet.read_table(path)
     return {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
 
 
@@ -195,7 +194,6 @@ PROVENANCE = {
     ".csv": of_csv,
     ".mcap": of_mcap,
     ".parquet": of_parquet,
-    ".feather": of_parquet,
 }
 
 

@@ -32,6 +32,7 @@ def test_the_first_bytes_determine_the_format_if_the_suffix_is_wrong(log, tmp_pa
         (b'{"a": 1}', "a.json", "it is JSON"),
         (b"ULog\x01\x12\x35\x01" + bytes(8) + b"B", "a.ulg", "it is a ULog file of PX4"),
         (b"MDF     4.10    " + bytes(8) + b"B", "a.mf4", "it is an MDF file"),
+        (b"ARROW1\0\0" + bytes(8) + b"B", "a.feather", "it is a Feather file"),
         (b"\x89MCAP", "a.mcap", "is not a recording, nor a complete MCAP file"),
         (bytes(200), "a.dat", "is not a recording"),
         ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.csv", "contains no row of numbers"),
