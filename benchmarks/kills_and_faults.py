@@ -58,7 +58,7 @@ _FINISHED = (0, 1, 3, 4)
 # Lines about the input, unrelated to writing.
 _OF_THE_WORK = ("warning: ", "note: ", "left out: ", "loss: ")
 _HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_pdf")
-_OPTIONAL = ("h5py", "pyarrow.parquet", "pyarrow.ipc", "asammdf", "nptdms", "mcap.writer", "mcap.reader", "jinja2")
+_OPTIONAL = ("h5py", "pyarrow.parquet", "pyarrow.ipc", "nptdms", "mcap.writer", "mcap.reader", "jinja2")
 Snapshot = dict[str, tuple[int, bytes]]
 # A folder whose files are written separately: one per log.
 _PLOTS = "plots"

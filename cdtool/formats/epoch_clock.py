@@ -28,18 +28,16 @@ class EpochClock:
     """The stamps of a file: `read(start, end)` returns them without conversion, integers as integers.
 
     A stamp is a multiple of `factor` [s], counted from `base` [s] after 1970 (`dated`) or after an unknown start.
-    Stamps that are equal to one of `missing` are missing.
     """
 
     read: Callable[[int, int], npt.NDArray[Any]]
     factor: float
     base: Fraction = Fraction(0)
-    missing: tuple[float, ...] = ()
     dated: bool = False
     first: Fraction | None = field(init=False)
 
     def __post_init__(self) -> None:
-        stamps = (stamp for stamp in self.read(0, _SEARCHED) if np.isfinite(stamp) and stamp not in self.missing)
+        stamps = (stamp for stamp in self.read(0, _SEARCHED) if np.isfinite(stamp))
         first = next(stamps, None)
         exact = int(first) if isinstance(first, np.integer) else None if first is None else float(first)
         object.__setattr__(self, "first", None if exact is None else Fraction(exact))
@@ -58,12 +56,8 @@ class EpochClock:
         """Return times [s] after `origin` if the stamps count from 1970; NaN where the stamp is missing."""
         raw = self.read(start, end)
         if self.start is None or not self.is_since_1970:
-            times = as_float64(raw) * self.factor + float(self.base)
-        else:
-            times = _since(raw, self.first or Fraction(0)) * self.factor + float(self.start - origin)
-        if self.missing:
-            times[np.isin(raw, self.missing)] = np.nan
-        return times
+            return as_float64(raw) * self.factor + float(self.base)
+        return _since(raw, self.first or Fraction(0)) * self.factor + float(self.start - origin)
 
 
 def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding], channel: str) -> EpochClock:
@@ -79,7 +73,7 @@ def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding],
     findings.append(
         Finding("file_unit_implausible", channel, {"readings": both_readings(stamp, clock.factor, stated, meant)})
     )
-    return EpochClock(clock.read, SECONDS[meant], missing=clock.missing)
+    return EpochClock(clock.read, SECONDS[meant])
 
 
 def common_origin(clocks: Mapping[str, EpochClock], findings: list[Finding]) -> Fraction:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -105,15 +104,6 @@ def require_clocks(groups: Sequence[Group]) -> None:
             "no column of the log is recognised as its clock, and this container needs a clock",
             "name the clock in a machine file, and pass the file with -m",
         )
-
-
-def names_of(groups: Sequence[Group], prefixes: Sequence[str]) -> WrittenNames:
-    """Return the names of columns, with the prefix of their group if several groups have a column of that name."""
-    shared = Counter(part.name for group in groups for part in chain(*group.flat))
-    return [
-        [[f"{prefix}/{part.name}" if shared[part.name] > 1 else part.name for part in parts] for parts in group.flat]
-        for group, prefix in zip(groups, prefixes, strict=True)
-    ]
 
 
 def prefix_keys(provenance: Mapping[str, str]) -> dict[str, str]:

@@ -99,7 +99,7 @@ class SlicedFormat(PiecewiseFormat):
                 left_out = next(key for key in keys if key not in columns)
                 raise RecordingError(f"column '{left_out}' is not numeric", "map another column")
             if not columns:
-                raise RecordingError("has no column of numbers", "see cdtool info")
+                raise RecordingError("has no column of numbers", str(next(iter(container.findings), "is it a log?")))
             if not container.has_own_clocks:
                 columns = {key: replace(column, clock=None) for key, column in columns.items()}
             clocks = {key: column.clock for key, column in columns.items() if column.clock is not None}

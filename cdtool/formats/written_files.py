@@ -19,13 +19,8 @@ WRITERS = {
     ".csv": "cdtool.formats.exports.csv_writing:write_csv_table",
     ".mcap": "cdtool.formats.bags.mcap_writing:write_mcap_topics",
     ".parquet": "cdtool.formats.containers.parquet_writing:write_parquet",
-    ".feather": "cdtool.formats.containers.parquet_writing:write_feather",
-    ".h5": "cdtool.formats.containers.hdf5_writing:write_hdf5",
-    ".hdf5": "cdtool.formats.containers.hdf5_writing:write_hdf5",
-    ".mf4": "cdtool.formats.containers.mdf:write_mdf",
-    ".tdms": "cdtool.formats.containers.tdms:write_tdms",
 }
-ONE_CLOCK = (".csv",)
+ONE_CLOCK = (".csv", ".parquet")
 
 
 def writer_of(target: Path) -> GroupWriter:

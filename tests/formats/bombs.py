@@ -123,30 +123,6 @@ def parquet_with_a_false_page(path: Path, claimed: int = 2**31 - 8) -> Path:
     return path
 
 
-def feather_of_zeros(path: Path, compression: str = "zstd", batches: int = 20) -> Path:
-    """Write 1.5 GiB of zeros in batches of 80 MB."""
-    import pyarrow as arrow
-    import pyarrow.ipc as ipc
-
-    batch = arrow.record_batch({"a": np.zeros(10**7)})
-    options = ipc.IpcWriteOptions(compression=compression)
-    with arrow.OSFile(str(path), "wb") as file, ipc.new_file(file, batch.schema, options=options) as writer:
-        for _ in range(batches):
-            writer.write_batch(batch)
-    return path
-
-
-def feather_with_a_false_buffer(path: Path) -> Path:
-    """Write 1000 numbers whose compressed buffer declares a TiB."""
-    import pyarrow as arrow
-    import pyarrow.feather as feather
-
-    feather.write_feather(arrow.table({"a": np.arange(1000.0)}), str(path), compression="zstd")
-    content = path.read_bytes()
-    path.write_bytes(content.replace(struct.pack("<q", 8 * 1000), struct.pack("<q", 2**40), 1))
-    return path
-
-
 def varint(value: int) -> bytes:
     """Return an unsigned integer in the varint encoding of Thrift and protobuf."""
     encoded = bytearray()

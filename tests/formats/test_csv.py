@@ -98,7 +98,7 @@ def test_a_byte_order_mark_is_not_part_of_the_first_name(log):
 
 
 def test_a_byte_order_mark_before_numbers_is_skipped(log):
-    assert values(read(log("1,2\n3,4\n".encode("utf-8-sig"))), "0") == [1, 3]
+    assert values(read(log("1,2.5\n3,4.5\n".encode("utf-8-sig"))), "0") == [1, 3]
 
 
 def test_latin_1_is_read_with_a_finding(log):
@@ -185,7 +185,7 @@ def test_a_missing_column_is_named_with_its_channel_and_the_nearest(log, machine
 def test_a_column_number_beyond_the_file_is_an_error(log, machine):
     wanted = machine('[channels]\ntime = { column = 0, unit = "s" }\nspeed = { column = 7, unit = "rad/s" }\n').columns
     with pytest.raises(RecordingError, match=r"no column 7 .*numbered from 0 to 1"):
-        read(log("0,1\n1,2\n"), wanted)
+        read(log("0,1.5\n1,2.5\n"), wanted)
 
 
 @pytest.mark.parametrize(

@@ -95,18 +95,15 @@ def test_a_clock_in_an_unknown_unit_is_a_warning(source_of):
     assert (doubt.channel, doubt.numbers["unit"]) == ("a.t", "ms")
 
 
-def test_structs_with_their_own_clocks_are_runs_one_after_the_other(source_of):
+def test_the_elements_of_an_array_of_structs_have_their_own_clocks(source_of):
     source = source_of({"trial": trials()})
-    assert set(source.columns) == {"trial(:)", "trial(:).t", "trial(:).q[0]", "trial(:).q[1]", "trial(:).load"}
-    runs = trials()
-    values = {name: column.values for name, column in source.columns.items()}
-    assert values["trial(:)"].tolist() == [1.0] * 30 + [2.0] * 40 + [3.0] * 50
-    np.testing.assert_array_equal(values["trial(:).t"], np.concatenate([run["t"] for run in runs]))
-    np.testing.assert_array_equal(values["trial(:).q[1]"], np.concatenate([run["q"][:, 1] for run in runs]))
-    assert set(values["trial(:).load"][30:70]) == {40.0}
-    assert source.details["trial(2).tool"] == "tool 40"
-    assert facts(source, "runs_of_structs") == [("runs_of_structs", {"array": "trial", "runs": 3, "rows": 120})]
-    assert {"trial(1).t", "trial(3).q[1]"} <= set(source.names)
+    fields = ("t", "q[0]", "q[1]")
+    assert set(source.columns) == {f"trial({number}).{name}" for number in (1, 2, 3) for name in fields}
+    for number, run in enumerate(trials(), 1):
+        column = source.columns[f"trial({number}).q[1]"]
+        np.testing.assert_array_equal(column.values, run["q"][:, 1])
+        np.testing.assert_array_equal(column.time, run["t"])
+    assert source.details["trial(2).tool"] == "tool 40" and source.details["trial(2).load"] == "40"
 
 
 def test_one_run_can_be_mapped_by_its_own_name(tmp_path, machine):
@@ -116,36 +113,12 @@ def test_one_run_can_be_mapped_by_its_own_name(tmp_path, machine):
     np.testing.assert_array_equal(recording["speed"].values[:, 0], trials()[1]["q"][:, 0])
 
 
-def test_a_run_without_rows_is_named_and_a_field_that_a_run_has_not_is_missing(source_of):
-    runs = trials()
-    runs[1] |= {"t": np.empty((0, 0)), "q": np.empty((0, 0))}
-    runs[2]["q"] = np.empty((0, 0))
-    source = source_of({"trial": runs})
-    assert len(source.columns["trial(:)"].values) == 80
-    assert np.isnan(source.columns["trial(:).q[0]"].values[30:]).all()
-    assert facts(source, "runs_without_rows") == [("runs_without_rows", {"array": "trial", "runs": (2,)})]
-
-
-def test_parameters_of_runs_are_named_once(source_of):
-    runs = [run | {"gains": np.arange(5.0), "handle": ("a",)} for run in trials()]
-    source = source_of({"trial": runs})
-    assert facts(source, "without_clock") == [("without_clock", {"variable": "trial(:).gains", "rows": 5})]
-    assert [fact.numbers["variable"] for fact in facts(source, "variable_left_out")] == ["trial(:).handle"]
-
-
-def test_structs_with_equal_clocks_or_a_second_clock_are_no_runs(source_of):
-    side = [{"t": T, "tau": T}, {"t": T, "tau": -T}]
-    second = [{"t": T * k, "x": T, "t_cell": np.arange(9.0), "f": np.ones(9)} for k in (1.0, 2.0)]
-    source = source_of({"joint": side, "run": second})
-    assert "joint(2).tau" in source.columns and "run(2).f" in source.columns
-    assert not [name for name in source.columns if "(:)" in name]
-
-
-def test_an_array_of_structs_of_single_numbers_is_a_table(source_of):
+def test_an_array_of_structs_of_single_numbers_is_named_with_what_makes_it_readable(source_of):
     """table2struct(T) makes one struct per row."""
-    source = source_of({"T": [{"t": 0.1 * i, "tau": 2.0 * i, "note": "x"} for i in range(6)]})
-    assert source.columns["T(:).t"].values.tolist() == [0.1 * i for i in range(6)]
-    assert source.columns["T(:).tau"].values.tolist() == [0, 2, 4, 6, 8, 10]
+    source = source_of({"v": T, "T": [{"t": 0.1 * i, "tau": 2.0 * i, "note": "x"} for i in range(6)]})
+    (found,) = facts(source, "variable_left_out")
+    assert found.numbers["what"] == "an array of structs without vectors"
+    assert "struct('t', [T.t])" in found.numbers["advice"]
 
 
 def test_simulink_logs_use_the_clock_of_the_outer_struct(source_of):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.commands.convert.converting import convert
 from cdtool.formats import slices
 from cdtool.formats.channels.log_statistics import LogStatistics
 from cdtool.formats.channels.reading import choose_format
@@ -23,7 +23,6 @@ from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces, sp
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from tests.commands.convert.kinds import needs
-from tests.formats.container_files import two_clocks
 
 
 def pieces_of(path: Path) -> list[Piece]:
@@ -46,10 +45,32 @@ def same(one: Source, other: Source) -> bool:
     )
 
 
-@pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
-def test_a_container_read_in_many_pieces_has_the_same_columns(suffix, tmp_path, monkeypatch):
+def write_hdf5(path: Path, clocks: Mapping[str, Mapping[str, FloatArray]]) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, columns in clocks.items():
+            for key, values in columns.items():
+                file[f"{name}/{key}"] = values
+            file[f"{name}/time"].attrs["unit"] = "s"
+
+
+def write_tdms(path: Path, clocks: Mapping[str, Mapping[str, FloatArray]]) -> None:
+    import nptdms
+
+    with nptdms.TdmsWriter(str(path)) as writer:
+        for name, columns in clocks.items():
+            units = {"time": {"unit_string": "s"}}
+            writer.write_segment([nptdms.ChannelObject(name, key, *[v, units.get(key)]) for key, v in columns.items()])
+
+
+@pytest.mark.parametrize("write", [write_hdf5, write_tdms])
+def test_a_container_read_in_many_pieces_has_the_same_columns(write, tmp_path, monkeypatch):
+    suffix = ".h5" if write is write_hdf5 else ".tdms"
     needs(suffix)
-    path = Path(convert(two_clocks(tmp_path / "run.mcap"), tmp_path / f"run{suffix}").files[0])
+    path = tmp_path / f"run{suffix}"
+    drive, imu = np.arange(300) / 1000.0, 0.0101 + np.arange(700) / 3000.0
+    write(path, {"drive": {"time": drive, "effort": np.sin(drive)}, "imu": {"time": imu, "x": np.cos(imu), "y": imu}})
     found = choose_format(path)
     at_once = found.columns(path)
     assert len({piece.clock for piece in pieces_of(path)}) == len(pieces_of(path))

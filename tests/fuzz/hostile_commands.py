@@ -111,7 +111,6 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("info stiff/01.csv -m machine.toml", "stiff/01.csv"),
     ("info log.mcap", "log.mcap"),
     ("info log.mat", "log.mat"),
-    ("info log.h5", "log.h5"),
     ("info log.parquet", "log.parquet"),
     ("info stiff/01.csv -m robot.toml", "robot.toml"),
     ("info stiff/01.csv -m robot.toml", "six.urdf"),
@@ -253,7 +252,6 @@ def make_bench(folder: Path) -> None:
         (*signature, "-d", "gm", "-o", folder / "gate.json"),
         ("benchmark", folder / "benchmark.toml", "-o", folder / "results.json"),
         ("convert", folder / "stiff" / "01.csv", folder / "log.mcap", "-m", folder / "machine.toml"),
-        ("convert", folder / "stiff" / "01.csv", folder / "log.h5"),
         ("convert", folder / "stiff" / "01.csv", folder / "log.parquet"),
     ):
         done = cdtool(*arguments)

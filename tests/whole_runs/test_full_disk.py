@@ -40,18 +40,13 @@ def on_a_full_disk(limit: int, *arguments: object) -> subprocess.CompletedProces
     )
 
 
-@pytest.mark.parametrize(
-    ("suffix", "limit"),
-    [*((suffix, 1 << 15) for suffix in KINDS), (".h5", 1 << 11)],
-    ids=[*KINDS, ".h5, as it is closed"],
-)
-def test_a_full_disk_is_one_line_and_leaves_existing_files(suffix, limit, tmp_path):
+@pytest.mark.parametrize("suffix", KINDS)
+def test_a_full_disk_is_one_line_and_leaves_existing_files(suffix, tmp_path):
     needs(suffix)
-    rows = 10_000 if limit == 1 << 15 else 20
-    log, target = table(tmp_path / "run.csv", rows=rows), tmp_path / "out" / f"out{suffix}"
+    log, target = table(tmp_path / "run.csv", rows=10_000), tmp_path / "out" / f"out{suffix}"
     target.parent.mkdir()
     target.write_bytes(b"mine")
-    done = on_a_full_disk(limit, "convert", log, target, "--force")
+    done = on_a_full_disk(1 << 15, "convert", log, target, "--force")
     expected = f"error: {target}: cannot be written: {os.strerror(errno.EFBIG)} (check the folder and its space)\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", expected)
     assert target.read_bytes() == b"mine" and len(list(target.parent.iterdir())) == 1

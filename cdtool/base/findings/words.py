@@ -144,8 +144,6 @@ _COMPUTED: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
     "new_zeros": _new_zeros,
     "more_zeros": lambda numbers: len(_new_zeros(numbers)) - 1,
     "lost_span": lambda numbers: numbers["lost"]["time"][1] - numbers["lost"]["time"][0],
-    "empty_runs": lambda numbers: [f"{numbers['array']}({run})" for run in numbers["runs"]],
-    "text_without_point": lambda numbers: numbers["text"].replace(".", ""),
     "seen": lambda numbers: f"{numbers['answer']} {numbers['found']}",
     "unassessable": lambda numbers: len(numbers["not_assessable"]),
     "ahead": lambda numbers: numbers["onset"] - numbers["begin"],

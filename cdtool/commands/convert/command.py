@@ -21,7 +21,7 @@ def convert(
         Place,
         typer.Argument(
             parser=location,
-            help="The file to write: .csv, .mcap, .parquet, .feather, .h5, .mf4 or .tdms.",
+            help="The file to write: .csv, .mcap or .parquet.",
             metavar="OUT",
         ),
     ],

@@ -34,8 +34,8 @@ def inject(
         str | None,
         typer.Option(
             "--format",
-            help="csv, mcap, parquet, feather, h5, mf4 or tdms; csv has one clock.",
-            autocompletion=completions.one_of(("csv", "mcap", "parquet", "feather", "h5", "mf4", "tdms")),
+            help="csv, mcap or parquet; csv and parquet have one clock.",
+            autocompletion=completions.one_of(("csv", "mcap", "parquet")),
         ),
     ] = None,
     jobs: JobsOption = 1,

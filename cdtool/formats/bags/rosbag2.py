@@ -2,7 +2,7 @@
 
 rosbag2_storage_sqlite3: a table `topics` (id, name, type, serialization_format), a table `messages` (id, topic_id,
 timestamp [ns], data), and from ROS 2 Iron on `message_definitions`. Bags written before contain no definition of their
-messages: those of the standard packages are known. A bag may be compressed with zstd, message by message or as a file.
+messages: those of the standard packages are known. Messages may be compressed with zstd, one by one.
 
 A database is opened read-only and as immutable, so that neither it nor a file beside it is changed. One that was not
 closed has a journal beside it, which SQLite can only apply to a copy: both are copied to a temporary folder.
@@ -14,7 +14,7 @@ import os
 import shutil
 import sqlite3
 from collections.abc import Generator, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,13 +25,12 @@ from cdtool.base.findings import Finding
 from cdtool.base.remote.remote_path import location
 from cdtool.formats.bags.bag import Bag, one_line
 from cdtool.formats.bags.topic_log import IsWanted, TopicFormat
-from cdtool.formats.containers.container_checks import check_size, one_line_errors
+from cdtool.formats.containers.container_checks import one_line_errors
 from cdtool.formats.messages.batch import Stream
 from cdtool.formats.messages.schemas import DEFINITIONS
 
 _SQLITE, _ZSTD = b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
 _FIRST_PAGE = 2**16  # SQLite's largest page size [bytes]; the first page contains the names of the tables
-_COMPRESSED = (".zstd", ".zst")
 _JOURNALS = ("-wal", "-journal")
 # Largest message [bytes]: SQLite does not return a longer value.
 _LARGEST = 2**28
@@ -45,13 +44,11 @@ class Rosbag2(TopicFormat):
     """ROS 2 bags in SQLite: a column is a topic and a numeric field of its messages, as in an MCAP file."""
 
     name: ClassVar[str] = "rosbag2"
-    suffixes: ClassVar[tuple[str, ...]] = (".db3", *_COMPRESSED)
+    suffixes: ClassVar[tuple[str, ...]] = (".db3",)
 
     def sniff(self, path: Path) -> bool:
-        """Return whether the file is an SQLite database with a table of messages, compressed or not."""
+        """Return whether the file is an SQLite database with a table of messages."""
         head = _head(path)
-        if head.startswith(_ZSTD):
-            head = _first_page(path)
         if not head.startswith(_SQLITE):
             return False
         journal = location(f"{path}{_JOURNALS[0]}")  # of a bag that was not closed, it may have all but the first bytes
@@ -102,24 +99,20 @@ class _Ros2Bag(Bag):
 
     @contextmanager
     def _database(self) -> Iterator[Path]:
-        """Yield the database as a file: the bag itself, or a temporary copy if it is compressed or was not closed."""
+        """Yield the database as a file: the bag itself, or a temporary copy if it was not closed."""
         journals = [path for path in (location(f"{self.path}{end}") for end in _JOURNALS) if _is_filled(path)]
-        compressed = _head(self.path).startswith(_ZSTD)
-        if not compressed and not journals:
+        if not journals:
             yield self.path
             return
         with TemporaryDirectory(prefix="cdtool-") as folder:
             copy = Path(folder) / "bag.db3"
-            if compressed:
-                _decompress_file(self.path, copy)
-            else:
-                shutil.copyfile(self.path, copy)
-                for journal in journals:
-                    shutil.copyfile(journal, Path(folder) / f"bag.db3{journal.name.removeprefix(self.path.name)}")
-                with closing(sqlite3.connect(copy)) as base:  # applies the journal
-                    base.execute("SELECT count(*) FROM sqlite_master").fetchone()
-                    base.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
-                self.noted.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
+            shutil.copyfile(self.path, copy)
+            for journal in journals:
+                shutil.copyfile(journal, Path(folder) / f"bag.db3{journal.name.removeprefix(self.path.name)}")
+            with closing(sqlite3.connect(copy)) as base:  # applies the journal
+                base.execute("SELECT count(*) FROM sqlite_master").fetchone()
+                base.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            self.noted.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
             yield copy
 
     def _count(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> None:
@@ -217,26 +210,3 @@ def _decompressed(raw: bytes) -> bytes | None:
 def _head(path: Path) -> bytes:
     with path.open("rb") as file:
         return file.read(_FIRST_PAGE)
-
-
-def _first_page(path: Path) -> bytes:
-    """Return the first bytes of a compressed file; as far as it can be decompressed."""
-    import zstandard
-
-    with path.open("rb") as file, suppress(zstandard.ZstdError):
-        head: bytes = zstandard.ZstdDecompressor(max_window_size=_LARGEST).stream_reader(file).read(_FIRST_PAGE)
-        return head
-    return b""
-
-
-def _decompress_file(path: Path, copy: Path) -> None:
-    """Decompress a file; raises RecordingError if it is far larger than a log of its size can be."""
-    import zstandard
-
-    size = 0
-    with path.open("rb") as file, copy.open("wb") as out:
-        reader = zstandard.ZstdDecompressor(max_window_size=_LARGEST).stream_reader(file, read_across_frames=True)
-        while piece := reader.read(1 << 20):
-            size += len(piece)
-            check_size(path, size // 8)
-            out.write(piece)

@@ -19,7 +19,6 @@ from cdtool.base.findings import Finding
 from cdtool.base.log_names import log_stem
 from cdtool.base.remote.remote_path import is_read_by_ranges, version_of
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource
-from cdtool.formats.channels.force_axes import on_one_clock
 from cdtool.formats.channels.header_units import clock_unit_findings, unit_findings
 from cdtool.formats.columns import Column
 from cdtool.formats.source import Source
@@ -76,7 +75,7 @@ def assemble_recording(
     for number, item in enumerate(channels.sources):
         parts = [columns[key] for key in item.keys]
         if table is None:
-            parts = [on_one_clock(item, parts, findings)]
+            parts = [_on_one_clock(item, parts)]
         clock = table or _own_clock(item, parts[0], clocks, findings)
         made = _series(item, [part.values for part in parts], clock, channels.joints, findings)
         if item.channel not in doubted:
@@ -146,6 +145,23 @@ def _clean(
         raise RecordingError(f"{name}: {fault.message}", fault.hint) from fault
     times = Series(clean.time, np.zeros(len(clean.time)), "s")
     return _Clock(times, clean.keep, clean.findings, tuple(gaps_of(times.time, times.period, "time")))
+
+
+def _on_one_clock(item: ChannelSource, parts: Sequence[Column]) -> Column:
+    """Return the columns of a channel as one column; raises RecordingError if they have different clocks."""
+    first = parts[0]
+    other = next((part for part in parts if not _same(part.time, first.time)), None)
+    if other is not None:
+        raise RecordingError(
+            f"'{first.name}' and '{other.name}' of channel '{item.channel}' have different clocks",
+            "all joints of a channel, and all axes of a force, must have the same clock",
+            channel=item.channel,
+        )
+    return first if len(parts) == 1 else Column(item.channel, np.column_stack([p.values for p in parts]), first.time)
+
+
+def _same(time: FloatArray | None, other: FloatArray | None) -> bool:
+    return time is other or (time is not None and other is not None and np.array_equal(time, other))
 
 
 def _table_clock(source: Source, channels: ChannelMap, findings: list[Finding]) -> tuple[_Clock, float]:

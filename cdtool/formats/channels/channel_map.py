@@ -74,7 +74,7 @@ class ChannelSource:
     whatever the mechanics of the machine say. `keys` are the columns by their names in the file, once these are known
     (resolve_columns). `words`: the column may contain texts, which are read as categories.
 
-    A force may be a vector: `columns`, or `fields`, each of one of the `topics`, are then its axes. `direction` (axes,)
+    A force may be a vector: `columns`, or `fields` of its topic, are then its axes. `direction` (axes,)
     is a unit vector: the force is the component along it; without one it is the magnitude. It may be in a file of its
     own. Of a label, `kinds` are the values that are contacts, each with its kind; without them, all above 0.5 are.
     """
@@ -92,7 +92,6 @@ class ChannelSource:
     most: float = math.inf
     duty: Duty | None = None
     keys: tuple[str, ...] = ()
-    topics: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
     direction: tuple[float, ...] = ()
     own_file: OwnFile | None = None
@@ -116,7 +115,7 @@ class ChannelSource:
         if self.channel != "force" or len(self.factor) == 1:
             return ()
         if self.fields:
-            return tuple(f"{topic} {field}" for topic, field in zip(self.topics, self.fields, strict=True))
+            return tuple(f"{self.topic} {field}" for field in self.fields)
         return tuple(str(column) for column in self.columns)
 
     @property
@@ -132,8 +131,7 @@ class ChannelSource:
     @property
     def by_axis(self) -> tuple[ChannelSource, ...]:
         """Return one source per axis of a vector of fields, so that a reader of topics finds each; otherwise itself."""
-        pairs = zip(self.topics, self.fields, strict=True)
-        return tuple(replace(self, topic=topic, field=name, topics=(), fields=()) for topic, name in pairs) or (self,)
+        return tuple(replace(self, field=name, fields=()) for name in self.fields) or (self,)
 
 
 @dataclass(frozen=True)
@@ -247,7 +245,6 @@ class ChannelTable:
     ] = None
     topic: Annotated[str, setting("MCAP and bags: the topic")] = ""
     field: Annotated[str, setting("MCAP and bags: the field of its messages")] = ""
-    topics: Annotated[tuple[str, ...], setting("of a force with several axes: a topic for each")] = ()
     fields: Annotated[tuple[str, ...], setting("of a force with several axes: a field for each")] = ()
     unit: Annotated[str, setting("unit of the log; required in a table")] = ""
     scale: Annotated[
@@ -390,15 +387,15 @@ class _Sources:
         self._refuse_others(channel, table, given, place)
         count = 1 if channel in (*GROUND_TRUTH, *TRIGGER) else len(self.joints)
         columns: tuple[str | int, ...] = ()
-        axes: tuple[tuple[str, str], ...] = ()
+        fields: tuple[str, ...] = ()
         topics = self.topics and table.file is None
         if topics:
-            axes = _field_axes(table, place)
+            fields = _fields(table, place)
         else:
             columns = _columns(table, channel, count, place)
             count = len(columns)
-        if len(axes) > 1:
-            count = len(axes)
+        if len(fields) > 1:
+            count = len(fields)
         duty = _duty(table, place) if table.kind == "duty" else None
         scaled = _Scaled(channel, self.accepted(channel), count, topics)
         stated, si, factor = scaled.unit_and_factor(table, duty, place)
@@ -409,12 +406,11 @@ class _Sources:
         if table.saturation and table.saturation[0] >= table.saturation[1]:
             hint = "give [lowest, highest] reading of the sensor, in the log's unit"
             raise place.fault("saturation", f"is {value_in_words(table.saturation)}", hint)
-        topic, name = axes[0] if len(axes) == 1 else ("", "")
         return ChannelSource(
             channel=channel,
             columns=columns,
-            topic=topic,
-            field=name,
+            topic=table.topic if topics else "",
+            field=fields[0] if len(fields) == 1 else "",
             factor=factor,
             unit=si,
             stated=stated,
@@ -423,8 +419,7 @@ class _Sources:
             least=least,
             most=most,
             duty=duty,
-            topics=tuple(topic for topic, _ in axes if len(axes) > 1),
-            fields=tuple(name for _, name in axes if len(axes) > 1),
+            fields=fields if len(fields) > 1 else (),
             direction=() if table.direction is None else _direction(table.direction, count, place),
             own_file=None if table.file is None else _own_file(table, place, in_messages=self.topics),
             kinds=() if table.kinds is None else _kinds(table.kinds, place),
@@ -443,7 +438,7 @@ class _Sources:
         allowed |= {"kinds"} if channel == "label" else set()
         in_messages = self.topics and table.file is None
         allowed |= set(_IN_MESSAGES if in_messages else _IN_TABLE)
-        allowed |= {"topics", "fields"} if in_messages and channel == "force" else set()
+        allowed |= {"fields"} if in_messages and channel == "force" else set()
         allowed |= set(_IN_FILE) if table.file is not None else set()
         for name in given:
             if name not in allowed:
@@ -522,26 +517,20 @@ def _columns(table: ChannelTable, channel: str, count: int, place: Place) -> tup
     return tuple(column for column in columns if column is not None)
 
 
-def _field_axes(table: ChannelTable, place: Place) -> tuple[tuple[str, str], ...]:
-    """Return topic and field of each axis: several fields of a topic, or fields of several topics; else of the one."""
-    for one, several in (("topic", "topics"), ("field", "fields")):
-        if getattr(table, one) and getattr(table, several):
-            raise place.fault(several, f"cannot be combined with '{one}'", "remove one of the two")
-        if not getattr(table, one) and not getattr(table, several):
-            raise place.fault(one, "is missing", "give a text")
-    topics, fields = table.topics or (table.topic,), table.fields or (table.field,)
-    count = max(len(topics), len(fields))
-    if len(topics) not in (1, count) or len(fields) not in (1, count):
-        raise place.fault("topics", f"names {len(topics)} topics for {len(fields)} fields", "give one of each per axis")
-    topics, fields = (names * count if len(names) == 1 else names for names in (topics, fields))
-    axes = tuple(zip(topics, fields, strict=True))
-    if table.topics or table.fields:
-        for name in fields:
-            if "[:]" in name:
-                hint = "name one element per axis, e.g. data[0]"
-                raise place.fault("fields", f"names '{name}', a whole array", hint)
-        _check_axes("fields", axes, place)
-    return axes
+def _fields(table: ChannelTable, place: Place) -> tuple[str, ...]:
+    """Return the field of a channel in its topic, or the fields that are the axes of a force."""
+    if table.field and table.fields:
+        raise place.fault("fields", "cannot be combined with 'field'", "remove one of the two")
+    for key, given in (("topic", table.topic), ("field", table.field or table.fields)):
+        if not given:
+            raise place.fault(key, "is missing", "give a text")
+    for name in table.fields:
+        if "[:]" in name:
+            hint = "name one element per axis, e.g. data[0]"
+            raise place.fault("fields", f"names '{name}', a whole array", hint)
+    if table.fields:
+        _check_axes("fields", table.fields, place)
+    return table.fields or (table.field,)
 
 
 def _check_axes(key: str, names: Sequence[object], place: Place) -> None:

@@ -51,6 +51,10 @@ _KNOWN_CONTENTS = {
     b"\x1f\x8b": "gzip-compressed",
     b"(\xb5/\xfd": "zstd-compressed",
     b"\x89HDF": "an HDF5 file",
+    b"ARROW1": "a Feather file",
+    b"ULog\x01\x12\x35": "a ULog file of PX4",
+    b"MDF     ": "an MDF file",
+    b"UnFinMF ": "an MDF file",
     b"SQLite format 3": "an SQLite database, but not a ROS 2 bag",
     b"<": "HTML or XML",
     b"{": "JSON",
@@ -59,6 +63,9 @@ _KNOWN_CONTENTS = {
 _NEXT_STEPS = {
     "a ZIP archive or an Excel workbook": "unpack the archive, or save the sheet as CSV",
     "gzip-compressed": "only text tables are read compressed; unpack it first, e.g. with gunzip",
+    "a ULog file of PX4": "write its topics as CSV, with ulog2csv of pyulog",
+    "a Feather file": "write it as Parquet, with pandas.read_feather(...).to_parquet(...)",
+    "an MDF file": "export it as MAT, CSV or Parquet",
     "zstd-compressed": "unpack it first, e.g. with unzstd",
 }
 

@@ -1,1 +1,1 @@
-"""Container formats: HDF5, MDF, TDMS, Parquet, ULog, XLSX."""
+"""Container formats: HDF5, TDMS, Parquet, XLSX."""

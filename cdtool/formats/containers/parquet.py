@@ -1,4 +1,4 @@
-"""Parquet and Feather (Arrow IPC): tables of typed columns, by pyarrow."""
+"""Parquet: tables of typed columns, by pyarrow."""
 
 from __future__ import annotations
 
@@ -15,38 +15,35 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
-from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, split_unit
+from cdtool.formats.column_names import column_key, requested_keys, split_unit
 from cdtool.formats.columns import Categories, Column, Piece, as_float64
 from cdtool.formats.containers.container_checks import check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
 
-_PARQUET, _ARROW = b"PAR1", b"ARROW1"
+_MAGIC = b"PAR1"
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
-# Metadata key of a table that cdtool wrote from several clocks.
-OWN_CLOCKS = b"cdtool.own_clocks"
 _FEWEST_ROWS = 2**12
 
 
 @dataclass(frozen=True)
 class Parquet(PiecewiseFormat):
-    """Arrow tables, `.parquet` and `.feather`: a missing value (null) becomes NaN, a time stamp becomes seconds."""
+    """Parquet tables: a missing value (null) becomes NaN, a time stamp becomes seconds."""
 
     name: ClassVar[str] = "parquet"
-    suffixes: ClassVar[tuple[str, ...]] = (".parquet", ".feather", ".arrow")
+    suffixes: ClassVar[tuple[str, ...]] = (".parquet",)
 
     def sniff(self, path: Path) -> bool:
-        """Return whether the file starts like a Parquet or Arrow file."""
+        """Return whether the file starts like a Parquet file."""
         with path.open("rb") as file:
-            head = file.read(len(_ARROW))
-        return head == _ARROW or head.startswith(_PARQUET)
+            return file.read(len(_MAGIC)) == _MAGIC
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         arrow = library("pyarrow", "parquet")
         findings: list[Finding] = []
-        with one_line_errors("a Parquet or Feather file"):
-            table = _ArrowTable(path, arrow, findings, wanted.worded if wanted is not None else ())
+        with one_line_errors("a Parquet file"):
+            table = _Table(path, arrow, findings, wanted.worded if wanted is not None else ())
             names = tuple(table.schema.names)
             keys = [key for key in requested_keys(wanted, names) if some is None or key in some]
             read = [key for key in keys if table.is_number(key)]
@@ -58,13 +55,13 @@ class Parquet(PiecewiseFormat):
                 raise RecordingError("has no column of numbers", "see cdtool info")
             yield from table.pieces(read)
         findings += [finding for key in read for finding in rounding_finding(key, table.rounded[key])]
-        details = {"rows": str(table.rows), "container": table.kind}
+        details = {"rows": str(table.rows)}
         unique = tuple(dict.fromkeys(findings))
         return Source(path, self.name, table.headers(read), table.origin, unique, details, names)
 
 
-class _ArrowTable:
-    """Schema and rows of a file in either container; `rows` is their number after `pieces` has read them.
+class _Table:
+    """Schema and rows of a file; `rows` is their number after `pieces` has read them.
 
     The columns `worded` may contain texts, which are read as categories.
     """
@@ -72,17 +69,9 @@ class _ArrowTable:
     def __init__(self, path: Path, arrow: Any, findings: list[Finding], worded: Collection[str | int] = ()) -> None:
         self.path, self.arrow, self.findings = path, arrow, findings
         self.rows, self.rounded = 0, Counter[str]()
-        with path.open("rb") as file:
-            self.kind = "parquet" if file.read(4) == _PARQUET else "feather"
-        if self.kind == "parquet":
-            self._file = library("pyarrow.parquet", "parquet").ParquetFile(os.fspath(path))
-            self.schema, self._batches = self._file.schema_arrow, self._of_parquet
-        else:
-            self._file = library("pyarrow.ipc", "parquet").open_file(os.fspath(path))
-            self.schema, self._batches = self._file.schema, self._of_feather
-        metadata = self.schema.metadata or {}
-        self.own_clocks = metadata.get(OWN_CLOCKS) == b"1" and OWN_CLOCK in self.schema.names
-        self.origin = float(metadata.get(b"cdtool.origin_s", b"0"))
+        self._file = library("pyarrow.parquet", "parquet").ParquetFile(os.fspath(path))
+        self.schema = self._file.schema_arrow
+        self.origin = float((self.schema.metadata or {}).get(b"cdtool.origin_s", b"0"))
         self._starts: dict[str, Any] = {}  # of columns of time stamps
         asked = (key for name in worded if (key := column_key(name, self.schema.names)))
         self._categories = {key: Categories() for key in asked if self._has_texts(key)}
@@ -101,45 +90,24 @@ class _ArrowTable:
 
     def headers(self, keys: Sequence[str]) -> dict[str, Column]:
         """Return the columns without their rows."""
-        own = np.empty(0) if self.own_clocks else None
-        values = [key for key in keys if not (self.own_clocks and key == OWN_CLOCK)]
         words = {key: each.words for key, each in self._categories.items()}
-        return {key: Column(key, np.empty(0), own, self._unit(key), words.get(key, {})) for key in values}
+        return {key: Column(key, np.empty(0), None, self._unit(key), words.get(key, {})) for key in keys}
 
     def pieces(self, keys: Sequence[str]) -> Iterator[Piece]:
         """Yield the rows of these columns, one group of rows at a time."""
-        read = list(dict.fromkeys((*keys, OWN_CLOCK) if self.own_clocks else keys))
-        for batch in self._batches(read):
-            self.rows += batch.num_rows
-            check_size(self.path, self.rows * len(keys))
-            columns = {key: self._numbers(key, batch.column(batch.schema.get_field_index(key))) for key in read}
-            if not self.own_clocks:
-                yield Piece("", None, {key: values for key, (values, _) in columns.items()}, batch.num_rows)
-                continue
-            time, _ = columns.pop(OWN_CLOCK)
-            for key, (values, absent) in columns.items():
-                # Written by cdtool from several clocks: null means that this column has no sample at this time.
-                yield Piece(key, time[~absent], {key: values[~absent]}, int(np.count_nonzero(~absent)))
-
-    def _of_parquet(self, keys: Sequence[str]) -> Iterator[Any]:
         metadata = self._file.metadata
         check_size(self.path, sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)) * len(keys))
-        return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)))
+        for batch in self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)):
+            self.rows += batch.num_rows
+            check_size(self.path, self.rows * len(keys))
+            columns = {key: self._numbers(key, batch.column(batch.schema.get_field_index(key))) for key in keys}
+            yield Piece("", None, columns, batch.num_rows)
 
-    def _of_feather(self, keys: Sequence[str]) -> Iterator[Any]:
-        # A batch is decompressed as a whole; this counts its rows by its head.
-        counted = library("pyarrow.dataset", "parquet").dataset(os.fspath(self.path), format="feather")
-        check_size(self.path, counted.count_rows() * len(self.schema.names))
-        for number in range(self._file.num_record_batches):
-            batch = self._file.get_batch(number)
-            batch.validate(full=True)  # Arrow does not check a file's declarations otherwise
-            yield batch.select(list(keys))
-
-    def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
-        """Return the values, and which of them are absent (null)."""
+    def _numbers(self, key: str, column: Any) -> FloatArray:
+        """Return the values, NaN where one is absent (null)."""
         absent = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
         if key in self._categories:
-            return self._codes(self._categories[key], column, absent), absent
+            return self._codes(self._categories[key], column, absent)
         if self.arrow.types.is_timestamp(column.type):
             return self._seconds(key, column.to_numpy(zero_copy_only=False).astype("datetime64[ns]"))
         if self.arrow.types.is_boolean(column.type):
@@ -148,7 +116,7 @@ class _ArrowTable:
         raw = (column.fill_null(0) if is_integer else column).to_numpy(zero_copy_only=False)
         self.rounded[key] += rounded_integers(raw) if is_integer else 0
         values = as_float64(raw)
-        return np.where(absent, np.nan, values) if absent.any() else values, absent
+        return np.where(absent, np.nan, values) if absent.any() else values
 
     def _codes(self, categories: Categories, column: Any, absent: Any) -> FloatArray:
         """Return the codes of a column of texts; NaN where a text is missing or empty."""
@@ -160,15 +128,15 @@ class _ArrowTable:
             values[~absent] = codes[encoded.indices.to_numpy(zero_copy_only=False)[~absent].astype(np.intp)]
         return values
 
-    def _seconds(self, key: str, stamps: Any) -> tuple[FloatArray, Any]:
-        """Return time stamps as seconds after the first one, which float64 can represent, and which are absent."""
+    def _seconds(self, key: str, stamps: Any) -> FloatArray:
+        """Return time stamps as seconds after the first one, which float64 can represent."""
         absent = np.isnat(stamps)
         if key not in self._starts and not absent.all():
             self._starts[key] = stamps[~absent][0]
             self.findings.append(Finding("stamps_as_seconds", key, {"start": str(self._starts[key])}))
-        seconds = (stamps - self._starts.get(key, np.datetime64(0, "ns"))).astype(np.int64) / 1e9
+        seconds: FloatArray = (stamps - self._starts.get(key, np.datetime64(0, "ns"))).astype(np.int64) / 1e9
         seconds[absent] = np.nan
-        return seconds, absent
+        return seconds
 
     def _unit(self, key: str) -> str | None:
         if self.arrow.types.is_timestamp(self.schema.field(key).type):

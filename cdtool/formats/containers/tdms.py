@@ -5,24 +5,20 @@ from __future__ import annotations
 import logging
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, partial
 from io import StringIO
-from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from cdtool.base.findings import Finding
-from cdtool.formats.column_names import OWN_CLOCK
-from cdtool.formats.columns import Column
 from cdtool.formats.containers.container_checks import library, messages_of, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, with_plausible_unit
-from cdtool.formats.groups import Group, Part, Parts, WrittenNames, names_of, prefix_keys
 from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat, rows_of
 from cdtool.recordings.units import find_unit
 
@@ -56,7 +52,6 @@ class Tdms(SlicedFormat):
         ):
             _add_channels(container, file)
             container.details = {key: str(value)[:80] for key, value in file.properties.items()}
-            container.origin = float(file.properties.get("cdtool.origin_s", 0.0))
             yield
             incomplete = getattr(file.file_status, "incomplete_final_segment", False)
             if incomplete:
@@ -140,29 +135,3 @@ def _start(channel: Any) -> Fraction | None:
 
 def _unit(channel: Any) -> str | None:
     return next((str(channel.properties[key]) for key in _UNIT_KEYS if channel.properties.get(key)), None)
-
-
-def write_tdms(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
-    """Write one channel per column with its unit, one group per clock with its `time`, and one segment per part."""
-    nptdms = library("nptdms", "tdms")
-    with nptdms.TdmsWriter(str(path)) as writer:
-        objects = [nptdms.RootObject(properties=prefix_keys(provenance))]
-        objects += [nptdms.GroupObject(group.name) for group in groups]
-        writer.write_segment(objects)
-        for ready in parts:
-            rows = [_channel_rows(nptdms, group, part) for group, part in zip(groups, ready, strict=True)]
-            writer.write_segment(list(chain(*rows)))
-    return names_of(groups, [group.name for group in groups])
-
-
-def _channel_rows(nptdms: Any, group: Group, part: Part | None) -> list[Any]:
-    """Return a group's channels with their next rows."""
-    if part is None:
-        return []
-    columns, values = list(chain(*group.flat)), part.flat
-    if group.own_clock and part.time is not None:
-        columns, values = [Column(OWN_CLOCK, part.time, unit="s"), *columns], [part.time, *values]
-    return [
-        nptdms.ChannelObject(group.name, column.name, array, {"unit_string": column.unit} if column.unit else {})
-        for column, array in zip(columns, values, strict=True)
-    ]

@@ -1,4 +1,4 @@
-"""Excel workbooks, by openpyxl: each sheet is read as the text table that it would be exported to.
+"""Excel workbooks, by openpyxl: the sheet with numbers is read as the text table that it would be exported to.
 
 Excel's own export rounds numbers to what a cell shows, and writes dates in the format of the cell. Here numbers have
 all their digits, and dates are ISO dates. Numbers have a decimal comma if numbers that are stored as texts have one.
@@ -14,23 +14,16 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import datetime, time, timedelta
-from fractions import Fraction
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
-import numpy as np
-
 from cdtool.base.errors import RecordingError, naming
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
-from cdtool.formats.column_names import split_unit
-from cdtool.formats.columns import Column
-from cdtool.formats.containers.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.containers.container_checks import check_size, library, one_line_errors
 from cdtool.formats.csv import Csv
-from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
 from cdtool.formats.source import Source
 
 _MAGIC, _WORKBOOK, _SEPARATOR = b"PK\x03\x04", "xl/workbook.xml", "\t"
@@ -53,10 +46,7 @@ _THOUSAND = 1000.0
 
 @dataclass(frozen=True)
 class Xlsx:
-    """Excel workbooks: each sheet is a table, read by the rules of text tables; of several, a column is `sheet!column`.
-
-    Of several tables each column has the clock of its own sheet, found by its name.
-    """
+    """Excel workbooks: the sheet with rows of numbers is a table, read by the rules of text tables."""
 
     name: ClassVar[str] = "xlsx"
     suffixes: ClassVar[tuple[str, ...]] = (".xlsx", ".xlsm")
@@ -80,7 +70,10 @@ class Xlsx:
             tables = [sheet for sheet in sheets if sheet.rows_of_numbers > 1]
             if not tables:
                 raise RecordingError("no sheet contains rows of numbers", "is it the right workbook?")
-            source = tables[0].source(wanted) if len(tables) == 1 else _Tables(tables).columns(path, wanted)
+            if len(tables) > 1:
+                names = ", ".join(f"'{sheet.name}'" for sheet in tables)[:200]
+                raise RecordingError(f"several sheets contain rows of numbers: {names}", "save each sheet as CSV")
+            source = tables[0].source(wanted)
         left_out = tuple(
             Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": "it contains no rows of numbers"})
             for sheet in sheets
@@ -96,9 +89,9 @@ class Xlsx:
 class _Sheet:
     """A sheet of the workbook at `path`, as the text table `file`; `epoch` is the day 0 of its dates.
 
-    By column, from 0: `dates` are those with dates, `errors` the number of cells with an error, the first of them and
-    its row, `commas` the same of texts that are numbers with a comma, `integers` the number of integers of 1000 and
-    more, `formulas` the number of formulas without a value, and the row of the first.
+    By column, from 0: `errors` are the number of cells with an error, the first of them and its row, `commas` the same
+    of texts that are numbers with a comma, `integers` the number of integers of 1000 and more, `formulas` the number of
+    formulas without a value, and the row of the first.
     """
 
     path: Path
@@ -108,13 +101,12 @@ class _Sheet:
     width: int = 0
     rows_of_numbers: int = 0
     decimal_point: bool = False
-    dates: set[int] = field(default_factory=set)
     errors: dict[int, tuple[Any, ...]] = field(default_factory=dict)
     commas: dict[int, tuple[Any, ...]] = field(default_factory=dict)
     integers: dict[int, int] = field(default_factory=dict)
     formulas: dict[int, tuple[Any, ...]] = field(default_factory=dict)
 
-    def source(self, wanted: ChannelMap | None = None) -> Source:
+    def source(self, wanted: ChannelMap | None) -> Source:
         """Return its columns, by the rules of text tables."""
         if wanted is not None:
             wanted = replace(wanted, pins=replace(wanted.pins, separator=_SEPARATOR, encoding="utf-8"))
@@ -177,21 +169,19 @@ class _Sheet:
         if isinstance(value, bool):
             return "true" if value else "false"
         if not isinstance(value, int | float):
-            self.dates.add(column)
             return _NUMBER + _moment(value)
         if abs(value) >= _THOUSAND and value == int(value):
             self.integers[column] = self.integers.get(column, 0) + 1
         kind = _kind(cell.number_format) if cell.has_style else ""
-        shown = self._date(float(value), kind, column) if kind else value
+        shown = self._date(float(value), kind) if kind else value
         return _NUMBER + (shown if isinstance(shown, str) else repr(shown).replace(".", _MARK))
 
-    def _date(self, days: float, kind: str, column: int) -> str | float:
+    def _date(self, days: float, kind: str) -> str | float:
         """Return days since the epoch as a date, a time of day or elapsed seconds."""
         try:
             moment = timedelta(microseconds=round(days * _DAY_US))
             if kind == "elapsed":
                 return moment.total_seconds()
-            self.dates.add(column)
             if 0.0 <= days < _FIRST_DATE:
                 return (datetime.min + moment).time().isoformat("microseconds")
             return (self.epoch + moment).isoformat(timespec="microseconds")
@@ -260,56 +250,3 @@ def _opened(openpyxl: Any, path: Path) -> Iterator[Any]:
             yield workbook
         finally:
             workbook.close()
-
-
-@dataclass(frozen=True)
-class _Tables(SlicedFormat):
-    """Several sheets of a workbook: a column is `sheet!column`, with the clock of its sheet."""
-
-    name: ClassVar[str] = "xlsx"
-    sheets: list[_Sheet]
-
-    @contextmanager
-    def _open(self, container: Container) -> Iterator[None]:
-        sources: dict[_Sheet, Source] = {}
-        for sheet in self.sheets:
-            try:
-                sources[sheet] = sheet.source()
-            except RecordingError as fault:
-                reason = fault.message.replace(f"sheet '{sheet.name}': ", "", 1)
-                left_out = Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": reason}, "loss")
-                container.findings.append(left_out)
-        if not sources:
-            raise RecordingError(f"no sheet can be read: {container.findings[0]}", "save each sheet as CSV")
-        container.origin = start = min((source.origin for source in sources.values() if source.origin), default=0.0)
-        for sheet, source in sources.items():
-            container.findings += [_in_sheet(sheet.name, finding) for finding in source.findings]
-            _add_columns(container, sheet, source, start)
-        yield
-
-
-def _add_columns(container: Container, sheet: _Sheet, source: Source, start: float) -> None:
-    """Add the columns of a sheet; its dates are seconds after `start`."""
-    dated = {name for i, name in enumerate(source.names) if i in sheet.dates}
-    stamps = next((column for column in source.columns.values() if _is_clock(column)), None)
-    clock = None
-    if stamps is not None and container.has_own_clocks:
-        clock = assumed_clock(f"{sheet.name}!{stamps.name}", stamps.values, container.findings, stamps.unit)
-        if stamps.name in dated:
-            clock, container.origin = replace(clock, base=Fraction(source.origin), dated=True), 0.0
-    later = source.origin - start if source.origin else 0.0
-    sliced = {
-        name: SlicedColumn.of(column.values + later * (name in dated), clock, column.unit)
-        for name, column in source.columns.items()
-    }
-    container.columns |= {f"{sheet.name}!{name}": partial(sliced.get, name) for name in source.names}
-
-
-def _is_clock(column: Column) -> bool:
-    """Return whether a column of a sheet has the name of a clock, and stamps."""
-    return is_clock_name(split_unit(column.name)[0]) and bool(np.isfinite(column.values).any())
-
-
-def _in_sheet(sheet: str, finding: Finding) -> Finding:
-    """Return a finding on a sheet with its name."""
-    return replace(finding, channel=f"{sheet}!{finding.channel}") if finding.channel else replace(finding, file=sheet)

@@ -35,10 +35,10 @@ class Csv:
         """Return whether the file starts with text other than markup, and is not of another format of text."""
         from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
         from cdtool.formats.csv.text import read_sample
-        from cdtool.formats.csv_dialect.foreign_heads import is_measurement, is_scope_export
+        from cdtool.formats.csv_dialect.foreign_heads import is_scope_export
 
         head = read_sample(path, HEAD_BYTES)
-        if is_measurement(head) or is_scope_export(head):
+        if is_scope_export(head):
             return False
         return bool(head.strip() or read_sample(path).strip()) and looks_like_text(head)
 

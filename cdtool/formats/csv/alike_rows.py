@@ -78,7 +78,7 @@ class ShorterSample:
             return None
         if not {*dialect.kinds} <= {*"NM"}:
             return None
-        if dialect.marks.doubt is not None or (dialect.header is None and dialect.separator == ","):
+        if dialect.header is None and dialect.separator == ",":
             return None
         return replace(dialect, sampled=dialect.sampled + self.left_out)
 

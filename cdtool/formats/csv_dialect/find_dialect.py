@@ -22,12 +22,9 @@ from cdtool.formats.csv.encoding import open_table
 from cdtool.formats.csv.lines import Line, SplitLine, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import Text
-from cdtool.formats.csv_dialect.ambiguous_marks import (
-    refuse_commas_that_may_be_decimal,
-    refuse_one_column_of_decimals,
-    resolve_marks,
-)
+from cdtool.formats.csv_dialect.ambiguous_marks import refuse_commas_that_may_be_decimal, resolve_marks
 from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
+from cdtool.formats.csv_dialect.foreign_heads import MEASUREMENT, refuse_measurement
 from cdtool.formats.csv_dialect.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell, find_marks
@@ -248,16 +245,10 @@ def find_dialect(path: Path, pins: TablePins) -> Dialect:
     Raises RecordingError if the file is not a table, or is ambiguous.
     """
     text, stream = open_table(path, pins.encoding)
+    if stream.startswith(MEASUREMENT) and not pins.skip_lines:
+        refuse_measurement(text.decode(stream))
     dialect = _dialect(text, stream, pins)
-    if dialect.marks.sure:
-        return dialect
-    marks = resolve_marks(dialect)
-    doubt = (
-        []
-        if marks.doubt is None
-        else [Finding("doubtful_point", "", {"text": marks.doubt.text, "line": marks.doubt.line})]
-    )
-    return replace(dialect, marks=marks, findings=(*dialect.findings, *doubt))
+    return dialect if dialect.marks.sure else replace(dialect, marks=resolve_marks(dialect))
 
 
 def _dialect(text: Text, stream: bytes, pins: TablePins) -> Dialect:
@@ -321,14 +312,8 @@ def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
 
 def _refuse_other_readings(sample: Sample, pins: TablePins) -> None:
     """Raise RecordingError if the commas may be decimal marks, or if another table is above this one."""
-    first = sample.head.first_line
-    if sample.head.header is None:
-        if not pins.separator and not sample.named:
-            above = [line for line in sample.comments if line.number < first]
-            named = any(len(line.text.strip(sample.mark).split()) == 1 for line in above)
-            refuse_commas_that_may_be_decimal(sample.data, sample.kinds, sample.separator, named)
-        if sample.width == 2 and sample.separator == "," and not pins.separator:
-            refuse_one_column_of_decimals([row for row in sample.table if row.number < first], sample.data)
+    if sample.head.header is None and sample.separator == "," and not pins.separator and not sample.named:
+        refuse_commas_that_may_be_decimal(sample.data, sample.kinds)
     if pins.header is None:  # a pinned header selects the table, and rows above it are reported as a loss
         refuse_table_above(sample.head, sample.width)
 

@@ -1,13 +1,19 @@
-"""Recognise text files of other formats by their first bytes: exports of TwinCAT Scope, LabVIEW's measurement files."""
+"""Recognise exports of TwinCAT Scope, and LabVIEW's measurement files (.lvm) that are not one table."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from cdtool.base.errors import RecordingError
+from cdtool.formats.csv.cells import number
+
 _MARK = b"\xef\xbb\xbf"
 # In any encoding: a name is within the first bytes once NUL bytes and byte order marks are removed.
 _FIRST_BYTES = 96
-LABVIEW = "LabVIEW Measurement"
+MEASUREMENT = b"LabVIEW Measurement"
+_ALIKE = ("Samples", "Date", "Time", "X_Dimension", "X0", "Delta_X")
+# Later stamps [s] are absolute.
+_ABSOLUTE = 1e9
 # TwinCAT Scope: the key of the first line, and the keys that identify its exports.
 NAME = "Name"
 SCOPE_TITLE = "TwinCAT Scope"
@@ -19,9 +25,25 @@ _FIRST_LINES = 20
 _FEWEST_KEYS = 2
 
 
-def is_measurement(head: bytes) -> bool:
-    """Return whether the first bytes of a file are those of LabVIEW's measurement files."""
-    return _begin(head).startswith(LABVIEW.encode())
+def refuse_measurement(head: str) -> None:
+    """Raise RecordingError if the column X_Value does not have the times of all channels of a measurement file."""
+    for line in head.splitlines():
+        key, *cells = (cell.strip() for cell in line.split("\t" if "\t" in line else ","))
+        stated = sorted({*cells} - {""})
+        reason = f"its channels differ in {key}: {', '.join(stated)[:60]}" if key in _ALIKE and len(stated) > 1 else ""
+        if key == "X_Columns" and stated == ["No"]:
+            reason = "it has no column of times (X_Columns No)"
+        if key == "X_Dimension" and stated[:1] not in ([], ["Time"]):
+            reason = f"its x axis is '{stated[0][:30]}', not Time"
+        if key == "X0" and stated and (number(stated[0].replace(",", "."), ".") or 0.0) > _ABSOLUTE:
+            reason = "its times count from 1904 (Time_Pref Absolute)"
+        if reason:
+            raise RecordingError(f"LabVIEW: {reason}", "write TDMS, or all channels at one rate with one X column")
+        if key == "X_Value":
+            return
+    raise RecordingError(
+        "LabVIEW: its head has no line that begins with X_Value", "was the copy cut off? copy it again"
+    )
 
 
 def is_scope_export(head: bytes) -> bool:

@@ -30,14 +30,13 @@ class SampleCell:
 
 @dataclass(frozen=True)
 class Marks:
-    """The decimal mark, the thousands separator ("" for none), and a number that may have another meaning (`doubt`).
+    """The decimal mark, and the thousands separator ("" for none).
 
     `sure` is False if no number has a decimal mark; then a point is assumed.
     """
 
     decimal: str
     thousands: str = ""
-    doubt: SampleCell | None = None
     sure: bool = True
 
 
@@ -115,9 +114,7 @@ def find_marks(
         shown = " and ".join(str(cell) for cell in groups.values())
         raise RecordingError(f"two thousands separators: {shown}", "pin thousands in [csv]")
     group_mark = next(iter(groups), "")
-    certain = bool(decimal or evidence.decimal or groups)
-    is_ambiguous = separator != "," and mark == "." and not certain
-    return Marks(mark, group_mark, evidence.either.get(mark) if is_ambiguous else None, certain)
+    return Marks(mark, group_mark, sure=bool(decimal or evidence.decimal or groups))
 
 
 def _decimal(evidence: _Evidence) -> str:

@@ -27,18 +27,11 @@ from cdtool.base.errors import RecordingError, naming
 from cdtool.base.plain_text import counted
 from cdtool.formats.channels.channel_map import ChannelMap, TablePins
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.cells import kind, split_line
+from cdtool.formats.csv.cells import kind, number, split_line
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text, open_table
 from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.csv_dialect.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
-from cdtool.formats.exports.timed_text import (
-    ClockGroup,
-    Segment,
-    TimedText,
-    details_of,
-    dialect_of_rows,
-    number_in_head,
-)
+from cdtool.formats.exports.scope_rows import ClockGroup, ScopeRows, dialect_of_rows
 from cdtool.formats.source import Source
 
 # The keys of lines about the file: of Scope View in TwinCAT 3 and in TwinCAT 2.
@@ -117,7 +110,7 @@ class _ScopeHead:
         return ""
 
 
-def _read_export(path: Path, pins: TablePins) -> TimedText:
+def _read_export(path: Path, pins: TablePins) -> ScopeRows:
     text, stream = open_table(path, pins.encoding, _MOST_HEAD)
     head = _read_head(text, stream.split(text.line_end))
     # A line in which a cell contains the separator is wider than the others: it would be read in the wrong columns.
@@ -143,18 +136,14 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
 
     for at, end in zip(clocks, [*clocks[1:], width], strict=True):
         members = {columns[i]: i for i in range(at + 1, end) if i in columns}
-        stated = {number_in_head(head.cell((_PERIOD, "SampleTime"), i)) or 0.0 for i in members.values()}
+        stated = {_number(head.cell((_PERIOD, "SampleTime"), i)) for i in members.values()}
         period = max(stated.pop() / 1000.0, 0.0) if len(stated) == 1 else 0.0
         if members:
-            groups.append(ClockGroup(members, at, times, ticks=bool(ticks), held=True, period=period))
-    details = details_of(text, head.separator, decimal) | {
-        "times": "FILETIME" if ticks else "ms since the start of the export",
-        "columns of times": str(len(groups)),
-    }
+            groups.append(ClockGroup(members, at, period))
     of_groups = {key: at for group in groups for key, at in group.columns.items()}
     units = {key: _unit(head.cell((_UNIT,), at)) for key, at in of_groups.items()}
     origin = (first - _TICKS_1970) / _TICKS_PER_S if ticks else _start(head)
-    return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, ())
+    return ScopeRows(dialect, groups, units, origin, times, bool(ticks))
 
 
 def _read_head(text: Text, raw: Sequence[bytes]) -> _ScopeHead:
@@ -227,6 +216,12 @@ def _decimal_mark(text: Text, head: _ScopeHead) -> str:
         if seen:
             return min(seen, key=lambda mark: seen[mark]).decode()
     return "."
+
+
+def _number(cell: str) -> float:
+    """Return a number of the head, whose decimal mark may not be that of the rows; 0 for any other cell."""
+    value = number(cell, "," if "," in cell else ".") if cell else None
+    return value if value is not None and np.isfinite(value) else 0.0
 
 
 def _unit(cell: str) -> str | None:

@@ -15,10 +15,10 @@ import numpy as np
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.containers.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.containers.container_checks import library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock
 from cdtool.formats.mat import version_5, version_73
+from cdtool.formats.mat.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
 from cdtool.formats.mat.layout import MatLayout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables
@@ -63,17 +63,17 @@ def _column(
     """Return a column, with its own clock if it has one; a clock that counts days is read in seconds."""
     if column is None:  # read only where a machine file names it
         return None
-    for variable, numbers in ((section.variable, section.numbers) for section in column.sections):
-        if numbers.is_complex and container.wanted is not None:
-            raise RecordingError(f"column '{name}' is complex", "save its real part")
-        if numbers.is_complex:
-            fact = {"variable": variable, "what": "complex", "advice": ""}
-            container.findings.append(Finding("variable_left_out", "", fact))
-            return None
-        if numbers.is_across:
-            rows, width = numbers.shape
-            shape = {"thing": "variable", "name": variable, "rows": rows, "columns": width}
-            container.findings.append(Finding("rows_as_columns", "", shape))
+    variable, numbers = column.variable, column.numbers
+    if numbers.is_complex and container.wanted is not None:
+        raise RecordingError(f"column '{name}' is complex", "save its real part")
+    if numbers.is_complex:
+        fact = {"variable": variable, "what": "complex", "advice": ""}
+        container.findings.append(Finding("variable_left_out", "", fact))
+        return None
+    if numbers.is_across:
+        rows, width = numbers.shape
+        shape = {"thing": "variable", "name": variable, "rows": rows, "columns": width}
+        container.findings.append(Finding("rows_as_columns", "", shape))
     clock = clock_of(column.clock) if clock_of is not None and column.clock else None
     if not is_clock_name(name.rpartition(".")[2]) or not is_datenum(column.values):
         return SlicedColumn(column.rows, lambda start, end: column.values[start:end], clock)

@@ -1,21 +1,16 @@
 """The columns of a MATLAB file: which numbers are a column, on which clock, and what is left out.
 
 A name is what a MATLAB user writes, `log.joint(2).tau`; the columns of a matrix `q` are `q[0]`, `q[1]` and so on.
-The elements of an array of structs are runs if each has a clock of its own: `run(:).tau` is a field of all of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import pairwise
-
-import numpy as np
 
 from cdtool.base.findings import Finding
-from cdtool.formats.containers.clock_beside import is_clock_name
-from cdtool.formats.mat.variables import MatColumn, Numbers, Value, Variables, VariableSection, left_out
+from cdtool.formats.mat.clock_beside import is_clock_name
+from cdtool.formats.mat.variables import MatColumn, Numbers, Value, Variables, left_out
 
 _DETAIL = 80
 # A matrix in a struct with more columns than this is an image or a model.
@@ -41,24 +36,20 @@ class Leaf:
         """Return whether it has the name and the shape of a clock."""
         return bool(is_clock_name(self.last)) and 1 in self.numbers.shape and not self.numbers.is_complex
 
-    def columns(self) -> Iterator[tuple[str, VariableSection]]:
-        """Yield the names and sections of its columns."""
+    def columns(self) -> Iterator[tuple[str, MatColumn]]:
+        """Yield its columns with their names."""
         for i in range(min(self.numbers.shape)):
-            yield (
-                self.name if 1 in self.numbers.shape else f"{self.name}[{i}]",
-                VariableSection(self.name, self.numbers, i),
-            )
+            name = self.name if 1 in self.numbers.shape else f"{self.name}[{i}]"
+            yield name, MatColumn(self.name, self.numbers, i)
 
 
 @dataclass
 class MatLayout:
     """The columns of a file in its order; `hidden` ones are read only where a machine file names them.
 
-    `leaves` are the arrays of numbers, `numbers` the single numbers, `texts` the texts by name. `with_runs`: arrays of
-    structs may be runs.
+    `leaves` are the arrays of numbers, `numbers` the single numbers, `texts` the texts by name.
     """
 
-    with_runs: bool = True
     columns: dict[str, MatColumn] = field(default_factory=dict)
     hidden: dict[str, MatColumn] = field(default_factory=dict)
     leaves: list[Leaf] = field(default_factory=list)
@@ -102,7 +93,7 @@ class MatLayout:
         else:
             leaf = Leaf(name, last, structs, value)
             self.leaves.append(leaf)
-            self.columns |= {key: MatColumn((section,)) for key, section in leaf.columns()}
+            self.columns |= dict(leaf.columns())
 
     def _cells(self, value: tuple[Value, ...], name: str, last: str, structs: tuple[str, ...]) -> None:
         if not any(_has_array(element) for element in value):
@@ -115,69 +106,12 @@ class MatLayout:
     def _structs(self, value: list[dict[str, Value]], name: str, structs: tuple[str, ...]) -> None:
         if not value:
             self.findings.append(left_out(name, "empty array of structs"))
-        elif len(value) == 1:
-            self._fields(value[0], name, structs)
-        elif not (self.with_runs and self._runs(value, name)):
-            for number, element in enumerate(value, 1):
-                self._fields(element, f"{name}({number})", structs)
-
-    def _fields(self, element: Mapping[str, Value], name: str, structs: tuple[str, ...]) -> None:
-        for key, part in element.items():
-            self.add(part, f"{name}.{key}", key, (*structs, name))
-
-    def _runs(self, value: list[dict[str, Value]], name: str) -> bool:
-        """Add the elements of an array of structs as runs, one after the other; False if they are not runs.
-
-        They are runs if each that has arrays has the same clock and no second one. Elements with equal clocks were
-        logged side by side: they are no runs. Structs of single numbers only are the rows of a table.
-        """
-        inside = [MatLayout(with_runs=False) for _ in value]
-        for number, (layout, element) in enumerate(zip(inside, value, strict=True), 1):
-            layout._fields(element, f"{name}({number})", ())
-        leaves = [{_inner_name(leaf.name, name): leaf for leaf in layout.leaves} for layout in inside]
-        filled = [some for some in leaves if some]
-        clocks = [{key for key, leaf in some.items() if leaf.is_clock and "." not in key} for some in filled]
-        common = set.intersection(*clocks) if clocks else set[str]()
-        clock = next((key for key in next(iter(filled), {}) if key in common), "")
-        rows = [some[clock].rows if clock in some else int(not filled) for some in leaves]
-        if clock:
-            has_second = any(
-                leaf.is_clock and leaf.rows != count
-                for some, count in zip(leaves, rows, strict=True)
-                for leaf in some.values()
-            )
-            if len(filled) < 2 or has_second or _are_equal([some[clock] for some in filled]):
-                return False
-        elif filled or not any(layout.numbers for layout in inside):
-            return False
-        used = [i for i, count in enumerate(rows) if count]
-        fields = [_fields_of_run(leaves[i], inside[i].numbers, name, rows[i]) for i in used]
-        if clock:
-            other = {key: leaf.rows for i in used for key, leaf in leaves[i].items() if leaf.rows != rows[i]}
-            self._add_run_findings(name, rows, other)
-            ids = tuple(VariableSection("", _constant(float(i + 1), rows[i])) for i in used)
-            self.columns[f"{name}(:)"] = MatColumn(ids, f"{name}(:).{clock}")
-        for key in dict.fromkeys(key for some in fields for key in some):
-            missing = (VariableSection("", _constant(np.nan, rows[i])) for i in used)
-            sections = tuple(some.get(key, none) for some, none in zip(fields, missing, strict=True))
-            self.columns[f"{name}(:).{key}"] = MatColumn(sections, f"{name}(:).{clock}" if clock else "")
-        self.hidden |= {key: column for layout in inside for key, column in layout.columns.items()}
-        self.texts |= {key: text for layout in inside for key, text in layout.texts.items()}
-        left = [found for i in used for found in inside[i].findings if found.kind == "variable_left_out"]
-        named = {f"{name}(:).{_inner_name(found.numbers['variable'], name)}": found.numbers for found in left}
-        self.findings += [
-            Finding("variable_left_out", "", {**numbers, "variable": key}) for key, numbers in named.items()
-        ]
-        return True
-
-    def _add_run_findings(self, name: str, rows: Sequence[int], other: Mapping[str, int]) -> None:
-        """Add what the runs are, and which of their fields, with `other` numbers of rows, are left out."""
-        used = sum(map(bool, rows))
-        self.findings.append(Finding("runs_of_structs", "", {"array": name, "runs": used, "rows": sum(rows)}))
-        if empty := tuple(number for number, count in enumerate(rows, 1) if not count):
-            self.findings.append(Finding("runs_without_rows", "", {"array": name, "runs": empty}))
-        for key, count in other.items():
-            self.findings.append(Finding("without_clock", "", {"variable": f"{name}(:).{key}", "rows": count}))
+        elif len(value) > 1 and not _has_array(value):
+            self.findings.append(left_out(name, "array of structs without vectors"))
+        for number, element in enumerate(value, 1):
+            place = name if len(value) == 1 else f"{name}({number})"
+            for key, part in element.items():
+                self.add(part, f"{place}.{key}", key, (*structs, place))
 
 
 def arrange_columns(variables: Variables) -> MatLayout:
@@ -229,32 +163,3 @@ def _clock_of(leaf: Leaf, clocks: Mapping[str, Mapping[int, str]]) -> tuple[str,
             own = of_struct[leaf.rows]
             return ("" if of_struct is clocks.get("") else own), False
     return "", bool(around)
-
-
-def _inner_name(name: str, array: str) -> str:
-    """Return the name of a field inside of an element of an array: `joint(1).q` of `run(3).joint(1).q`."""
-    return name[len(array) :].partition(").")[2]
-
-
-def _fields_of_run(
-    leaves: Mapping[str, Leaf], numbers: Mapping[str, Numbers], array: str, rows: int
-) -> dict[str, VariableSection]:
-    """Return the columns of a run: arrays as long as its clock, and single numbers in each of its rows."""
-    found = {
-        _inner_name(key, array): section
-        for leaf in leaves.values()
-        if leaf.rows == rows
-        for key, section in leaf.columns()
-    }
-    return found | {_inner_name(key, array): VariableSection(key, each.repeated(rows)) for key, each in numbers.items()}
-
-
-def _constant(number: float, rows: int) -> Numbers:
-    return Numbers((rows, 1), partial(np.full, (rows, 1), number))
-
-
-def _are_equal(clocks: Sequence[Leaf]) -> bool:
-    if len({clock.rows for clock in clocks}) > 1:
-        return False
-    values = (np.asarray(clock.numbers.read()).ravel() for clock in clocks)
-    return all(np.array_equal(first, second) for first, second in pairwise(values))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.errors import RecordingError
@@ -25,6 +24,7 @@ _ADVICE = {
     "datetime": "save it as numbers: posixtime({name})",
     "duration": "save it as numbers: seconds({name})",
     "categorical": "save it as numbers: double({name})",
+    "array of structs without vectors": "save it as one struct of vectors: struct('t', [{name}.t])",
     "sparse matrix": "save it as a plain matrix: full({name})",
     "Simulink.SimulationData.Dataset": "save its signals as numbers: {name}{{1}}.Values.Time, {name}{{1}}.Values.Data",
 }
@@ -49,41 +49,25 @@ class Numbers:
         """Return a vector or matrix as a table (n, k), its rows along the longer dimension."""
         return (self.read() if self.shape[0] >= self.shape[1] else self.read().T).reshape(max(self.shape), -1)
 
-    def repeated(self, rows: int) -> Numbers:
-        """Return a single number in each of so many rows."""
-        return Numbers((rows, 1), lambda: np.repeat(self.table, rows, axis=0), self.is_complex)
-
 
 @dataclass(frozen=True)
-class VariableSection:
-    """The rows of a column that a variable contains: column `index` of its table."""
+class MatColumn:
+    """Column `index` of a variable's table; `clock` is the name of the column that is its clock, empty if unknown."""
 
     variable: str
     numbers: Numbers
     index: int = 0
-
-    def values(self) -> npt.NDArray[Any]:
-        """Return its values (n,)."""
-        return self.numbers.table[:, self.index]
-
-
-@dataclass(frozen=True)
-class MatColumn:
-    """A column: its sections, one after the other, and the name of the column that is its clock; empty if unknown."""
-
-    sections: tuple[VariableSection, ...]
     clock: str = ""
 
     @property
     def rows(self) -> int:
         """Return the number of its values."""
-        return sum(max(section.numbers.shape) for section in self.sections)
+        return max(self.numbers.shape)
 
-    @cached_property
+    @property
     def values(self) -> npt.NDArray[Any]:
         """Return its values (n,) as the file has them."""
-        parts = [section.values() for section in self.sections]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return self.numbers.table[:, self.index]
 
 
 @dataclass(frozen=True)

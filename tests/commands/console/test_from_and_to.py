@@ -33,7 +33,7 @@ def test_detect_uses_only_the_part(log, machine):
     assert before["verdict"] == "no alarm" and not before["alarms"]
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".mcap", ".h5"])
+@pytest.mark.parametrize("suffix", [".csv", ".mcap", ".parquet"])
 @pytest.mark.parametrize("mapped", [True, False])
 def test_convert_writes_only_the_rows_of_the_part_with_their_times(log, machine, tmp_path, suffix, mapped):
     output = tmp_path / f"part{suffix}"

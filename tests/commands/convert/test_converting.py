@@ -67,7 +67,7 @@ def test_each_of_two_clocks_gets_its_own_csv_table_without_resampling(tmp_path):
             assert series.time.tobytes() == original[name].time.tobytes()
 
 
-@pytest.mark.parametrize("suffix", [suffix for suffix in SEVERAL_CLOCKS if suffix != ".mf4"])
+@pytest.mark.parametrize("suffix", SEVERAL_CLOCKS)
 def test_the_start_of_a_log_on_an_epoch_is_kept(suffix, tmp_path):
     needs(suffix)
     log = two_clocks(tmp_path / "run.mcap", start_ns=1_700_000_000_123_456_789)
@@ -184,42 +184,16 @@ def of_mcap(path: Path) -> dict[str, str]:
 
 
 def of_parquet(path: Path) -> dict[str, str]:
-    import pyarrow.feather
     import pyarrow.parquet
 
-    table = pyarrow.parquet.read_table(path) if path.suffix == ".parquet" else pyarrow.feather.read_table(path)
+    table = pyarrow.parquet.read_table(path)
     return {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
-
-
-def of_hdf5(path: Path) -> dict[str, str]:
-    import h5py
-
-    with h5py.File(path) as file:
-        return {key: str(value) for key, value in file.attrs.items()}
-
-
-def of_mdf(path: Path) -> dict[str, str]:
-    import asammdf
-
-    with asammdf.MDF(path) as log:
-        return dict(line.split(": ", 1) for line in str(log.header.description).splitlines())
-
-
-def of_tdms(path: Path) -> dict[str, str]:
-    import nptdms
-
-    return dict(nptdms.TdmsFile.read_metadata(path).properties)
 
 
 PROVENANCE = {
     ".csv": of_csv,
     ".mcap": of_mcap,
     ".parquet": of_parquet,
-    ".feather": of_parquet,
-    ".h5": of_hdf5,
-    ".hdf5": of_hdf5,
-    ".mf4": of_mdf,
-    ".tdms": of_tdms,
 }
 
 
@@ -297,6 +271,6 @@ def test_the_kinds_of_a_label_are_kept(tmp_path):
         "t,v,k\n" + "".join(f"{i / 10},0.{i},{i % 3}\n" for i in range(9)), encoding="utf-8"
     )
     machine = read_machine_file(tmp_path / "machine.toml")
-    convert(tmp_path / "log.csv", tmp_path / "new.h5", machine=machine)
-    again = read_machine_file(tmp_path / "new.h5.machine.toml")
+    convert(tmp_path / "log.csv", tmp_path / "new.parquet", machine=machine)
+    again = read_machine_file(tmp_path / "new.parquet.machine.toml")
     assert {item.channel: item.kinds for item in again.columns.sources}["label"] == ((1.0, "hard"), (2.5, 'so"ft'))

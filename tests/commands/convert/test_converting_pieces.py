@@ -55,7 +55,7 @@ def test_messages_out_of_order_are_written_by_time_and_none_of_equal_time_is_los
         assert read[name].time == pytest.approx(expected.time, abs=1e-9)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".mcap", ".parquet", ".h5"])
+@pytest.mark.parametrize("suffix", [".csv", ".mcap", ".parquet"])
 def test_a_log_in_many_pieces_becomes_the_same_file_as_in_one(suffix, tmp_path, monkeypatch):
     needs(suffix)
     log = table(tmp_path / "run.csv", rows=3000)

@@ -15,7 +15,6 @@ from tests.commands.convert.kinds import KINDS, needs
 from tests.formats.container_files import assert_same, logged, machine_file, two_clocks
 
 EPOCH = 1_700_000_000.25
-ONE_CLOCK = [suffix for suffix in KINDS if suffix != ".mf4"]  # its start is a date in whole microseconds
 
 
 def dated(path: Path) -> Path:
@@ -31,7 +30,7 @@ def known(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("suffix", ONE_CLOCK)
+@pytest.mark.parametrize("suffix", KINDS)
 def test_a_table_on_an_epoch_keeps_its_start_through_a_container_and_back(suffix, tmp_path):
     needs(suffix)
     log, machine = dated(tmp_path / "run.csv"), known(tmp_path)
@@ -45,7 +44,7 @@ def test_a_table_on_an_epoch_keeps_its_start_through_a_container_and_back(suffix
         assert_same(original, found, exact_time=done is first and suffix != ".mcap")
 
 
-@pytest.mark.parametrize("suffix", ONE_CLOCK)
+@pytest.mark.parametrize("suffix", KINDS)
 def test_all_columns_of_several_clocks_keep_the_start_without_a_machine_file(suffix, tmp_path):
     needs(suffix)
     log = two_clocks(tmp_path / "run.mcap", start_ns=1_700_000_000_250_000_000)

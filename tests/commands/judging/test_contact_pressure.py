@@ -47,7 +47,7 @@ def test_alone_it_does_not_show_a_contact(rig):
         cdtool.benchmark(rig / "benchmark.toml")
 
 
-@pytest.mark.parametrize("suffix", ["csv", "mcap", "h5", "parquet"])
+@pytest.mark.parametrize("suffix", ["csv", "mcap", "parquet"])
 def test_a_converted_log_has_the_same_pressure(rig, suffix):
     log, target = rig / "edge" / "01.csv", rig / f"converted.{suffix}"
     converted = cdtool.convert(log, target, machine=rig / "machine.toml")

@@ -10,12 +10,8 @@ import pytest
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
-from cdtool.base.findings import Finding
 from cdtool.commands.convert.converting import convert
-from cdtool.formats.channels.channel_map import ChannelSource
-from cdtool.formats.channels.force_axes import on_one_clock
-from cdtool.formats.channels.reading import read_as_logged
-from cdtool.formats.columns import Column
+from cdtool.formats.channels.reading import read_as_logged, survey
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.recordings.recording import Recording
@@ -125,11 +121,9 @@ def write_log(folder: Path, axes: FloatArray, time: FloatArray) -> Path:
     return folder / "log.mcap"
 
 
-@pytest.mark.parametrize(
-    "force", ['topic = "/cell", fields = ["wrench.force.y"]', 'topics = ["/cell"], field = "wrench.force.y"']
-)
-def test_a_single_field_is_a_single_load_cell(tmp_path, force):
-    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}force = {{ {force} }}\n", encoding="utf-8")
+def test_a_single_field_is_a_single_load_cell(tmp_path):
+    force = 'force = { topic = "/cell", fields = ["wrench.force.y"] }'
+    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{force}\n", encoding="utf-8")
     axes = np.random.default_rng(0).normal(size=(200, 3))
     log = write_log(tmp_path, axes, np.arange(200) * 5e-3)
     recording = read_as_logged(log, read_machine_file(tmp_path / "machine.toml")).recording
@@ -145,7 +139,7 @@ def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, als
     log, machine = write_log(tmp_path, axes, time), read_machine_file(tmp_path / "machine.toml")
     found = read_as_logged(log, machine).recording["force"].values
     assert found.tolist() == (-axes[:, 2:] if also else axes).tolist()
-    for name in ("new.csv", "new.mcap", "new.h5"):
+    for name in ("new.csv", "new.mcap", "new.parquet"):
         convert(log, tmp_path / name, machine=machine)
         again = read_machine_file(tmp_path / f"{name}.machine.toml")
         assert read_as_logged(tmp_path / name, again).recording["force"].values.tolist() == found.tolist()
@@ -156,46 +150,29 @@ def test_an_infinite_value_of_an_axis_of_a_container_with_clocks_names_the_axis(
     axes[7, 1] = np.inf
     (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{TOPIC}\n", encoding="utf-8")
     log = write_log(tmp_path, np.where(np.isinf(axes), 1.0, axes), np.arange(200) * 5e-3)
-    convert(log, tmp_path / "new.h5", machine=read_machine_file(tmp_path / "machine.toml"))
-    with h5py.File(tmp_path / "new.h5", "r+") as file:
+    convert(log, tmp_path / "new.parquet", machine=read_machine_file(tmp_path / "machine.toml"))
+    with h5py.File(tmp_path / "new.h5", "w") as file:
+        for name, column in survey(tmp_path / "new.parquet").columns.items():
+            file[name] = column.values
+            file[name].attrs["unit"] = column.unit or "1"
         file["force y"][7] = np.inf
-    again = read_machine_file(tmp_path / "new.h5.machine.toml")
+    again = read_machine_file(tmp_path / "new.parquet.machine.toml")
     (found,) = (
         item for item in read_as_logged(tmp_path / "new.h5", again).recording.findings if item.severity == "loss"
     )
     assert (found.kind, found.channel) == ("infinite_values", "force force y")
 
 
-def test_each_axis_may_have_a_topic_and_a_clock_of_its_own(tmp_path):
-    time = np.arange(200) * 5e-3
-    speed = Stream("/joints", "sensor_msgs/msg/JointState", time, {"velocity": np.ones((200, 1))}, ("axis",))
-    late = time + 0.002
-    streams = [
-        Stream(f"/f{name}", "geometry_msgs/msg/WrenchStamped", clock, {"wrench.force.x": 100.0 * clock})
-        for name, clock in (("x", time), ("y", late))
-    ]
-    write_mcap(tmp_path / "log.mcap", [speed, *streams])
-    force = 'force = { topics = ["/fx", "/fy"], field = "wrench.force.x" }'
-    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{force}\n", encoding="utf-8")
-    recording = read_as_logged(tmp_path / "log.mcap", read_machine_file(tmp_path / "machine.toml")).recording
-    series = recording["force"]
-    assert series.values[1:, 0] == pytest.approx(100.0 * series.time[1:])
-    assert series.values[1:, 1] == pytest.approx(100.0 * (series.time[1:] - 0.003))
-    (note,) = [fact_of(item) for item in recording.findings if item.kind == "axes_held"]
-    assert note.numbers["age"] == pytest.approx(0.003, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("force", "said"),
     [
-        ('topics = ["/a", "/b"], fields = ["x", "y", "z"]', "names 2 topics for 3 fields"),
-        ('topics = ["/a", "/b"], topic = "/a", field = "x"', "cannot be combined with 'topic'"),
+        ('topics = ["/a", "/b"], fields = ["x", "y"]', "force.topics: unknown key"),
         ('topic = "/a", field = "x", fields = ["x", "y"]', "cannot be combined with 'field'"),
-        ('topics = ["/a", "/a"], field = "x"', "an axis twice"),
+        ('topic = "/a", fields = ["x", "x"]', "an axis twice"),
         ('fields = ["x", "y"]', "force.topic: is missing"),
     ],
 )
-def test_wrong_topics_of_a_vector_name_their_key(tmp_path, force, said):
+def test_wrong_fields_of_a_vector_name_their_key(tmp_path, force, said):
     (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}force = {{ {force} }}\n", encoding="utf-8")
     with pytest.raises(ConfigurationError, match=said):
         read_machine_file(tmp_path / "machine.toml")
@@ -208,32 +185,17 @@ def test_a_whole_array_is_no_axis(tmp_path):
         read_machine_file(tmp_path / "machine.toml")
 
 
-def source() -> ChannelSource:
-    return ChannelSource("force", columns=("a", "b"), factor=(1.0, 1.0), unit="N", keys=("a", "b"))
-
-
-def test_axes_with_clocks_of_their_own_are_held_and_never_from_the_future():
-    slow, fast = np.arange(100) * 0.01, np.arange(1000) * 0.001 + 0.0004
-    findings: list[Finding] = []
-    column = on_one_clock(source(), [Column("a", fast.copy(), fast), Column("b", slow.copy(), slow)], findings)
-    assert column.time is not None and column.time.tolist() == slow.tolist()
-    held = column.values[1:, 0]
-    assert np.all(held <= slow[1:]) and np.all(held > slow[1:] - 0.0011)
-    assert np.isnan(column.values[0, 0])
-    (note,) = findings
-    assert note.kind == "axes_held" and note.numbers["slowest"] == "b" and note.numbers["age"] == pytest.approx(6e-4)
-
-
-def test_an_axis_that_pauses_is_missing_and_not_held():
-    slow, fast = np.arange(100) * 0.01, np.arange(1000) * 0.001
-    kept = (fast < 0.3) | (fast > 0.5)
-    axes = [Column("a", fast[kept], fast[kept]), Column("b", slow.copy(), slow)]
-    column = on_one_clock(source(), axes, [])
-    missing = slow[np.isnan(column.values[:, 0])]
-    assert missing[0] == pytest.approx(0.31, abs=0.011) and missing[-1] == pytest.approx(0.5, abs=0.011)
-
-
-def test_an_axis_without_samples_is_refused():
-    time = np.arange(10.0)
-    with pytest.raises(RecordingError, match=r"'b' .* has no sample"):
-        on_one_clock(source(), [Column("a", time, time), Column("b", time[:0], time[:0])], [])
+def test_axes_with_clocks_of_their_own_are_refused(tmp_path):
+    (tmp_path / "machine.toml").write_text(f"{AXIS}{COLUMNS}{VECTOR}\n".replace('"t"', '"time"'), encoding="utf-8")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for group, names, rate in (("a", ("v", "fx", "fy"), 100.0), ("b", ("fz",), 50.0)):
+            file[f"{group}/time"] = np.arange(40) / rate
+            file[f"{group}/time"].attrs["unit"] = "s"
+            for name in names:
+                file[f"{group}/{name}"] = np.arange(40.0)
+    text = (tmp_path / "machine.toml").read_text(encoding="utf-8")
+    for name, group in (("v", "a"), ("fx", "a"), ("fy", "a"), ("fz", "b")):
+        text = text.replace(f'"{name}"', f'"{group}/{name}"')
+    (tmp_path / "machine.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"'a/fx' and 'b/fz' of channel 'force' have different clocks"):
+        read_as_logged(tmp_path / "log.h5", read_machine_file(tmp_path / "machine.toml"))

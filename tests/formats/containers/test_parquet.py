@@ -10,19 +10,15 @@ from cdtool.formats.containers.parquet import Parquet
 from tests.base.findings.facts import fact_of
 
 pa = pytest.importorskip("pyarrow")
-feather = pytest.importorskip("pyarrow.feather")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 
-@pytest.fixture(params=["parquet", "feather"])
-def saved(request, tmp_path):
+@pytest.fixture
+def saved(tmp_path):
     def save(columns, **options):
-        path = tmp_path / f"log.{request.param}"
+        path = tmp_path / "log.parquet"
         table = columns if isinstance(columns, pa.Table) else pa.table(columns)
-        if request.param == "parquet":
-            parquet.write_table(table, path, **options)
-        else:
-            feather.write_feather(table, str(path), **options)
+        parquet.write_table(table, path, **options)
         return path
 
     return save

@@ -12,7 +12,6 @@ from cdtool.base.findings import Finding
 from cdtool.formats.columns import as_float64
 from cdtool.formats.epoch_clock import EpochClock
 from cdtool.recordings.clock.plausible_unit import SECONDS, unit_since_1970
-from cdtool.recordings.units import find_unit
 
 _NAME = re.compile(r"^(t|ts|time|tout|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
 # A clock's unit at the end of its name: `t_ms`.
@@ -26,32 +25,24 @@ def is_clock_name(name: str) -> bool:
     return _NAME.match(name) is not None
 
 
-def assumed_clock(
-    name: str, stamps: npt.NDArray[Any], findings: list[Finding], stated: str | None = None
-) -> EpochClock:
+def assumed_clock(name: str, stamps: npt.NDArray[Any], findings: list[Finding]) -> EpochClock:
     """Return a column of stamps (n,), n > 0, as a clock; the finding on its unit is added to `findings`.
 
-    The unit is `stated` in the file, or at the end of the name, or that of a start after 1970, or that of the steps. A
-    unit other than s that only the steps state is a warning.
+    The unit is at the end of the name, or that of a start after 1970, or that of the steps. A unit other than s that
+    only the steps state is a warning.
     """
     known = stamps[np.isfinite(stamps)] if stamps.dtype.kind == "f" else stamps
     start, step = (float(known[0]) if len(known) else 0.0), _usual_step(known)
-    unit = find_unit(stated) if stated else None
     in_name, epoch = _UNIT_IN_NAME.search(name), unit_since_1970(start)
-    evidence: Literal["header", "name", "epoch", "steps"] = "steps"
-    if stated and unit is not None and unit.si == "s":
-        label, factor, evidence = stated, unit.factor, "header"
-    elif in_name or epoch:
+    if in_name or epoch:
         label, evidence = (in_name[1], "name") if in_name else (epoch, "epoch")
-        factor = SECONDS[label]
     else:
-        label = next(unit for most, unit in _UNITS if step < most)
-        factor = SECONDS[label]
+        label, evidence = next(unit for most, unit in _UNITS if step < most), "steps"
     severity: Literal["note", "warning"] = "warning" if evidence == "steps" and label != "s" else "note"
     findings.append(
         Finding("assumed_clock", name, {"unit": label, "evidence": evidence, "start": start, "step": step}, severity)
     )
-    return EpochClock(lambda first, end: stamps[first:end], factor)
+    return EpochClock(lambda first, end: stamps[first:end], SECONDS[label])
 
 
 def _usual_step(stamps: npt.NDArray[Any]) -> float:
