@@ -86,14 +86,14 @@ def joint_evidence(
     """Return what the fit of a form, to these runs, shows of a joint; without a form only its motion."""
     if form is None or not (fits[form].equations.joints == motion.joint).any():
         return RobotJointEvidence(motion)
-    windows = _JointWindows.of(motion.joint, fits[form], runs)
+    windows = _FittedWindows.of(motion.joint, fits[form], runs)
     return RobotJointEvidence(
         motion, _unseen(windows, form, fits[form], runs), _friction(windows, motion.joint, form, fits[form])
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _JointWindows:
+class _FittedWindows:
     """The equations of a joint (n,): where they are in all, run, place and time of the window, averages over it.
 
     `friction`: the torque less that of inertia and gravity, the machine's own and what the fit changed.
@@ -108,7 +108,7 @@ class _JointWindows:
     friction: FloatArray
 
     @classmethod
-    def of(cls, joint: int, fit: RobotFit, runs: Sequence[RobotRun]) -> _JointWindows:
+    def of(cls, joint: int, fit: RobotFit, runs: Sequence[RobotRun]) -> _FittedWindows:
         """Return the windows of a joint, run by run, as the equations are."""
         equations, regressor, parts = fit.equations, regressor_of(fit.machine), []
         change = fit.parameters - regressor.values
@@ -126,7 +126,7 @@ class _JointWindows:
         return cls(*(np.concatenate(item) for item in zip(*parts, strict=True)))
 
 
-def _unseen(windows: _JointWindows, form: FrictionForm, fit: RobotFit, runs: Sequence[RobotRun]) -> UnseenTorque:
+def _unseen(windows: _FittedWindows, form: FrictionForm, fit: RobotFit, runs: Sequence[RobotRun]) -> UnseenTorque:
     """Return the torque along the run that is predicted worst, relative to the torque of all runs."""
     residual, previous = fit.left_out.residual[windows.rows], fit.left_out.previous[windows.rows]
     worst = int(np.argmax(np.bincount(windows.run, residual**2) / np.maximum(np.bincount(windows.run), 1)))
@@ -138,7 +138,7 @@ def _unseen(windows: _JointWindows, form: FrictionForm, fit: RobotFit, runs: Seq
     return UnseenTorque(runs[worst].name, len(runs), form, np.insert(time, gaps, time[gaps]), *broken)
 
 
-def _friction(windows: _JointWindows, joint: int, form: FrictionForm, fit: RobotFit) -> JointFrictionCurve | None:
+def _friction(windows: _FittedWindows, joint: int, form: FrictionForm, fit: RobotFit) -> JointFrictionCurve | None:
     """Return the friction over speed, with the inertias that belong to the form."""
     speed = windows.speed
     points = friction_curve(speed, windows.friction, fit.left_out.blocks[windows.rows], speed_edges(speed))

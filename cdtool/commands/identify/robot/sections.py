@@ -19,8 +19,8 @@ from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, ta
 
 _UNSEEN = (
     "Each part, a run or a fifth of the only one, is predicted by a fit to the other parts; shown is the run with the "
-    "largest residual. Torques are low-passed; lines are interrupted where a joint rests. The title has the RMS of the "
-    "residual of all runs before and after."
+    "largest residual. The model has the friction that the machine file has afterwards. Torques are low-passed; lines "
+    "are interrupted where a joint rests. The title has the RMS of the residual of all runs before and after."
 )
 _FRICTION = (
     "Measured torque less that of inertia and gravity, per interval of speed; bars are two standard errors between "
