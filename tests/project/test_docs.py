@@ -66,10 +66,10 @@ COMMANDS = {
     "docs/identification.md": 4,
 }
 EXAMPLES = {
-    "docs/python.md": 11,
+    "docs/python.md": 13,
     "docs/own-detector.md": 1,
     "docs/comparing.md": 1,
-    "docs/impact.md": 11,
+    "docs/impact.md": 10,
     "docs/signature.md": 1,
     "docs/simulators.md": 3,
     "docs/detectors/friction-ekf.md": 1,
