@@ -71,7 +71,7 @@ EXAMPLES = {
     "docs/comparing.md": 1,
     "docs/impact.md": 10,
     "docs/signature.md": 1,
-    "docs/simulators.md": 3,
+    "docs/simulators.md": 2,
     "docs/detectors/friction-ekf.md": 1,
 }
 # Lines of shell blocks that set something up or take long: run by CI or by hand, not here.
