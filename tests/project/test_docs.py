@@ -67,7 +67,6 @@ COMMANDS = {
 }
 EXAMPLES = {
     "docs/python.md": 13,
-    "docs/own-detector.md": 1,
     "docs/comparing.md": 1,
     "docs/impact.md": 10,
     "docs/signature.md": 1,
