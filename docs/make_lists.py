@@ -39,9 +39,9 @@ _MODEL = "the machine file must give the inertia"
 _INDEX = """# The detectors
 
 Each page gives the equation, the signal and its unit, the gains with their defaults, and when the detector fails.
-"Model" means inertia and friction in the [machine file](../machine-file.md), and for an arm or a robot also the geometry; with coupled
-joints, a detector that uses a model also needs the position. [How to choose](../choosing.md) compares them. `cdtool list detectors` also
-lists those of installed plug-ins.
+"Model" means inertia and friction in the [machine file](../machine-file.md), and for an arm or a robot also the
+geometry; with coupled joints, a detector that uses a model also needs the position. [How to choose](../choosing.md)
+compares them. `cdtool list detectors` also lists those of installed plug-ins.
 
 | detector | short | needs | what it looks at | use it |
 |---|---|---|---|---|
