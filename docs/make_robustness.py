@@ -369,7 +369,7 @@ another name, or `adaptive_level` in `[signature]`, and run it again.
 * In the simulators a change is pure: friction rises everywhere by the same share; noise, controller and obstacles stay
   the same. A real winter changes several of these at once.
 * The thresholds have their default settings, not a common false-alarm budget:
-  [Thresholds compared](thresholds-compared.md) has that comparison for the unchanged machine.
+  [Thresholds](thresholds.md#compared-at-the-same-false-alarm-budget) has that comparison for the unchanged machine.
   [`cdtool tune`](tuning.md) at a budget sets other limits; other runs may then alarm.
 * The numbers are those of few runs: {few} of {count} alarming has a 95 % interval of {low:.1f} to {high:.0f} %.
 """

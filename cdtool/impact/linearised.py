@@ -31,7 +31,7 @@ def linearised_contact(law: ContactLaw, penetration: float, rate: float) -> Cont
     """K_c and D_c of a law about a penetration [m] and its rate [m/s]; r^2 times them is 4.17.
 
     Central differences, accurate to about 1e-8 of the value, for any law. Raises UsageError outside the contact.
-    Both change with the state: `docs/transmission.md` states how far from it they are valid.
+    Both change with the state: `docs/impact.md` states how far from it they are valid.
     """
     require_positive("penetration", penetration, "m")
     depth, change = 1e-4 * penetration, 1e-4 * max(abs(rate), 1e-3)

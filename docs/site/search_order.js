@@ -1,7 +1,7 @@
 // The order of search results: pages that explain come before generated ones and before lists of pages.
 // Sphinx embeds this file in searchtools.js; without it an object of Python precedes the page of the same name.
 var LATER = [
-  [/^docs\/reference\/python\//, 12], [/^docs\/recipes\//, 8], [/^docs\/architecture$/, 8], [/^CHANGELOG$/, 12],
+  [/^docs\/reference\/python\//, 12], [/^docs\/recipes$/, 8], [/^docs\/architecture$/, 8], [/^CHANGELOG$/, 12],
   [/^CONTRIBUTING$/, 10], [/^docs\/(index|tasks|concepts|reference|gallery)$/, 6], [/^index$/, 3], [/^docs\/robustness$/, 4],
   [/^docs\/errata$/, 4]
 ];

@@ -1,4 +1,4 @@
-"""The recipes of docs/recipes as what they tell to do: files to write, and a line for the table of a room.
+"""The recipes of docs/recipes.md as what they tell to do: files to write, and a line for the table of a room.
 
 As a pytest plug-in, `-p tests.project.recipes`, it installs all of them from the folder in RECIPES.
 """
@@ -18,15 +18,14 @@ import pytest
 from cdtool.base.registry import Registry
 from tests.project import pages
 
-FOLDER = pages.DOCS / "recipes"
+PAGE = pages.DOCS / "recipes.md"
 _FILE = re.compile(r"`(?P<path>[\w./-]+)`:\n\n```\w+\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """A page: the files that it shows, the package whose table it extends, its line in the table, and its commands."""
+    """A section: the files that it shows, the package whose table it extends, its line in the table, its commands."""
 
-    page: Path
     files: dict[str, str]
     package: str
     name: str
@@ -34,20 +33,20 @@ class Recipe:
     commands: tuple[str, ...]
 
 
-def read_recipe(page: Path) -> Recipe:
-    """The recipe of a page; raises AssertionError where the page has no table, or several entries."""
-    text = page.read_text(encoding="utf-8")
+def read_recipe(text: str) -> Recipe:
+    """The recipe of a section; raises AssertionError where it has no table, or several entries."""
     files = {found["path"]: found["text"] for found in _FILE.finditer(text)}
     ((path, line),) = [(path, files.pop(path)) for path in list(files) if path.endswith("/__init__.py")]
     ((name, entry),) = ast.literal_eval(f"{{{line}}}").items()
     (shell,) = [block["body"] for block in pages.FENCE.finditer(text) if block["kind"] == "bash"]
     package = path.removesuffix("/__init__.py").replace("/", ".")
-    return Recipe(page, files, package, name, entry, tuple(shell.splitlines()))
+    return Recipe(files, package, name, entry, tuple(shell.splitlines()))
 
 
 def read_recipes() -> list[Recipe]:
-    """All recipes, by the names of their pages."""
-    return [read_recipe(page) for page in sorted(FOLDER.glob("*.md")) if page.name != "index.md"]
+    """All recipes, in the order of their page."""
+    _, *sections = re.split(r"^(?=## Add )", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return [read_recipe(section) for section in sections]
 
 
 def registry_of(recipe: Recipe) -> Registry:
@@ -72,7 +71,7 @@ def install(recipe: Recipe, folder: Path, patch: pytest.MonkeyPatch) -> None:
     patch.setitem(registry.table, recipe.name, target)
     if short:
         patch.setitem(registry.short_names, short, recipe.name)
-    patch.setattr(pages, "MACHINE_PAGES", [*pages.MACHINE_PAGES, recipe.page])
+    patch.setattr(pages, "MACHINE_PAGES", [*dict.fromkeys([*pages.MACHINE_PAGES, PAGE])])
 
 
 def pytest_configure(config: Any) -> None:

@@ -66,13 +66,11 @@ COMMANDS = {
     "docs/identification.md": 4,
 }
 EXAMPLES = {
-    "docs/python.md": 11,
-    "docs/own-detector.md": 1,
+    "docs/python.md": 13,
     "docs/comparing.md": 1,
-    "docs/impact.md": 7,
-    "docs/transmission.md": 3,
+    "docs/impact.md": 10,
     "docs/signature.md": 1,
-    "docs/simulators.md": 3,
+    "docs/simulators.md": 2,
     "docs/detectors/friction-ekf.md": 1,
 }
 # Lines of shell blocks that set something up or take long: run by CI or by hand, not here.

@@ -1,4 +1,4 @@
-"""The recipes: what a page shows can be copied, passes the contract tests and its own, and its commands run."""
+"""The recipes: what the page shows can be copied, passes the contract tests and its own, and its commands run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_there_is_a_recipe_for_each_kind_of_class_that_cdtool_lists():
     assert sorted(f"{registry_of(recipe).kind}s" for recipe in RECIPES) == sorted(_KINDS)
 
 
-@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.page.stem)
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
 def test_a_recipe_adds_no_file_that_exists_and_tests_it_where_its_tests_belong(recipe: Recipe):
     assert f"{recipe.package.replace('.', '/')}/{recipe.name}.py" in recipe.files
     for path in recipe.files:
@@ -74,7 +74,7 @@ def test_what_the_recipes_add_passes_the_contract_tests_and_its_own(folder):
     assert int(done.stdout.rpartition(" passed")[0].split()[-1].split("\n")[-1]) > 80
 
 
-@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.page.stem)
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
 @pytest.mark.usefixtures("installed")
 def test_the_commands_of_a_recipe_run_and_name_what_it_adds(recipe: Recipe, tmp_path, monkeypatch):
     (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")

@@ -165,12 +165,11 @@ def test_the_contract_tests_run_over_the_plugins(site):
     assert int(done.stdout.rpartition(" passed")[0].split()[-1]) > 30
 
 
-def test_the_page_shows_the_detector_of_the_package_and_its_commands_run(command, tmp_path):
+def test_the_page_shows_the_entry_points_of_the_package_and_its_commands_run(command, tmp_path):
     page = (ROOT / "docs" / "own-detector.md").read_text(encoding="utf-8")
     example = ROOT / "tests" / "plugin_example"
     shown = set(re.findall(r"^```\w+\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
-    for path in (example / "pyproject.toml", example / "cdtool_plugin_example" / "torque_rate.py"):
-        assert path.read_text(encoding="utf-8") in shown, path
+    assert (example / "pyproject.toml").read_text(encoding="utf-8") in shown
     (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")
     blocks = re.findall(r"^```bash\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     lines = [shlex.split(line) for block in blocks for line in block.splitlines()]

@@ -65,4 +65,4 @@ found[2].plot()
 
 # %% [markdown]
 # It is beaten by most others: compare it with the momentum observer in [Compare detectors](compare_detectors.md). The
-# [recipe](../recipes/detector.md) describes the contract, and the tests that show whether a detector keeps it.
+# [recipe](../recipes.md#add-a-detector) describes the contract, and the tests that show whether a detector keeps it.

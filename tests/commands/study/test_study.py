@@ -235,17 +235,15 @@ def test_a_joint_is_required_if_there_are_several(tmp_path):
     assert ranked("-m", gantry, "--joint", "x") != ranked("-m", gantry, "--joint", "y")
 
 
-def test_the_page_shows_what_the_commands_print(monkeypatch, tmp_path):
+def test_the_page_shows_what_the_command_prints(monkeypatch, tmp_path):
     page = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
-    blocks = [block.split("```")[0] for block in page.split("```console\n$ cdtool ")[1:]]
-    assert len(blocks) == 2
-    for block in blocks:
-        command, *shown = block.splitlines()
-        paths = [str(ROOT / word) if word.startswith(("sample_logs", "docs")) else word for word in command.split()]
-        monkeypatch.chdir(tmp_path)
-        printed = [line.rstrip() for line in cdtool(*paths).out.splitlines()]
-        assert len(shown) >= 9 and shown[-1] == "..."
-        assert [line.rstrip() for line in shown[:-1]] == printed[: len(shown) - 1]
+    (block,) = [block.split("```")[0] for block in page.split("```console\n$ cdtool ")[1:]]
+    command, *shown = block.splitlines()
+    paths = [str(ROOT / word) if word.startswith("sample_logs") else word for word in command.split()]
+    monkeypatch.chdir(tmp_path)
+    printed = [line.rstrip() for line in cdtool(*paths).out.splitlines()]
+    assert len(shown) >= 9 and shown[-1] == "..."
+    assert [line.rstrip() for line in shown[:-1]] == printed[: len(shown) - 1]
 
 
 def test_the_page_names_every_key_of_a_study():
