@@ -76,7 +76,7 @@ class Registry:
             return made
         problem = f"has the name of a {self.kind} of cdtool itself" if name in self.table else ""
         if problem := problem or self._breach(type(made), name):
-            raise UsageError(f"{self.kind} {type(made).__name__} {problem}", f"see docs/recipes/{self.kind}.md")
+            raise UsageError(f"{self.kind} {type(made).__name__} {problem}", f"see docs/recipes.md#add-a-{self.kind}")
         return made
 
     def broken_plugins(self) -> dict[str, CdtoolError]:
