@@ -107,7 +107,7 @@ class SlicedFormat(PiecewiseFormat):
             columns = {key: column for key, column in columns.items() if some is None or key in some}
             check_size(path, sum(column.rows for column in columns.values()))
             rounded = Counter[str]()
-            yield from _interleave(columns, origin, container.findings, rounded)
+            yield from _interleave(columns, origin, rounded)
             container.findings += [note for key in columns for note in rounding_finding(key, rounded[key])]
         headers = {key: _header(key, column) for key, column in columns.items()}
         findings = tuple(dict.fromkeys(container.findings))
@@ -120,9 +120,7 @@ def _header(name: str, column: SlicedColumn) -> Column:
     return Column(name, np.empty(0), time, column.unit, column.categories.words if column.categories else {})
 
 
-def _interleave(
-    columns: Mapping[str, SlicedColumn], origin: Fraction, findings: list[Finding], rounded: Counter[str]
-) -> Iterator[Piece]:
+def _interleave(columns: Mapping[str, SlicedColumn], origin: Fraction, rounded: Counter[str]) -> Iterator[Piece]:
     """Yield the same share of each clock's rows in turn, so that clocks that run in parallel advance together.
 
     Table columns of equal length form one table. The integers that float64 rounds are counted by column.
@@ -138,16 +136,9 @@ def _interleave(
             for name in names:
                 raw = columns[name].read(start, end)
                 rounded[name] += rounded_integers(raw) if raw.dtype.kind in "iu" else 0
-                values[name] = _padded(raw, end - start)
+                values[name] = as_float64(raw)
                 if len(raw) < end - start:
-                    lost = {"count": end - start - len(raw), "first": start + len(raw)}
-                    findings.append(Finding("values_cut_off", name, lost))
+                    raise RecordingError(f"column '{name}' ends before row {end}, its last one", "copy the file again")
             clock = columns[names[0]].clock
-            time = None if clock is None else _padded(clock.times(start, end, origin), end - start)
+            time = None if clock is None else clock.times(start, end, origin)
             yield Piece(str(number), time, values, end - start)
-
-
-def _padded(raw: npt.NDArray[Any], rows: int) -> FloatArray:
-    """Return numbers as float64, with NaN for those that a damaged file does not have."""
-    values = as_float64(raw)
-    return values if len(values) == rows else np.pad(values, (0, rows - len(values)), constant_values=np.nan)

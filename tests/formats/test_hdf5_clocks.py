@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.formats.channels.reading import survey
+from cdtool.base.errors import RecordingError
+from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.containers.hdf5 import Hdf5
 from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.pieces import join_pieces
 from tests.base.findings.facts import fact_of
 
@@ -60,10 +62,16 @@ def test_stamps_before_the_first_one_keep_their_sign(saved):
     assert times.tolist() == [0.0, -5e-9, 4e-9]
 
 
-@pytest.mark.parametrize("unit", ["seconds since 2024-01-01", "days since 1899-12-30"])
-def test_a_unit_since_a_date_is_not_a_clock(saved, unit):
-    source = survey(saved(time=(np.arange(9.0), {"units": unit}), q=(np.arange(9.0), {})))
-    assert source.columns["q"].time is None and source.columns["time"].unit == unit and source.origin == 0.0
+@pytest.mark.parametrize("unit", ["seconds since 2024-01-01", "milliseconds since 2024-01-01", "days since 1899-12-30"])
+def test_a_time_since_a_date_is_left_out_and_never_read_in_another_unit(saved, tmp_path, unit):
+    path = saved(time=(np.arange(9.0), {"units": unit}), q=(np.arange(9.0), {}))
+    source = survey(path)
+    assert list(source.columns) == ["q"] and source.columns["q"].time is None
+    why = f"in '{unit}' of the CF conventions, which are not applied"
+    assert facts(source) == [("", ("column_left_out", {"column": "time", "what": why}))]
+    (tmp_path / "machine.toml").write_text(MACHINE)
+    with pytest.raises(RecordingError, match="'time'"):
+        read_recording(path, read_machine_file(tmp_path / "machine.toml"))
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ from cdtool.recordings.units import find_unit
 
 # Attributes of the CF conventions by which stored numbers are converted, each with the value that converts nothing.
 _CONVERTING = {"scale_factor": 1.0, "add_offset": 0.0, "_FillValue": np.nan, "missing_value": np.nan}
+_SINCE = " since "
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNIT_KEYS = ("unit", "units", "Unit", "Units")
 _CLOCK_NAMES = ("time", "t", "timestamp")
@@ -153,6 +154,8 @@ def _unusable(dataset: Any) -> str:
         return f"a MATLAB {_text(dataset.attrs.get('MATLAB_class'))}"
     if any(_converts(dataset.attrs.get(key, same), same) for key, same in _CONVERTING.items()):
         return "packed by the CF conventions, which are not applied"
+    if _SINCE in (_unit(dataset) or ""):  # in any unit: read as a plain clock, its times might be wrong
+        return f"in '{_unit(dataset)}' of the CF conventions, which are not applied"
     if dataset.ndim not in (1, 2) or 0 in dataset.shape:
         return f"of shape {dataset.shape}"
     if dataset.size == 1:
