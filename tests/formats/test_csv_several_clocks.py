@@ -7,11 +7,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import cdtool
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
+from cdtool.commands.convert.converting import convert
 from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import join_pieces
+from tests.base.findings.facts import fact_of
 
 OWN = """[channels]
 time = { column = "time", unit = "s" }
@@ -52,18 +55,24 @@ def clock_warnings(source) -> list[Finding]:
 
 
 @pytest.mark.parametrize("header", HEADERS)
-def test_channels_beside_clocks_of_other_rates_are_refused_and_reported(log, machine, header):
-    path = log(table(header, CELL, DRIVE))
-    first, second = (name for name in Csv().columns(path).names if name[:1] in "tX" and name != "torque")
-    for clock in (f'"{first}"', "0"):
-        with pytest.raises(RecordingError, match=f"column 'torque' is beside the clock '{second}'") as fault:
-            read_recording(path, machine(OWN.replace('"time", unit', f"{clock}, unit")))
-        assert "it has 40 stamps, not 50" in str(fault.value)
-        assert fault.value.hint == "split the table into a file for each clock"
-    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
-        (warning,) = clock_warnings(source)
-        assert warning.channel == second and warning.numbers["columns"] == ("torque", "speed")
-        assert all(column.time is None for column in source.columns.values())
+def test_each_channel_has_the_clock_before_it(log, machine, header):
+    recording = read_recording(log(table(header, CELL, DRIVE)), machine(OWN))
+    assert recording["force"].time.tolist() == CELL.tolist()
+    assert recording["force"].values[:, 0].tolist() == list(range(50))
+    for channel in ("torque", "speed"):
+        assert recording[channel].time.tolist() == DRIVE.tolist()
+    assert not [finding for finding in recording.findings if finding.severity != "note"]
+    assert [finding.kind for finding in recording.findings if finding.channel == "time"] == ["own_clocks"]
+
+
+def test_clocks_in_ms_without_a_unit_are_refused_rather_than_read_in_s(log, machine):
+    path = log(table("time,force,time2,torque,speed", 1e3 * CELL, 1e3 * DRIVE))
+    with pytest.raises(RecordingError, match="is beside the clock 'time2'") as fault:
+        read_recording(path, machine(OWN.replace('unit = "s"', 'unit = "ms"')))
+    assert "in the unit of its header ('time2 [ms]')" in fault.value.hint
+    path = log(table("time [ms],force,time2 [ms],torque,speed", 1e3 * CELL, 1e3 * DRIVE))
+    recording = read_recording(path, machine(OWN))
+    assert recording["force"].time == pytest.approx(CELL) and recording["torque"].time == pytest.approx(DRIVE)
 
 
 @pytest.mark.parametrize(
@@ -86,11 +95,16 @@ def test_one_clock_for_all_channels_is_refused_if_the_times_differ(log, machine,
         text += why
     with pytest.raises(RecordingError, match=text) as fault:
         read_recording(path, machine(named(clock)))
-    assert fault.value.hint == "split the table into a file for each clock"
+    assert 'time = { column = "time", unit = "s" }' in fault.value.hint
     only = "\n".join(line for line in named(clock).splitlines() if wrong not in line and "speed" not in line)
     remaining = "force" if clock == "time1" else "torque"
     assert len(read_recording(path, machine(only))[remaining]) == 4000
     for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        if why.startswith("their steps"):
+            assert not clock_warnings(source) and source.columns["torque"].time[-1] == pytest.approx(
+                start + step * 3999
+            )
+            continue
         (warning,) = clock_warnings(source)
         assert warning.channel == "time2" and warning.kind == "other_clock"
         assert (warning.numbers["first"], warning.numbers["columns"]) == ("time1", ("torque", "speed"))
@@ -121,10 +135,57 @@ def test_adjacent_clocks_belong_to_the_same_rows(log, machine):
     assert not clock_warnings(Csv().columns(path))
 
 
-def test_clocks_after_their_channels_are_recognised_by_the_last_column(log):
+def test_clocks_after_their_channels_are_recognised_by_the_last_column(log, machine):
     rows = "".join(f"{i},{i / 2000},{10 * i},{100 * i},{i / 1000}\n" for i in range(50))
-    (warning,) = clock_warnings(Csv().columns(log("force,time1,torque,speed,time2\n" + rows)))
-    assert (warning.channel, warning.numbers["columns"]) == ("time2", ("torque", "speed"))
+    recording = read_recording(log("force,time1,torque,speed,time2\n" + rows), machine(OWN))
+    assert recording["force"].time[-1] == 49 / 2000 and recording["torque"].time[-1] == 49 / 1000
+
+
+def test_units_and_epoch_are_read_from_each_clocks_header(log, machine):
+    header = "time1 [ms],force,time2 [s],torque,speed"
+    path = log(table(header, 1.7e12 + 1e3 * CELL, 1.7e9 + 0.125 + DRIVE))
+    recording = read_recording(path, machine(OWN))
+    assert recording.origin == 1.7e9
+    assert recording["force"].time == pytest.approx(CELL, abs=1e-6)
+    assert recording["torque"].time == pytest.approx(0.125 + DRIVE, abs=1e-6)
+
+
+def test_a_channel_without_a_clock_is_refused(log, machine):
+    rows = "".join(f"{i},{i / 2000},{10 * i},{i / 1000},{100 * i}\n" for i in range(50))
+    with pytest.raises(RecordingError, match="no clock is beside column 'force'"):
+        read_recording(log("force,time1,torque,time2,speed\n" + rows), machine(OWN))
+
+
+def test_values_without_a_time_are_a_loss(log, machine):
+    rows = "".join(f"{i / 2000},{i},{'' if i == 7 else i / 1000},{10 * i},{100 * i}\n" for i in range(50))
+    recording = read_recording(log(HEADERS[0] + "\n" + rows), machine(OWN))
+    assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
+    lost = [finding for finding in recording.findings if finding.severity == "loss"]
+    assert lost == [Finding("values_without_time", channel, {"count": 1}) for channel in ("torque", "speed")]
+
+
+@pytest.mark.parametrize("unit", ["", " [ms]"])
+def test_without_a_machine_file_channels_of_other_rates_have_the_clocks_beside_them(log, tmp_path, unit):
+    factor = 1e3 if unit else 1.0
+    text = table(f"t1{unit};torque [N m];t2{unit};position [mm];speed [mm/s]", factor * CELL, factor * DRIVE, ";")
+    path = log(text.replace(",", ";"))
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        assert list(source.columns) == ["torque [N m]", "position [mm]", "speed [mm/s]"]
+        assert source.columns["torque [N m]"].time == pytest.approx(CELL)
+        assert source.columns["speed [mm/s]"].time == pytest.approx(DRIVE)
+        assert source.columns["position [mm]"].values.tolist() == [10.0 * i for i in range(40)]
+        facts = [fact_of(finding) for finding in source.findings]
+        assumed = [] if unit else [("clock_unit_assumed", {"clocks": ("t1", "t2"), "step": pytest.approx(0.0005)})]
+        assert facts == [("own_clocks", {"clocks": (f"t1{unit}", f"t2{unit}")}), *assumed]
+    info = cdtool.info(path)
+    assert [(item.samples, item.missing) for item in info.channels] == [(50, 0), (40, 0), (40, 0)]
+    assert [item.rate_hz for item in info.channels] == pytest.approx([2000.0, 1000.0, 1000.0])
+    draft = cdtool.init(path, tmp_path / "draft.toml").text
+    assert 'time = { column = "time", unit = "s" }' in draft
+    clock = next(line for line in draft.splitlines() if line.startswith("time ="))
+    assert ("read in s, at 2000 Hz" in draft) is not bool(unit) and clock
+    converted = convert(path, tmp_path / "log.mcap").files[0]
+    assert {item.samples for item in cdtool.info(converted).channels} == {50, 40}
 
 
 def test_a_second_clock_without_channels_of_its_own_is_reported_and_changes_nothing(log):
@@ -136,6 +197,26 @@ def test_a_second_clock_without_channels_of_its_own_is_reported_and_changes_noth
         assert all(column.time is None for column in source.columns.values())
 
 
+def test_a_clock_of_the_same_rate_that_ends_early_is_that_of_its_channels(log):
+    path = log(table(HEADERS[0], CELL, CELL[:30]))
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        assert len(source.columns["torque"].values) == 30 and len(source.columns["force"].values) == 50
+
+
+def test_a_long_table_is_read_in_pieces_with_the_times_of_the_whole(log, monkeypatch):
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 1 << 18)
+    first, second = 1.7e9 + np.arange(60_000) / 2000.0, 1.7e9 + 0.25 + np.arange(20_000) / 500.0
+    path = log(table("time1 [s],force,time2 [s],torque,speed", first, second))
+    pieces = list(Csv().pieces(path))
+    whole, joined = Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)
+    assert len(pieces) > 4 and path.stat().st_size > 1 << 21
+    assert whole.origin == joined.origin == 1.7e9
+    for name, column in whole.columns.items():
+        assert np.array_equal(column.values, joined.columns[name].values)
+        assert np.array_equal(column.time, joined.columns[name].time)
+    assert joined.columns["speed"].time[0] == 0.25
+
+
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(
     rates=st.lists(st.sampled_from([50, 100, 250, 1000]), min_size=2, max_size=2, unique=True),
@@ -145,7 +226,8 @@ def test_a_second_clock_without_channels_of_its_own_is_reported_and_changes_noth
 def test_no_channel_is_read_with_the_clock_of_another(log, machine, rates, counts, mark):
     first, second = (np.arange(count) / rate for count, rate in zip(counts, rates, strict=True))
     path = log(table(HEADERS[0], first, second, mark))
-    with pytest.raises(RecordingError, match="no column 'time'"):
-        read_recording(path, machine(OWN))
+    recording = read_recording(path, machine(OWN))
+    assert recording["force"].time.tolist() == first.tolist()
+    assert recording["torque"].time.tolist() == second.tolist()
     with pytest.raises(RecordingError, match="is beside the clock"):
         read_recording(path, machine(named("time1")))

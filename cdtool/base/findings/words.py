@@ -140,6 +140,7 @@ _COMPUTED: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
     "first_rows": _first_rows,
     "first_gaps": _first_gaps,
     "wrap": lambda numbers: 2 ** numbers["restart"]["wrapped_bits"],
+    "assumed_rate": lambda numbers: 1.0 / numbers["step"] if numbers["step"] > 0.0 else 0.0,
     "new_zeros": _new_zeros,
     "more_zeros": lambda numbers: len(_new_zeros(numbers)) - 1,
     "lost_span": lambda numbers: numbers["lost"]["time"][1] - numbers["lost"]["time"][0],

@@ -327,7 +327,8 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     unit = ratio.fitting[0].clock if ratio is not None and ratio.fitting else clock.unit if clock is not None else ""
     side = side_of(channels, ratio, clock, messages_si)
     if own or topics:
-        time = Clock({"column": "time", "unit": "s"}, "the file's own clock", "", 1.0)
+        assumed = next((item.sentence for item in source.findings if item.kind == "clock_unit_assumed"), "")
+        time = Clock({"column": "time", "unit": "s"}, "the file's own clock", assumed, 1.0)
     else:
         time = _clock(channels, clock, ratio, side.gear is not None)
     if stamp and time.keys.get("column") == stamp[0]:

@@ -15,9 +15,9 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, UsageError, naming
-from cdtool.formats.channels.channel_map import ChannelMap, TablePins
-from cdtool.formats.column_names import column_key, wanted_keys
-from cdtool.formats.pieces import Pieces
+from cdtool.formats.channels.channel_map import ChannelMap, TablePins, TimeSource
+from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
+from cdtool.formats.pieces import Pieces, join_pieces, split_by_clock
 from cdtool.formats.source import Source
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Csv:
 
         `pins` are in place of those of the map.
         """
-        from cdtool.formats.csv.several_clocks import other_clocks
+        from cdtool.formats.csv.several_clocks import Clocks, pieces_by_own_clock
         from cdtool.formats.csv.table import read_table
         from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
@@ -55,45 +55,56 @@ class Csv:
             dialect = find_dialect(path, pins or (TablePins() if wanted is None else wanted.pins))
             if wanted is not None:
                 return _read_wanted(dialect, wanted)
-            table = read_table(dialect, dialect.names)
-            values = {key: column.values for key, column in table.columns.items()}
-            return replace(table, findings=(*table.findings, *other_clocks(dialect, values)))
+            table, clocks = read_table(dialect, dialect.names), Clocks.by_names(dialect)
+            if len(clocks.groups) < 2:  # joined from pieces, a large table would be in memory twice
+                return table
+            return join_pieces(pieces_by_own_clock(dialect, clocks, split_by_clock(table), None), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
-        from cdtool.formats.csv.several_clocks import other_clocks
+        from cdtool.formats.csv.several_clocks import Clocks, pieces_by_own_clock
         from cdtool.formats.csv.table import table_pieces
         from cdtool.formats.csv_dialect.find_dialect import find_dialect
 
         with naming(path):
             dialect = find_dialect(path, TablePins())
+            clocks = Clocks.by_names(dialect)
             # The last column is always read: it shows whether the file's end is complete.
-            pieces = table_pieces(dialect, dialect.names if keys is None else {*keys, dialect.names[-1]})
-            first = next(pieces)
-            yield first
-            table = yield from pieces
-            return replace(table, findings=(*table.findings, *other_clocks(dialect, first.values)))
+            read = dialect.names if keys is None else {*keys, dialect.names[-1]}
+            if len(clocks.groups) > 1:
+                read = {*read, *(dialect.names[i] for i in clocks.columns)}
+            return (yield from pieces_by_own_clock(dialect, clocks, table_pieces(dialect, read), keys))
 
 
 def _read_wanted(dialect: Dialect, wanted: ChannelMap) -> Source:
-    from cdtool.formats.csv.several_clocks import Clocks, other_clocks
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clocks, pieces_by_own_clock
     from cdtool.formats.csv.table import read_table
 
     names, time = dialect.names, wanted.time
     clock = column_key(time.column, names) if time.column is not None else None
-    clocks, keys = Clocks.by_names(dialect, clock), wanted_keys(wanted, names)
-    if clock is None or len(clocks.groups) < 2:
-        return read_table(dialect, keys, clock, wanted)
+    clocks = Clocks.by_names(dialect, clock)
+    own = time.column == OWN_CLOCK and time.factor == 1.0
+    if len(clocks.groups) < 2 or (clock is None and not own):
+        return read_table(dialect, wanted_keys(wanted, names), clock, wanted)
+    keys = wanted_keys(wanted if clock is not None else replace(wanted, time=TimeSource()), names)
     table = read_table(dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
-    values = {key: column.values for key, column in table.columns.items()}
-    other = other_clocks(dialect, values, clock, keys)
-    if other:
-        raise RecordingError(
-            f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}', but the machine file "
-            f"names '{clock}': {other[0].words_for('difference[what]')}",
-            "split the table into a file for each clock",
-        )
-    return replace(table, columns={key: column for key, column in table.columns.items() if key in keys})
+    if clock is not None:
+        values = {key: column.values for key, column in table.columns.items()}
+        other = other_clocks(dialect, clocks, clock, keys, values)
+        if other and not own:
+            beside = f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}'"
+            differs = other[0].words_for("difference[what]")
+            raise RecordingError(f"{beside}, but the machine file names '{clock}': {differs}", HINT)
+        if not other:
+            return replace(table, columns={key: column for key, column in table.columns.items() if key in keys})
+        # Back to the file's values, which can be compared with the other clocks.
+        as_written = replace(table.columns[clock], values=table.columns[clock].values + table.origin)
+        table = replace(table, columns={**table.columns, clock: as_written})
+    channels = [key for key in keys if key != clock]
+    for key in channels:
+        if dialect.names.index(key) not in clocks.of:
+            raise RecordingError(f"no clock is beside column '{key}'", "name its clock in [channels] time")
+    return join_pieces(pieces_by_own_clock(dialect, clocks, split_by_clock(table), channels, stated=True), sort=False)
 
 
 def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[str, str]) -> None:
