@@ -135,9 +135,9 @@ def cases(inputs: Path) -> list[Case]:
             _plot("explain", stiff[0], *machine, "--signature", b),
         ),
         Case(
-            "recover",
-            ("recover", f"{inputs}/2.mcap", "-o", "{out}/r.mcap", "--force"),
-            ("recover", f"{inputs}/1.mcap", "-o", "{out}/r.mcap", "--force"),
+            "convert, recover",
+            ("convert", f"{inputs}/2.mcap", "{out}/r.mcap", "--recover", "verified", "--force"),
+            ("convert", f"{inputs}/1.mcap", "{out}/r.mcap", "--recover", "verified", "--force"),
         ),
         Case(
             "init",

@@ -152,7 +152,7 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("study sensors -m machine.toml --study study.toml", "study.toml"),
     ("study sensors -m machine.toml --study study.toml", "machine.toml"),
     ("convert stiff/01.csv out.csv -m machine.toml --force", "machine.toml"),
-    ("recover log.mcap out.mcap --force", "log.mcap"),
+    ("convert log.mcap out.mcap --recover all --force", "log.mcap"),
 )
 _NUMBERS = ("0", "-1", "1", "99999999999999999999", "-99999999999999999999", "nan", "inf", "-inf", "1e308", "1e-320")
 _WORDS = ("", " ", "x", ",", "1,2,3", "9" * 5000, "\udcff\udcfe", "a\nb", "1e400", "0x10", "--", "\u202e", "/dev/zero")

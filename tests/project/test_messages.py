@@ -26,7 +26,7 @@ SHOWN_BY = {
     "detection": {"detect"},
     "detection_options": {"detect", "explain", "score"},
     "prepared_detector": {"detect", "learn-signature"},
-    "recovering": {"recover"},
+    "recovering": {"convert"},
     "score_triggers": {"score"},
     "study_file": {"study new", "study", "study run"},
     "identification": {"identify"},

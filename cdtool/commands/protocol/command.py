@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 protocol = typer.Typer(
     help="Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies.",
     no_args_is_help=True,
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
 )
 _FACTS: Mapping[str, tuple[Fact, ...]] = {"fail": (Fact.FORCE_VIOLATED,), "incomplete": (Fact.INCOMPLETE,), "pass": ()}
 _SHOWN = 10

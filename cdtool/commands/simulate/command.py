@@ -17,7 +17,7 @@ from cdtool.commands.console.options import JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
 
 simulate = typer.Typer(
-    help="Write simulated recordings with known contacts.", no_args_is_help=True, rich_markup_mode="markdown"
+    help="Write simulated recordings with known contacts.", no_args_is_help=True, rich_markup_mode=None
 )
 
 _FORMATS = ("csv", "mcap", "mixed")

@@ -15,9 +15,7 @@ from cdtool.commands.console.place import Place, location
 if TYPE_CHECKING:
     from cdtool.commands.study.study import SensorStudy
 
-study = typer.Typer(
-    help="Study an impact before the machine is built.", no_args_is_help=True, rich_markup_mode="markdown"
-)
+study = typer.Typer(help="Study an impact before the machine is built.", no_args_is_help=True, rich_markup_mode=None)
 
 NOT_SEEN = "not seen"
 
