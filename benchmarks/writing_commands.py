@@ -156,7 +156,7 @@ def cases(inputs: Path) -> list[Case]:
             Case(f"simulate {kind}", ("simulate", kind, *some, "-o", "{out}/logs"))
             for kind, some in (
                 ("gate", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0")),
-                ("arm", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0", "--format", "mixed")),
+                ("arm", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0", "--set", "format=mixed")),
             )
         ),
         *(

@@ -84,7 +84,7 @@ def season(work: Path) -> None:
     cdtool("simulate", "gate", "-o", "gate", "--free", 14, "--holdout", 40, "--stiff", 0, "--soft", 0, folder=work)
     free = ("--free", 15, "--holdout", 0, "--stiff", 0, "--soft", 0)
     for month, friction in enumerate((1.0, 1.05, 1.1, 1.15), 1):
-        changed = ("--friction", friction, "--seed", 20 + month)
+        changed = ("--set", f"friction={friction}", "--seed", 20 + month)
         cdtool("simulate", "gate", *free, *changed, "-o", f"month{month}", folder=work)
     taught = sorted(path.relative_to(work) for name in ("free", "holdout") for path in (work / "gate" / name).iterdir())
     machine = ("-m", "gate/machine.toml")

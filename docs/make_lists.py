@@ -23,6 +23,7 @@ from cdtool.base.settings import keys_of, kind_in_words
 from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
 from cdtool.commands.judging.named_logs import OnsetTable
 from cdtool.commands.judging.settings_table import ForceTable
+from cdtool.commands.simulate.simulation_table import SimulationTable
 from cdtool.detectors import DETECTORS
 from cdtool.formats import FORMATS
 from cdtool.machines.joint_machine import JointTable
@@ -60,6 +61,7 @@ _MODELS: Mapping[str, Any] = {
     "profile": ForceProfile,
     "rotary_axis": RotaryAxisTable,
     "signature": Signature,
+    "simulation": SimulationTable,
     "step": ForceStep,
     "urdf_robot": UrdfRobotTable,
 }
@@ -72,7 +74,7 @@ _SHORT = (
     (" and of at most", ", ≤"),
     (" and below", ", <"),
 )
-_KEY_PAGES = ("benchmark-file", "machine-file", "force-limits")
+_KEY_PAGES = ("benchmark-file", "machine-file", "force-limits", "simulators")
 # The keys that every machine has stand once, in the table "machine".
 _ADDS_TO = dict.fromkeys(("axis", "rotary_axis", "planar_arm", "urdf_robot"), "machine")
 _CHOOSING = "| detector | short | needs | use it |\n|---|---|---|---|\n"
@@ -102,10 +104,7 @@ def files() -> Mapping[Path, str]:
         readme: _with_table(readme, _README, map(_readme_line, rows)),
         choosing: _with_table(choosing, _CHOOSING, map(_choosing_line, rows)),
         containers: _with_table(containers, _CONTAINERS, map(_format_line, FORMATS.names())),
-        **{
-            page: _with_keys(page)
-            for page in (DOCS / f"{name}.md" for name in ("benchmark-file", "machine-file", "force-limits"))
-        },
+        **{page: _with_keys(page) for page in (DOCS / f"{name}.md" for name in _KEY_PAGES)},
     }
 
 

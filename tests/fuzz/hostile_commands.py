@@ -196,7 +196,7 @@ _OPTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
         "study sensors -m machine.toml",
         ("--speed", "--stiffness", "--lever", "--drive-stiffness", "--k", "--joint", "-o"),
     ),
-    ("simulate gate --free 1 --holdout 0 --stiff 0 --soft 0 -o sim", ("--seed", "--format")),
+    ("simulate gate --free 1 --holdout 0 --stiff 0 --soft 0 -o sim", ("--seed", "--set")),
     ("benchmark benchmark.toml -o out.json", ("--detectors", "--jobs")),
     ("score triggers.csv -b benchmark.toml", ("--clock", "--jobs")),
     ("info stiff/01.csv", ("-m",)),

@@ -19,9 +19,19 @@ DETECTORS = ["igm", "gm"]
 @pytest.mark.parametrize(("name", "more"), [("gate", ()), ("arm", ("--trial", 2))])
 @pytest.mark.parametrize("file_format", ["csv", "mcap"])
 def test_the_simulators_can_leave_the_references_out(name, more, file_format, tmp_path):
-    for folder, flag in (("with", ()), ("without", ("--no-reference",))):
+    for folder, flag in (
+        ("with", ()),
+        (
+            "without",
+            (
+                "--set",
+                "reference=false",
+            ),
+        ),
+    ):
         counts = ("--free", 1, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 4)
-        done = command("simulate", name, *more, *counts, "--format", file_format, *flag, "-o", tmp_path / folder)
+        keys = ("--set", f"format={file_format}", *flag)
+        done = command("simulate", name, *more, *counts, *keys, "-o", tmp_path / folder)
         assert done.status == 0
     kinds = [
         cdtool.read(tmp_path / folder / "stiff" / f"01.{file_format}", tmp_path / folder / "machine.toml")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
+from importlib import import_module
 
 Complete = Callable[[str], list[str]]
 
@@ -37,15 +38,25 @@ def thresholds(incomplete: str) -> list[str]:
 
 def settings(incomplete: str) -> list[str]:
     """Return the keys of the benchmark file that begin with the typed text, each with the = before its value."""
-    from cdtool.base.settings import alternatives, bare_type, is_model, keys_of
-    from cdtool.commands.judging.settings_table import JudgingTable
+    known = _keys("cdtool.commands.judging.settings_table:JudgingTable")
+    return _beginning(incomplete, [*known, "threshold.name="])
 
-    def keys(model: object, prefix: str) -> Iterable[str]:
+
+def keys(place: str) -> Complete:
+    """Return the completion of the keys of a model, named as module:Class, each with the = before its value."""
+    return lambda incomplete: _beginning(incomplete, _keys(place))
+
+
+def _keys(place: str) -> Iterable[str]:
+    from cdtool.base.settings import alternatives, bare_type, is_model, keys_of
+
+    def below(model: object, prefix: str) -> Iterable[str]:
         for name, key in keys_of(model).items():
             tables = [bare_type(part) for part in alternatives(key.hint) if is_model(bare_type(part))]
-            yield from (f"{prefix}{name}=",) if not tables else keys(tables[0], f"{prefix}{name}.")
+            yield from (f"{prefix}{name}=",) if not tables else below(tables[0], f"{prefix}{name}.")
 
-    return _beginning(incomplete, [*keys(JudgingTable, ""), "threshold.name="])
+    module, _, attribute = place.partition(":")
+    return below(getattr(import_module(module), attribute), "")
 
 
 def operations(incomplete: str) -> list[str]:

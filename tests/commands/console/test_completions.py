@@ -70,7 +70,7 @@ def test_every_registered_name_is_a_completion():
         (("tune", "--thresholds", "signature,gl"), ["signature,glr"]),
         (("tune", "--objective", "p"), ["p95"]),
         (("plan", "--detectors", "feekf,g"), ["feekf,gm"]),
-        (("simulate", "gate", "--format", "mi"), ["mixed"]),
+        (("simulate", "--set", "fri"), ["friction="]),
     ],
 )
 def test_other_values_are_completed(words, expected):

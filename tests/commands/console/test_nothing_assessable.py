@@ -81,7 +81,7 @@ def rebounding(tmp_path_factory) -> Path:
     """Return the folder of a gate that rebounds after its impact, without reference channels."""
     folder = tmp_path_factory.mktemp("gate") / "gate"
     counts = ("--free", 8, "--holdout", 0, "--stiff", 1, "--soft", 0)
-    assert cdtool("simulate", "gate", *counts, "--no-reference", "-o", folder).status == 0
+    assert cdtool("simulate", "gate", *counts, "--set", "reference=false", "-o", folder).status == 0
     text = (folder / "benchmark.toml").read_text(encoding="utf-8")
     text = re.sub("(?m)^detectors = .*", 'detectors = ["feekf", "pt"]', text)
     (folder / "benchmark.toml").write_text(text, encoding="utf-8")

@@ -119,7 +119,7 @@ def test_logs_stay_small(folder: Path) -> None:
 
 def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path, tmp_path: Path) -> None:
     counts = ("--free", 0, "--holdout", 0, "--stiff", 4, "--soft", 0)
-    done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--format", "mixed", "-o", tmp_path / "b")
+    done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--set", "format=mixed", "-o", tmp_path / "b")
     assert done.status == 0, done.err
     for name in ("stiff/01.mcap", "stiff/02.mcap", "stiff/03.csv", "machine.toml"):
         assert (tmp_path / "b" / name).read_bytes() == (folder / name).read_bytes()
@@ -148,5 +148,6 @@ def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_
     with pytest.raises(UsageError, match="unknown trial 3"):
         simulate_arm(tmp_path / "third", COUNTS, seed=1, trial=3)  # type: ignore[arg-type]
     assert command("simulate", "arm", "--trial", 3, "-o", tmp_path / "third").status == 2
-    assert command("simulate", "arm", "--format", "cvs", "-o", tmp_path / "third").status == 2
+    assert command("simulate", "gate", "--trial", 2, "-o", tmp_path / "third").status == 2
+    assert command("simulate", "arm", "--set", "format=cvs", "-o", tmp_path / "third").status == 2
     assert not any(tmp_path.iterdir())
