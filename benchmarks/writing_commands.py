@@ -151,7 +151,7 @@ def cases(inputs: Path) -> list[Case]:
             ("simulate", "gate", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", "{out}/logs"),
         ),
         Case("tune", _tune(f"{inputs}/benchmark.toml", "trend"), _tune(f"{inputs}/benchmark.toml", "limit")),
-        Case("coverage", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
+        Case("inject, map", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
         *(
             Case(f"simulate {kind}", ("simulate", kind, *some, "-o", "{out}/logs"))
             for kind, some in (
@@ -202,7 +202,7 @@ def _tune(setup: str, threshold: str) -> tuple[str, ...]:
 
 
 def _coverage(setup: str) -> tuple[str, ...]:
-    return ("coverage", setup, "-o", "{out}/p.png", "--force")
+    return ("inject", setup, "-o", "{out}/p.png", "--force")
 
 
 def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:

@@ -76,7 +76,7 @@ def coverage(work: Path) -> None:
     logs = work / "coverage"
     shutil.copytree(ROOT / "sample_logs" / "gate", logs)
     detectors = ("--detectors", "pi,feekf,gm,pt")
-    cdtool("coverage", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
+    cdtool("inject", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
 
 
 def season(work: Path) -> None:

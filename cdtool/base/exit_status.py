@@ -96,7 +96,6 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "convert": _CAN_LOSE,
     "identify": _CAN_LOSE,
     "inject": _CAN_LOSE,
-    "coverage": _CAN_LOSE,
     "signature show": _ALWAYS,
     "signature check": _CAN_LOSE,
     "signature update": _CAN_LOSE,

@@ -48,7 +48,6 @@ _GROUPS: Mapping[str, Mapping[str, tuple[str, str]]] = {
         "signature": ("cdtool.commands.signature.command:signature", "Show, check or update a signature."),
         "identify": ("cdtool.commands.identify.command:identify", "Identify the model of an axis or robot."),
         "inject": ("cdtool.commands.inject.command:inject", "Put simulated contacts into logs, and map them."),
-        "coverage": ("cdtool.commands.inject.coverage.command:coverage", "Map where contacts are noticed."),
         "tune": ("cdtool.commands.tune.command:tune", "Tune detectors at a false-alarm budget."),
         "simulate": ("cdtool.commands.simulate.command:simulate", "Write simulated logs with known contacts."),
         "study": ("cdtool.commands.study.command:study", "Study an impact before the machine is built."),

@@ -22,7 +22,6 @@ NOT_YET = {
     "signature check": (12, 44),
     "tune": (14, 44),
     "identify": (13, 43),
-    "": (3, 41),
 }
 # Their options over the bound of all: remove with the last row of NOT_YET.
 NOT_YET_ALL = 131

@@ -14,7 +14,6 @@ from cdtool.commands.console import completions
 from cdtool.commands.tune.options import IMPACTS
 from cdtool.commands.tune.search.objective import Goal
 from cdtool.detectors import DETECTORS
-from cdtool.formats.written_files import WRITERS
 from cdtool.recordings.operations import HOW_TO_CUT
 from cdtool.thresholds import THRESHOLDS
 
@@ -80,7 +79,6 @@ def test_other_values_are_completed(words, expected):
 def test_values_that_are_listed_by_hand_are_those_that_the_commands_accept():
     assert completed("tune", "--objective", "") == [item.value for item in Goal]
     assert completed("tune", "--impacts", "") == list(IMPACTS)
-    assert {f".{name}" for name in completed("inject", "--format", "")} == set(WRITERS) - {".hdf5"}
 
 
 def test_a_benchmark_file_is_completed_by_its_suffix(tmp_path, monkeypatch):
