@@ -197,7 +197,7 @@ def _identify(logs: Sequence[str], machine: Sequence[str]) -> tuple[str, ...]:
 
 
 def _tune(setup: str, threshold: str) -> tuple[str, ...]:
-    options = ("--thresholds", threshold, "--false-alarm-budget", "1/op", "--force", "-o", "{out}/tuned")
+    options = ("--set", f"tune.thresholds={threshold}", "--false-alarm-budget", "1/op", "--force", "-o", "{out}/tuned")
     return ("tune", setup, "--detectors", "gm", *options)
 
 

@@ -15,6 +15,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
 from cdtool.commands.judging.named_logs import OnsetTable
 from cdtool.commands.judging.settings_table import ForceTable
 from cdtool.commands.simulate.simulation_table import SimulationTable
+from cdtool.commands.tune.options import TuneTable
 from cdtool.detectors import DETECTORS
 from cdtool.formats import FORMATS
 from cdtool.machines.joint_machine import JointTable
@@ -63,6 +65,7 @@ _MODELS: Mapping[str, Any] = {
     "signature": Signature,
     "simulation": SimulationTable,
     "step": ForceStep,
+    "tune": TuneTable,
     "urdf_robot": UrdfRobotTable,
 }
 _SHORT = (
@@ -74,7 +77,7 @@ _SHORT = (
     (" and of at most", ", ≤"),
     (" and below", ", <"),
 )
-_KEY_PAGES = ("benchmark-file", "machine-file", "force-limits", "simulators")
+_KEY_PAGES = ("benchmark-file", "machine-file", "force-limits", "simulators", "tuning")
 # The keys that every machine has stand once, in the table "machine".
 _ADDS_TO = dict.fromkeys(("axis", "rotary_axis", "planar_arm", "urdf_robot"), "machine")
 _CHOOSING = "| detector | short | needs | use it |\n|---|---|---|---|\n"
@@ -143,6 +146,8 @@ def _default(item: Field[Any]) -> str:
         (value,) = value
     if value in (None, "", (), MISSING, math.inf):
         return ""
+    if isinstance(value, Enum):
+        return f'`"{value.value}"`'
     if isinstance(value, bool):
         return str(value).lower()
     return f'`"{value}"`' if isinstance(value, str) else f"{value:g}"

@@ -75,7 +75,8 @@ def _benchmark() -> dict[str, Any]:
     rules = {name: _table(THRESHOLDS.load(name)) for name in THRESHOLDS.names()}
     rules["signature"]["properties"] = {}  # its settings are in [signature]
     made["properties"]["threshold"]["anyOf"] = [{"enum": list(rules)}, _chosen("name", rules, required=False)]
-    made["properties"]["inject"] |= _table(SECTIONS.load("inject").table)
+    for name in ("inject", "tune"):
+        made["properties"][name] |= _table(SECTIONS.load(name).table)
     made["properties"]["protocol"] |= _protocol_table()
     return made
 

@@ -20,7 +20,6 @@ NOT_YET = {
     "explain": (27, 75),
     "benchmark": (16, 50),
     "signature check": (12, 44),
-    "tune": (14, 44),
     "identify": (13, 43),
 }
 # Their options over the bound of all: remove with the last row of NOT_YET.

@@ -134,7 +134,7 @@ def _detect(files: Folder, *logs: Path) -> Outcome:
 
 
 def _tune(files: Folder, benchmark: Path) -> Outcome:
-    options = ("--false-alarm-budget", "1/3op", "--thresholds", "limit", "-o", files.path / "tuned")
+    options = ("--false-alarm-budget", "1/3op", "--set", "tune.thresholds=limit", "-o", files.path / "tuned")
     return cdtool("tune", benchmark, *options)
 
 
