@@ -210,4 +210,4 @@ def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:
 
 
 def _sensors(machine: Sequence[str], speed: str) -> tuple[str, ...]:
-    return ("study", "sensors", *machine, "--speed", speed, "--stiffness", "5e5", "-o", "{out}/p.svg")
+    return ("study", "sensors", *machine, "--set", f"impact.speed={speed}", "-o", "{out}/p.svg")

@@ -194,7 +194,7 @@ _OPTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("compare results.json other.json", ("--level", "-o")),
     (
         "study sensors -m machine.toml",
-        ("--speed", "--stiffness", "--lever", "--drive-stiffness", "--k", "--joint", "-o"),
+        ("--set", "--joint", "-o"),
     ),
     ("simulate gate --free 1 --holdout 0 --stiff 0 --soft 0 -o sim", ("--seed", "--set")),
     ("benchmark benchmark.toml -o out.json", ("--detectors", "--jobs")),

@@ -9,9 +9,8 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import plain, progress
-from cdtool.commands.console.options import QuietOption
+from cdtool.commands.console.options import QuietOption, keys_option
 from cdtool.commands.console.place import Place, location
 
 # Most logs per group: more numbered files in one folder become unwieldy.
@@ -33,11 +32,9 @@ def simulate(
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="What differs, repeatable, as friction=1.2 or format=mcap; docs/simulators.md.",
-            autocompletion=completions.keys("cdtool.commands.simulate.simulation_table:SimulationTable"),
+        keys_option(
+            "What differs, repeatable, as friction=1.2 or format=mcap; docs/simulators.md.",
+            "cdtool.commands.simulate.simulation_table:SimulationTable",
         ),
     ] = None,
     quiet: QuietOption = False,

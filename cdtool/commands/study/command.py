@@ -9,7 +9,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import statuses_words
 from cdtool.commands.console.console import number, plain, print_json, table
-from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption
+from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption, keys_option
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -35,28 +35,24 @@ def sensors(
         ),
     ] = None,
     joint: Annotated[str, typer.Option("--joint", help="Joint to study; required if there are several.")] = "",
-    speed: Annotated[float | None, typer.Option("--speed", help="Load speed at contact [m/s].")] = None,
-    stiffness: Annotated[float | None, typer.Option("--stiffness", help="Obstacle stiffness [N/m].")] = None,
-    lever: Annotated[
-        float | None,
-        typer.Option("--lever", help="Rotary axis, arm, robot: distance from the axis to the contact [m]."),
+    settings: Annotated[
+        list[str] | None,
+        keys_option(
+            "A key of the study file in place of its value, repeatable, as impact.speed=0.2.",
+            "cdtool.commands.study.study_file:StudyTable",
+        ),
     ] = None,
-    drive_stiffness: Annotated[
-        float | None, typer.Option("--drive-stiffness", help="Drive stiffness at the load [N/m, N m/rad].")
-    ] = None,
-    factor: Annotated[
-        float, typer.Option("--k", help="Detection limit: k sigma of the noise plus the resolution.")
-    ] = 5.0,
-    as_json: JsonOption = False,
     output: Annotated[
         Place | None, typer.Option("--output", "-o", parser=location, help="A figure: .png, .svg, .pdf.")
     ] = None,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Rank the sensors by when they detect an impact, with the force and the limiting factor (thesis figure 4.10).
 
-    Example: cdtool study sensors -m sample_logs/gate/machine.toml --speed 0.2 --stiffness 5e5
+    Example: cdtool study sensors -m sample_logs/gate/machine.toml --set impact.speed=0.2
     """
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.study.study import study_sensors
 
     if output:
@@ -66,14 +62,7 @@ def sensors(
         if output.suffix.lower() not in SUFFIXES:
             raise UsageError(f"--output is '{output}'", f"the name must end in {', '.join(SUFFIXES)}")
         refuse_foreign_figure(output, force=force)
-    given = {
-        "impact.speed": speed,
-        "impact.stiffness": stiffness,
-        "impact.lever": lever,
-        "drive.stiffness": drive_stiffness,
-    }
-    options = {key: value for key, value in given.items() if value is not None}
-    done = study_sensors(machine, file, joint=joint, factor=factor, options=options)
+    done = study_sensors(machine, file, joint=joint, settings=given_settings(settings or ()))
     if output:
         from cdtool.commands.study.sensor_plot import plot_ranking
 
@@ -88,7 +77,6 @@ def sensors(
 def figures(
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")],
     force: ForceOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Draw the thesis's figures of impacts: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
 
@@ -96,11 +84,7 @@ def figures(
     """
     from cdtool.commands.study.impact_plots import draw_impact_figures
 
-    written = draw_impact_figures(output, force=force)
-    if as_json:
-        print_json([str(path) for path in written])
-        return
-    for path in written:
+    for path in draw_impact_figures(output, force=force):
         typer.echo(plain(path))
 
 

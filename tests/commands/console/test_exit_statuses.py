@@ -236,7 +236,7 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("simulate", 0): lambda f: cdtool("simulate", "gate", *ONE_RUN, "-o", f.path / "gate"),
     ("simulate", 2): lambda f: cdtool("simulate", "gate", "--set", "format=xyz", "-o", f.path / "gate"),
     ("study sensors", 0): lambda _: cdtool(
-        "study", "sensors", "-m", GATE / "machine.toml", "--speed", 0.2, "--stiffness", 5e5
+        "study", "sensors", "-m", GATE / "machine.toml", "--set", "impact.speed=0.2"
     ),
     ("study sensors", 2): lambda f: cdtool("study", "sensors", "-m", f.absent),
     ("study figures", 0): lambda f: cdtool("study", "figures", "-o", f.path / "figures"),
