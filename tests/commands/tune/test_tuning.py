@@ -167,7 +167,9 @@ def test_the_files_can_be_used(written, gate):
     names = {path.name for path in folder.iterdir()}
     assert names == {
         "machine.toml",
+        "machine.schema.json",
         "benchmark.toml",
+        "benchmark.schema.json",
         "signature_momentum.json",
         "tuning.html",
         "tuning.json",
@@ -192,7 +194,7 @@ def test_the_files_can_be_used(written, gate):
 def test_files_state_what_was_chosen_and_why(written):
     folder, outcome = written
     text = (folder / "benchmark.toml").read_text(encoding="utf-8")
-    assert text.startswith("# Tuned by cdtool tune from benchmark.toml for momentum at 1/20op.")
+    assert text.startswith("#:schema ./benchmark.schema.json\n# Tuned by cdtool tune from benchmark.toml for momentum")
     assert "# These results are from recordings not used for the choice." in text
     assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12, "safety_factor": ANY}
     machine = (folder / "machine.toml").read_text(encoding="utf-8")
