@@ -29,7 +29,22 @@ class Case:
 def prepare(folder: Path, run: Run) -> None:
     """Make the inputs: recordings, signatures, results, triggers; `run` runs a command."""
     gate = folder / "gate"
-    run(["simulate", "gate", "--free", "4", "--holdout", "1", "--stiff", "2", "--soft", "0", "-o", str(gate)])
+    run(
+        [
+            "simulate",
+            "gate",
+            "--set",
+            "free=4",
+            "--set",
+            "holdout=1",
+            "--set",
+            "stiff=2",
+            "--set",
+            "soft=0",
+            "-o",
+            str(gate),
+        ]
+    )
     (folder / "benchmark.toml").write_text(
         'machine = "gate/machine.toml"\ndetectors = ["gm"]\n[signature]\nforce = true\n'
         '[learn]\nlogs = ["gate/free/*.csv"]\n[impacts.stiff]\nlogs = ["gate/stiff/*.csv"]\n',
@@ -148,15 +163,42 @@ def cases(inputs: Path) -> list[Case]:
         Case(
             "inject",
             ("inject", f"{inputs}/inject_b.toml", "-o", "{out}/injected"),
-            ("simulate", "gate", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", "{out}/logs"),
+            (
+                "simulate",
+                "gate",
+                "--set",
+                "free=1",
+                "--set",
+                "holdout=0",
+                "--set",
+                "stiff=0",
+                "--set",
+                "soft=0",
+                "-o",
+                "{out}/logs",
+            ),
         ),
         Case("tune", _tune(f"{inputs}/benchmark.toml", "trend"), _tune(f"{inputs}/benchmark.toml", "limit")),
         Case("inject, map", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
         *(
             Case(f"simulate {kind}", ("simulate", kind, *some, "-o", "{out}/logs"))
             for kind, some in (
-                ("gate", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0")),
-                ("arm", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0", "--set", "format=mixed")),
+                ("gate", ("--set", "free=1", "--set", "holdout=0", "--set", "stiff=1", "--set", "soft=0")),
+                (
+                    "arm",
+                    (
+                        "--set",
+                        "free=1",
+                        "--set",
+                        "holdout=0",
+                        "--set",
+                        "stiff=1",
+                        "--set",
+                        "soft=0",
+                        "--set",
+                        "format=mixed",
+                    ),
+                ),
             )
         ),
         *(

@@ -10,8 +10,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from cdtool.commands.scoring.json_schema import KINDS
-from cdtool.commands.scoring.json_schema import schema_text as written_text
+from cdtool.commands.console.json_schema import KINDS
+from cdtool.commands.console.json_schema import schema_text as written_text
 from cdtool.results.results import SCHEMA_VERSION, Results
 
 FILE = Path(__file__).with_name("results.schema.json")

@@ -131,8 +131,8 @@ def statuses_words(command: str) -> str:
 
 def help_epilog() -> str:
     """Return the end of `cdtool --help`: a line for each status of a finished command, and one for the others."""
-    rows = {int(status): f"{int(status)} {meaning}" for status, meaning in STATUSES.items()}
-    done = [text for number, text in rows.items() if number <= ExitStatus.INCONCLUSIVE]
-    ended = ", ".join(text for number, text in rows.items() if number > ExitStatus.INCONCLUSIVE)
+    texts = [(status, f"{int(status)} {meaning}") for status, meaning in STATUSES.items()]
+    done = [text for status, text in texts if status <= ExitStatus.INCONCLUSIVE]
+    ended = ", ".join(text for status, text in texts if status > ExitStatus.INCONCLUSIVE)
     # click does not wrap the paragraph after this mark.
     return "\n".join(["\b", "Exit status; if several apply, 2 before 1 before 3 before 4:", *done, ended])

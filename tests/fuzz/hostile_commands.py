@@ -143,7 +143,7 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("report results.json -o out.html", "results.json"),
     ("report results.json -o out.html", "results.traces.json.gz"),
     ("compare results.json other.json -o out.md", "other.json"),
-    ("plan --from results.json --detectors gm,pt --group stiff", "results.json"),
+    ("plan --difference-ms 5 --std-ms results.json --detectors gm,pt --group stiff", "results.json"),
     ("score triggers.csv -b benchmark.toml", "triggers.csv"),
     ("score triggers.csv -b labelled.toml", "labels.csv"),
     ("signature show gate.json", "gate.json"),
@@ -188,15 +188,15 @@ _OPTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
         ),
     ),
     ("plan", ("--difference-ms", "--std-ms", "--power", "--missed-at-most", "--false-alarms-at-most", "--level")),
-    ("plan --difference-ms 5 --std-ms 3", ("--power", "--level", "--allowed", "--group", "--from")),
-    ("plan --missed-at-most 5%", ("--level", "--allowed", "--power")),
-    ("plan --false-alarms-at-most 1/1000op", ("--level", "--allowed", "--power")),
+    ("plan --difference-ms 5 --std-ms 3", ("--power", "--level", "--group", "--std-ms")),
+    ("plan --missed-at-most 5%", ("--level", "--power")),
+    ("plan --false-alarms-at-most 1/1000op", ("--level", "--power")),
     ("compare results.json other.json", ("--level", "-o")),
     (
         "study sensors -m machine.toml",
-        ("--set", "--joint", "-o"),
+        ("--set", "-o"),
     ),
-    ("simulate gate --free 1 --holdout 0 --stiff 0 --soft 0 -o sim", ("--seed", "--set")),
+    ("simulate gate --set free=1 --set holdout=0 --set stiff=0 --set soft=0 -o sim", ("--seed", "--set")),
     ("benchmark benchmark.toml -o out.json", ("--detectors", "--jobs")),
     ("score triggers.csv -b benchmark.toml", ("--clock", "--jobs")),
     ("info stiff/01.csv", ("-m",)),
@@ -223,7 +223,7 @@ def make_bench(folder: Path) -> None:
     done = cdtool(
         "simulate",
         "gate",
-        *["--free", "5", "--holdout", "1", "--stiff", "2", "--soft", "1", "--seed", "5", "-o"],
+        *["--set", "free=5", "--set", "holdout=1", "--set", "stiff=2", "--set", "soft=1", "--seed", "5", "-o"],
         folder,
     )
     assert done.status == 0, done.err

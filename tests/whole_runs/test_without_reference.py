@@ -29,7 +29,7 @@ def test_the_simulators_can_leave_the_references_out(name, more, file_format, tm
             ),
         ),
     ):
-        counts = ("--free", 1, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 4)
+        counts = ("--set", "free=1", "--set", "holdout=0", "--set", "stiff=1", "--set", "soft=0", "--seed", 4)
         keys = ("--set", f"format={file_format}", *flag)
         done = command("simulate", name, *more, *counts, *keys, "-o", tmp_path / folder)
         assert done.status == 0

@@ -11,7 +11,7 @@ from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import leave_with, plain, print_json, with_findings
 from cdtool.commands.console.late_progress import late_progress
-from cdtool.commands.console.options import FromOption, JsonOption, QuietOption, ToOption, section_of
+from cdtool.commands.console.options import FromOption, JsonOption, ToOption, section_of
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -50,7 +50,6 @@ def convert(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
-    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Convert a log to another file format without rounding; each channel keeps its own clock, unit and provenance.
@@ -67,7 +66,7 @@ def convert(
     if recover and (machine or section):
         raise UsageError("--recover copies messages as they are", "recover first, then convert with -m, --from or --to")
     done: Converted | Recovered
-    with late_progress("recovering" if recover else "converting", quiet=quiet) as advance:
+    with late_progress("recovering" if recover else "converting") as advance:
         if recover:
             done = write_what_is_left(source, output, recover == "all", force=force, progress=advance)
         else:

@@ -13,16 +13,17 @@ from cdtool.base.errors import CdtoolError, RecordingError, UsageError
 from cdtool.base.files.writing import write_text, write_texts
 from cdtool.base.findings import Finding, worst_first
 from cdtool.base.log_names import log_stem
-from cdtool.base.remote.remote_path import location
+from cdtool.base.plain_text import counted
+from cdtool.base.remote.remote_path import location, relative_name
 from cdtool.base.settings import Place
+from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.init.benchmark_draft import draft_benchmark
 from cdtool.commands.init.channel_guess import guess_channels
 from cdtool.commands.init.derived_speed import propose_low_pass
-from cdtool.commands.init.draft_text import Clock, Draft, UnreadWord, draft_text
-from cdtool.commands.init.machine_side import side_of
+from cdtool.commands.init.draft_text import Clock, Draft, UnreadWord, draft_text, toml
+from cdtool.commands.init.machine_side import Side, side_of
 from cdtool.commands.init.names.units import Evidence, fits_as_well, is_si
 from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
-from cdtool.commands.init.robot import of_robot, with_relative_urdf
 from cdtool.commands.init.speed_ratio import Ratio, ratio_of
 from cdtool.commands.init.streams import Channels, column_key, streams_of
 from cdtool.commands.init.table_clock import DraftedClock, split_stamp, table_clock
@@ -31,7 +32,6 @@ from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.information import info
 from cdtool.commands.judging.log_findings import before_contact
 from cdtool.commands.judging.runs import find_logs, read, several_logs
-from cdtool.commands.scoring.json_schema import refuse_other_schema, with_schema
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.channels.reading import choose_format, element_names, has_topics, log_parts, with_nanoseconds
 from cdtool.formats.csv import Csv
@@ -39,6 +39,7 @@ from cdtool.formats.csv_dialect.pins import read_pins
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.formats.source import Format, Source
 from cdtool.machines.plausibility import check_channels
+from cdtool.machines.urdf_reader import moving_joints
 from cdtool.results.results import Skipped
 from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.truth.force_vector import with_scalar_force
@@ -120,10 +121,10 @@ def init(
 
 def _written(logs: Sequence[Path], target: Path, csv: Mapping[str, Any], urdf: str | Path | None) -> Drafted:
     draft = _drafted(logs[0], csv)
-    draft = draft if urdf is None else of_robot(draft, location(urdf).absolute())
+    draft = draft if urdf is None else _of_robot(draft, location(urdf).absolute())
     drafted = _settled(logs, draft)
     # While guesses are settled the draft is elsewhere, and names the URDF by its whole path.
-    text = drafted.text if urdf is None else with_relative_urdf(drafted.text, location(urdf), target.parent)
+    text = drafted.text if urdf is None else _with_relative_urdf(drafted.text, location(urdf), target.parent)
     files = with_schema("machine", target, text)
     write_texts(files)
     return replace(drafted, path=str(target), text=files[target])
@@ -366,6 +367,31 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     return Draft(
         log_stem(log), log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words
     )
+
+
+def _of_robot(draft: Draft, urdf: Path) -> Draft:
+    """Return the draft of a urdf_robot: its joints by their names, or else in the order of the URDF.
+
+    Raises ConfigurationError for a URDF that cannot be read, UsageError if it has fewer joints than the log.
+    """
+    names, logged = moving_joints(urdf), draft.joints
+    if len(names) < len(logged):
+        raise UsageError(
+            f"{urdf}: has {counted(len(names), 'moving joint')}, the log {len(logged)}", "give the URDF of this robot"
+        )
+    robot: dict[str, object] = {"urdf": str(urdf)}
+    used = logged if set(logged) <= set(names) else names[: len(logged)]
+    if used != logged:
+        robot["joint_map"] = dict(zip(logged, used, strict=True))
+    if locked := [name for name in names if name not in used]:
+        robot["locked"] = dict.fromkeys(locked, 0.0)
+    side = Side("urdf_robot", "load", "a URDF is given")
+    return replace(draft, side=side, evidence=replace(draft.evidence, side=side), robot=robot)
+
+
+def _with_relative_urdf(text: str, urdf: Path, folder: Path) -> str:
+    """Return the text of a draft that names its URDF relative to the folder of the draft."""
+    return text.replace(toml(str(urdf.absolute())), toml(relative_name(urdf, folder)), 1)
 
 
 def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:

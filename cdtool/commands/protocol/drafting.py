@@ -17,6 +17,7 @@ from cdtool.base.errors import UsageError
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import relative_name
+from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.judging.matched_log import CutLog
 from cdtool.commands.protocol.assessment.plan import (
     FILL_IN,
@@ -27,7 +28,6 @@ from cdtool.commands.protocol.assessment.plan import (
     TestParticulars,
 )
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.commands.scoring.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.scoring.scoring import logs_to_score
 from cdtool.results.results import Skipped
 from cdtool.truth.force.limits import ForceProfile, read_force_limits

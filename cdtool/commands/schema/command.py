@@ -23,6 +23,6 @@ def schema(
     """
     if kind not in _KINDS:
         raise UsageError(f"unknown kind '{kind}'", nearest(kind, _KINDS))
-    from cdtool.commands.scoring.json_schema import schema_text
+    from cdtool.commands.console.json_schema import schema_text
 
     typer.echo(schema_text(kind), nl=False)

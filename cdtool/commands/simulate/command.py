@@ -10,11 +10,8 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import plain, progress
-from cdtool.commands.console.options import QuietOption, keys_option
+from cdtool.commands.console.options import keys_option
 from cdtool.commands.console.place import Place, location
-
-# Most logs per group: more numbered files in one folder become unwieldy.
-_MOST = 100_000
 
 
 def simulate(
@@ -22,10 +19,6 @@ def simulate(
         Literal["gate", "arm"], typer.Argument(help="The thesis's sliding gate or robot arm.", metavar="MACHINE")
     ],
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")],
-    free: Annotated[int, typer.Option("--free", min=0, max=_MOST, help="Impact-free runs to learn from.")] = 14,
-    holdout: Annotated[int, typer.Option("--holdout", min=0, max=_MOST, help="Impact-free runs to score only.")] = 40,
-    stiff: Annotated[int, typer.Option("--stiff", min=0, max=_MOST, help="Impacts on the bare load cell.")] = 30,
-    soft: Annotated[int, typer.Option("--soft", min=0, max=_MOST, help="Impacts with a rubber bumper.")] = 30,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")] = 1,
     trial: Annotated[
         Literal["1", "2"] | None, typer.Option("--trial", help="Arm: impact on the arm (1) or the forearm (2).")
@@ -33,15 +26,14 @@ def simulate(
     settings: Annotated[
         list[str] | None,
         keys_option(
-            "What differs, repeatable, as friction=1.2 or format=mcap; docs/simulators.md.",
+            "How many logs, and what differs, repeatable: stiff=4, friction=1.2, format=mcap; docs/simulators.md.",
             "cdtool.commands.simulate.simulation_table:SimulationTable",
         ),
     ] = None,
-    quiet: QuietOption = False,
 ) -> None:
     """Simulate recordings with known contacts, machine.toml and benchmark.toml: the gate of chapter 5, the arm of 6.
 
-    Example: cdtool simulate gate --free 14 --holdout 40 --stiff 30 --soft 30 --seed 1 -o gate
+    Example: cdtool simulate gate --set free=14 --set stiff=10 --seed 1 -o gate
     """
     from cdtool.commands.judging.settings_table import read_settings
     from cdtool.commands.simulate.arm_recordings import simulate_arm
@@ -53,8 +45,8 @@ def simulate(
         raise UsageError("--trial is only for the arm", "omit it")
     table = read_settings(SimulationTable, settings or ())
     simulate_machine = simulate_gate if machine == "gate" else partial(simulate_arm, trial=2 if trial == "2" else 1)
-    counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
-    with progress("simulating", quiet=quiet) as advance:
+    counts = table.counts
+    with progress("simulating") as advance:
         written = simulate_machine(
             output,
             counts,

@@ -34,7 +34,6 @@ def sensors(
             "--study", parser=location, help="TOML: [impact], [drive], [controller], [sensors.*]; docs/study.md."
         ),
     ] = None,
-    joint: Annotated[str, typer.Option("--joint", help="Joint to study; required if there are several.")] = "",
     settings: Annotated[
         list[str] | None,
         keys_option(
@@ -62,7 +61,7 @@ def sensors(
         if output.suffix.lower() not in SUFFIXES:
             raise UsageError(f"--output is '{output}'", f"the name must end in {', '.join(SUFFIXES)}")
         refuse_foreign_figure(output, force=force)
-    done = study_sensors(machine, file, joint=joint, settings=given_settings(settings or ()))
+    done = study_sensors(machine, file, settings=given_settings(settings or ()))
     if output:
         from cdtool.commands.study.sensor_plot import plot_ranking
 

@@ -35,7 +35,6 @@ def study_sensors(
     machine: str | Path,
     study: str | Path | None = None,
     *,
-    joint: str = "",
     settings: Mapping[str, Any] | None = None,
 ) -> SensorStudy:
     """Rank the sensors of a machine by how early they respond to an impact.
@@ -45,9 +44,7 @@ def study_sensors(
     machine : str or Path
         The machine file.
     study : str or Path, optional
-        A TOML file with k and the tables [impact], [drive], [controller] and [sensors.NAME].
-    joint : str, optional
-        The joint of an arm or robot that is hit while the others are at rest.
+        A TOML file with joint, k and the tables [impact], [drive], [controller] and [sensors.NAME].
     settings : mapping, optional
         Values in place of keys of the file, as {"impact.speed": 0.2}.
 
@@ -75,7 +72,7 @@ def study_sensors(
     ['load_cell', 'accelerometer', 'torque_sensor', 'motor_position', 'motor_speed', 'motor_torque']
     """
     file = read_machine_file(machine)
-    found = read_study(file, study, joint, settings)
+    found = read_study(file, study, settings)
     ranking = rank_sensors(found.case, found.sensors, found.factor)
     frequency = found.first_frequency
     waves = None if frequency is None else check_waves(ranking.swing_duration, frequency)

@@ -120,6 +120,9 @@ class SensorsTable:
 class StudyTable:
     """A study file as it is written; docs/study.md has the meaning of each key and its default."""
 
+    joint: Annotated[
+        str, setting("the joint that is hit while the others are at rest; required if there are several")
+    ] = ""
     factor: Annotated[
         Positive, setting("a sensor has responded beyond this many standard deviations of its noise", key="k")
     ] = 5.0
@@ -141,9 +144,7 @@ class Study:
     assumptions: tuple[str, ...]
 
 
-def read_study(
-    machine: MachineFile, file: str | Path | None, joint: str = "", settings: Mapping[str, Any] | None = None
-) -> Study:
+def read_study(machine: MachineFile, file: str | Path | None, settings: Mapping[str, Any] | None = None) -> Study:
     """Read the impact and the sensors; `settings` take the place of keys of the file, as "impact.speed".
 
     Raises UsageError, or ConfigurationError naming file and key; the inertias are required.
@@ -155,7 +156,7 @@ def read_study(
     place.finish()
     assert table is not None
     reader = StudyReader(table)
-    part = _studied_joint(machine, joint, reader)
+    part = _studied_joint(machine, table.joint, reader)
     case = _case(part, reader)
     frequency = reader.optional("impact", "first_frequency", "the load is rigid except for its drive")
     sensors = _sensors(part, reader)
@@ -330,7 +331,7 @@ def _studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> Studi
         )
     if not wanted and len(machine.joints) > 1:
         names = ", ".join(machine.joints)
-        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"select one with --joint: {names}")
+        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"set joint to one of them: {names}")
     if wanted and wanted not in machine.joints:
         raise UsageError(f"{file.path} has no joint '{wanted}'", nearest(wanted, machine.joints))
     at = machine.joints.index(wanted) if wanted else 0

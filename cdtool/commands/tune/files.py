@@ -11,7 +11,7 @@ from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import plain
 from cdtool.base.remote.remote_path import is_remote
-from cdtool.commands.scoring.json_schema import refuse_other_schema, with_schema
+from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.tune.tuned_files import (
     LABELS,
     LABELS_MARK,

@@ -158,7 +158,7 @@ def _broken_plugin(files: Folder) -> Outcome:
         return cdtool("list", "detectors")
 
 
-ONE_RUN = ("--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0)
+ONE_RUN = ("--set", "free=1", "--set", "holdout=0", "--set", "stiff=0", "--set", "soft=0")
 VIOLATED = '[limits]\n"*.*.missed" = { max = -1 }\n'
 
 DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {

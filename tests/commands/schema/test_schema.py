@@ -11,8 +11,8 @@ import jsonschema
 import pytest
 
 from cdtool.base.errors import ConfigurationError
+from cdtool.commands.console.json_schema import KINDS, schema_of
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
-from cdtool.commands.scoring.json_schema import KINDS, schema_of
 from cdtool.formats.machine_file import read_machine_file
 from tests.command import cdtool
 

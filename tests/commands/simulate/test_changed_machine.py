@@ -17,7 +17,7 @@ from cdtool.commands.simulate.gate_model import GateParameters, GateRun, simulat
 from cdtool.formats.machine_file import read_machine_file
 from tests.command import cdtool as command
 
-ONE_RUN = ("--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0)
+ONE_RUN = ("--set", "free=1", "--set", "holdout=0", "--set", "stiff=0", "--set", "soft=0")
 GATE, ARM = GateParameters(), ArmParameters()
 # Without what differs from run to run, so that levels can be compared with closed forms.
 QUIET = replace(

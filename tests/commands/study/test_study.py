@@ -122,7 +122,7 @@ def test_a_coarser_or_noisier_sensor_is_never_earlier_and_moves_no_other_row(tmp
 
 def test_a_joint_of_an_arm_is_studied_while_the_other_stands(tmp_path):
     # The forearm of the simulated arm: M22 without its motor, hit 0.3 m from the elbow, is that rotary axis.
-    done = cdtool("study", "sensors", "-m", ARM, "--joint", "forearm", "--set", "impact.lever=0.3")
+    done = cdtool("study", "sensors", "-m", ARM, "--set", "joint=forearm", "--set", "impact.lever=0.3")
     assert done.status == 0
     assert "the other joints are at rest: 0.06984 kg m2 at forearm, without its motor" in done.out
     alone = tmp_path / "forearm.toml"
@@ -132,7 +132,7 @@ def test_a_joint_of_an_arm_is_studied_while_the_other_stands(tmp_path):
         encoding="utf-8",
     )
     same = ranked("-m", alone, "--set", "impact.lever=0.3")
-    for name, found in ranked("-m", ARM, "--joint", "forearm", "--set", "impact.lever=0.3").items():
+    for name, found in ranked("-m", ARM, "--set", "joint=forearm", "--set", "impact.lever=0.3").items():
         assert found["time_ms"] == pytest.approx(same[name]["time_ms"], abs=1e-3)
         assert found["peak_so_far_n"] == pytest.approx(same[name]["peak_so_far_n"], rel=1e-3)
 
@@ -188,7 +188,7 @@ def test_the_figures_of_the_thesis_are_drawn_again(tmp_path):
         (("--set", "impact.stiffness=nan"), "--set impact.stiffness: is nan"),
         (("--set", "k=0"), "--set k: is 0"),
         (("--set", "impact.lever=1"), "a lever is given for a linear axis"),
-        (("--joint", "gat"), "no joint 'gat' (did you mean gate?"),
+        (("--set", "joint=gat"), "no joint 'gat' (did you mean gate?"),
         (("--study", "absent.toml"), "absent.toml: no such file"),
         (("--study", "wrong.toml"), "wrong.toml: sensors.encoder.counts: unknown key (did you mean counts_per_turn?"),
         (("--study", "kind.toml"), "kind.toml: impact: is 3"),
@@ -213,13 +213,13 @@ def test_a_machine_without_inertias_is_refused(tmp_path):
     bare.write_text(BARRIER.format(motor=0.0), encoding="utf-8")
     done = cdtool("study", "sensors", "-m", bare)
     assert done.status == 2 and "machine.motor_inertia is missing or 0" in done.err
-    done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "ur10e.toml", "--joint", "elbow")
+    done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "ur10e.toml", "--set", "joint=elbow")
     assert done.status == 2 and "coordinates = 'motor' with motor_inertia" in done.err
     done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "scara.toml")
     assert done.status == 2 and "must all rotate or all slide" in done.err
     done = cdtool("study", "sensors", "-m", ARM)
-    assert done.status == 2 and "2 joints (select one with --joint: arm, forearm)" in done.err
-    done = cdtool("study", "sensors", "-m", ARM, "--joint", "arm")
+    assert done.status == 2 and "2 joints (set joint to one of them: arm, forearm)" in done.err
+    done = cdtool("study", "sensors", "-m", ARM, "--set", "joint=arm")
     assert done.status == 2 and "no lever is given" in done.err
 
 
@@ -231,8 +231,8 @@ def test_a_joint_is_required_if_there_are_several(tmp_path):
         encoding="utf-8",
     )
     done = cdtool("study", "sensors", "-m", gantry)
-    assert done.status == 2 and "2 joints (select one with --joint: x, y)" in done.err
-    assert ranked("-m", gantry, "--joint", "x") != ranked("-m", gantry, "--joint", "y")
+    assert done.status == 2 and "2 joints (set joint to one of them: x, y)" in done.err
+    assert ranked("-m", gantry, "--set", "joint=x") != ranked("-m", gantry, "--set", "joint=y")
 
 
 def test_the_page_shows_what_the_commands_print(monkeypatch, tmp_path):
