@@ -25,7 +25,9 @@ def _study() -> None:
     """Study an impact before the machine is built."""
 
 
-@study.command("sensors", epilog=statuses_words("study sensors"))
+@study.command(
+    "sensors", short_help="Rank the sensors by when they detect an impact.", epilog=statuses_words("study sensors")
+)
 def sensors(
     machine: MachineOption,
     file: Annotated[
@@ -72,7 +74,7 @@ def sensors(
         _show(done)
 
 
-@study.command("figures", epilog=statuses_words("study figures"))
+@study.command("figures", short_help="Draw the thesis's figures of impacts.", epilog=statuses_words("study figures"))
 def figures(
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")],
     force: ForceOption = False,

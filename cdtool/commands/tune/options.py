@@ -48,7 +48,8 @@ class TuneTable:
         known = THRESHOLDS.usable_names() if self.thresholds else []
         for name in self.thresholds:
             if name not in known:
-                raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
+                hint = 'give a list, as ["signature", "glr"]' if "," in name else nearest(name, known)
+                raise UsageError(f"unknown threshold '{name}'", hint)
 
 
 @dataclass(frozen=True)
