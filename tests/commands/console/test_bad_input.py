@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import Outcome, cdtool
+from tests.command import Outcome, cdtool, keys
 
 HEADER = "t,i_motor,n_motor,phi,acc_x,load_cell,n_ref,i_ref"
 
@@ -112,20 +112,7 @@ def test_an_incomplete_last_line_is_dropped_and_reported(detect, tmp_path, good,
 
 
 def test_a_truncated_mcap_file_is_read_up_to_the_cut_with_status_3(detect, tmp_path):
-    arguments = (
-        "simulate",
-        "gate",
-        "--set",
-        "free=0",
-        "--set",
-        "holdout=0",
-        "--set",
-        "stiff=1",
-        "--set",
-        "soft=0",
-        "--seed",
-        5,
-    )
+    arguments = ("simulate", "gate", *keys(free=0, holdout=0, stiff=1, soft=0), "--seed", 5)
     assert cdtool(*arguments, "--format", "mcap", "-o", tmp_path / "m").status == 0
     whole = (tmp_path / "m" / "stiff" / "01.mcap").read_bytes()
     path = written(tmp_path / "cut.mcap", whole[: int(0.95 * len(whole))])

@@ -14,7 +14,7 @@ from cdtool.results.evaluated import evaluate
 from cdtool.results.files.results_file import to_json
 from cdtool.results.limits import LimitRule
 from cdtool.results.results import Results
-from tests.command import Outcome, cdtool
+from tests.command import Outcome, cdtool, keys
 from tests.formats.mcap.small_files import small_file
 from tests.results.judged_results import results as judged_results
 from tests.synthetic.builds import MISSED, build_results
@@ -158,7 +158,7 @@ def _broken_plugin(files: Folder) -> Outcome:
         return cdtool("list", "detectors")
 
 
-ONE_RUN = ("--set", "free=1", "--set", "holdout=0", "--set", "stiff=0", "--set", "soft=0")
+ONE_RUN = keys(free=1, holdout=0, stiff=0, soft=0)
 VIOLATED = '[limits]\n"*.*.missed" = { max = -1 }\n'
 
 DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from tests.command import cdtool
+from tests.command import cdtool, keys
 
 
 def _simulated(folder, free, holdout, stiff, machine="gate"):
-    counts = ("--set", f"free={free}", "--set", f"holdout={holdout}", "--set", f"stiff={stiff}", "--set", "soft=0")
+    counts = keys(free=free, holdout=holdout, stiff=stiff, soft=0)
     done = cdtool("simulate", machine, *counts, "--seed", 5, "-o", folder)
     assert done.status == 0, done.err
     return done.out

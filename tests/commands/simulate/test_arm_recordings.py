@@ -19,6 +19,7 @@ from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.recording import Recording
 from tests.command import cdtool as command
+from tests.command import keys
 
 ARM = ArmParameters()
 COUNTS = {"free": 1, "holdout": 1, "stiff": 3, "soft": 1}
@@ -118,7 +119,7 @@ def test_logs_stay_small(folder: Path) -> None:
 
 
 def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path, tmp_path: Path) -> None:
-    counts = ("--set", "free=0", "--set", "holdout=0", "--set", "stiff=4", "--set", "soft=0")
+    counts = keys(free=0, holdout=0, stiff=4, soft=0)
     done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--set", "format=mixed", "-o", tmp_path / "b")
     assert done.status == 0, done.err
     for name in ("stiff/01.mcap", "stiff/02.mcap", "stiff/03.csv", "machine.toml"):
@@ -130,7 +131,7 @@ def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path,
 
 def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> None:
     assert cdtool.simulate_arm(tmp_path / "python", {"stiff": 1}, seed=6, trial=2) == 1
-    counts = ("--set", "free=0", "--set", "holdout=0", "--set", "stiff=1", "--set", "soft=0")
+    counts = keys(free=0, holdout=0, stiff=1, soft=0)
     assert command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "line").status == 0
     names = sorted(path.relative_to(tmp_path / "line") for path in (tmp_path / "line").rglob("*.*"))
     assert len(names) == 3

@@ -16,8 +16,9 @@ from cdtool.commands.simulate.changed_machine import FLUX_PER_KELVIN, ChangedMac
 from cdtool.commands.simulate.gate_model import GateParameters, GateRun, simulate_gate_run
 from cdtool.formats.machine_file import read_machine_file
 from tests.command import cdtool as command
+from tests.command import keys
 
-ONE_RUN = ("--set", "free=1", "--set", "holdout=0", "--set", "stiff=0", "--set", "soft=0")
+ONE_RUN = keys(free=1, holdout=0, stiff=0, soft=0)
 GATE, ARM = GateParameters(), ArmParameters()
 # Without what differs from run to run, so that levels can be compared with closed forms.
 QUIET = replace(
