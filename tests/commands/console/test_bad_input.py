@@ -113,7 +113,7 @@ def test_an_incomplete_last_line_is_dropped_and_reported(detect, tmp_path, good,
 
 def test_a_truncated_mcap_file_is_read_up_to_the_cut_with_status_3(detect, tmp_path):
     arguments = ("simulate", "gate", *keys(free=0, holdout=0, stiff=1, soft=0), "--seed", 5)
-    assert cdtool(*arguments, "--format", "mcap", "-o", tmp_path / "m").status == 0
+    assert cdtool(*arguments, *keys(format="mcap"), "-o", tmp_path / "m").status == 0
     whole = (tmp_path / "m" / "stiff" / "01.mcap").read_bytes()
     path = written(tmp_path / "cut.mcap", whole[: int(0.95 * len(whole))])
     done = detect(path)
