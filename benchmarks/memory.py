@@ -123,7 +123,7 @@ def _measured(folder: Path, logs: Mapping[str, Path]) -> bool:
         "info": ["info", "LOG"],
         "convert to .parquet": ["convert", "LOG", str(folder / "out.parquet"), "--force"],
         "convert to .mcap": ["convert", "LOG", str(folder / "out.mcap"), "--force"],
-        "recover": ["recover", "LOG", "-o", str(folder / "recovered.mcap"), "--unverified", "--force"],
+        "convert --recover": ["convert", "LOG", str(folder / "recovered.mcap"), "--recover", "all", "--force"],
     }
     held, rows = True, []
     for task, arguments in (mapped | bounded).items():

@@ -29,7 +29,22 @@ class Case:
 def prepare(folder: Path, run: Run) -> None:
     """Make the inputs: recordings, signatures, results, triggers; `run` runs a command."""
     gate = folder / "gate"
-    run(["simulate", "gate", "--free", "4", "--holdout", "1", "--stiff", "2", "--soft", "0", "-o", str(gate)])
+    run(
+        [
+            "simulate",
+            "gate",
+            "--set",
+            "free=4",
+            "--set",
+            "holdout=1",
+            "--set",
+            "stiff=2",
+            "--set",
+            "soft=0",
+            "-o",
+            str(gate),
+        ]
+    )
     (folder / "benchmark.toml").write_text(
         'machine = "gate/machine.toml"\ndetectors = ["gm"]\n[signature]\nforce = true\n'
         '[learn]\nlogs = ["gate/free/*.csv"]\n[impacts.stiff]\nlogs = ["gate/stiff/*.csv"]\n',
@@ -135,9 +150,9 @@ def cases(inputs: Path) -> list[Case]:
             _plot("explain", stiff[0], *machine, "--signature", b),
         ),
         Case(
-            "recover",
-            ("recover", f"{inputs}/2.mcap", "-o", "{out}/r.mcap", "--force"),
-            ("recover", f"{inputs}/1.mcap", "-o", "{out}/r.mcap", "--force"),
+            "convert, recover",
+            ("convert", f"{inputs}/2.mcap", "{out}/r.mcap", "--recover", "verified", "--force"),
+            ("convert", f"{inputs}/1.mcap", "{out}/r.mcap", "--recover", "verified", "--force"),
         ),
         Case(
             "init",
@@ -148,15 +163,42 @@ def cases(inputs: Path) -> list[Case]:
         Case(
             "inject",
             ("inject", f"{inputs}/inject_b.toml", "-o", "{out}/injected"),
-            ("simulate", "gate", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", "{out}/logs"),
+            (
+                "simulate",
+                "gate",
+                "--set",
+                "free=1",
+                "--set",
+                "holdout=0",
+                "--set",
+                "stiff=0",
+                "--set",
+                "soft=0",
+                "-o",
+                "{out}/logs",
+            ),
         ),
         Case("tune", _tune(f"{inputs}/benchmark.toml", "trend"), _tune(f"{inputs}/benchmark.toml", "limit")),
-        Case("coverage", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
+        Case("inject, map", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
         *(
             Case(f"simulate {kind}", ("simulate", kind, *some, "-o", "{out}/logs"))
             for kind, some in (
-                ("gate", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0")),
-                ("arm", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0", "--format", "mixed")),
+                ("gate", ("--set", "free=1", "--set", "holdout=0", "--set", "stiff=1", "--set", "soft=0")),
+                (
+                    "arm",
+                    (
+                        "--set",
+                        "free=1",
+                        "--set",
+                        "holdout=0",
+                        "--set",
+                        "stiff=1",
+                        "--set",
+                        "soft=0",
+                        "--set",
+                        "format=mixed",
+                    ),
+                ),
             )
         ),
         *(
@@ -196,12 +238,12 @@ def _identify(logs: Sequence[str], machine: Sequence[str]) -> tuple[str, ...]:
 
 
 def _tune(setup: str, threshold: str) -> tuple[str, ...]:
-    options = ("--thresholds", threshold, "--false-alarm-budget", "1/op", "--force", "-o", "{out}/tuned")
+    options = ("--set", f"tune.thresholds={threshold}", "--false-alarm-budget", "1/op", "--force", "-o", "{out}/tuned")
     return ("tune", setup, "--detectors", "gm", *options)
 
 
 def _coverage(setup: str) -> tuple[str, ...]:
-    return ("coverage", setup, "-o", "{out}/p.png", "--force")
+    return ("inject", setup, "-o", "{out}/p.png", "--force")
 
 
 def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:
@@ -209,4 +251,4 @@ def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:
 
 
 def _sensors(machine: Sequence[str], speed: str) -> tuple[str, ...]:
-    return ("study", "sensors", *machine, "--speed", speed, "--stiffness", "5e5", "-o", "{out}/p.svg")
+    return ("study", "sensors", *machine, "--set", f"impact.speed={speed}", "-o", "{out}/p.svg")

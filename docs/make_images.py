@@ -63,7 +63,7 @@ def gate(work: Path) -> None:
 
 def budget(work: Path) -> None:
     """Latency against false alarms on 300 + 300 simulated impact-free runs, at one false alarm in 100 operations."""
-    counts = ("--free", 300, "--holdout", 300, "--stiff", 30, "--soft", 30, "--seed", 5)
+    counts = ("--set", "free=300", "--set", "holdout=300", "--set", "stiff=30", "--set", "soft=30", "--seed", 5)
     cdtool("simulate", "gate", "-o", "budget", *counts, folder=work)
     done = benchmark(work / "budget" / "benchmark.toml", false_alarm_budget="1/100op", jobs=2)
     write_figures(Report(done.evaluated, done.traces), work)
@@ -76,15 +76,29 @@ def coverage(work: Path) -> None:
     logs = work / "coverage"
     shutil.copytree(ROOT / "sample_logs" / "gate", logs)
     detectors = ("--detectors", "pi,feekf,gm,pt")
-    cdtool("coverage", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
+    cdtool("inject", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
 
 
 def season(work: Path) -> None:
     """Friction that rises from month to month, as docs/signature.md has it."""
-    cdtool("simulate", "gate", "-o", "gate", "--free", 14, "--holdout", 40, "--stiff", 0, "--soft", 0, folder=work)
-    free = ("--free", 15, "--holdout", 0, "--stiff", 0, "--soft", 0)
+    cdtool(
+        "simulate",
+        "gate",
+        "-o",
+        "gate",
+        "--set",
+        "free=14",
+        "--set",
+        "holdout=40",
+        "--set",
+        "stiff=0",
+        "--set",
+        "soft=0",
+        folder=work,
+    )
+    free = ("--set", "free=15", "--set", "holdout=0", "--set", "stiff=0", "--set", "soft=0")
     for month, friction in enumerate((1.0, 1.05, 1.1, 1.15), 1):
-        changed = ("--friction", friction, "--seed", 20 + month)
+        changed = ("--set", f"friction={friction}", "--seed", 20 + month)
         cdtool("simulate", "gate", *free, *changed, "-o", f"month{month}", folder=work)
     taught = sorted(path.relative_to(work) for name in ("free", "holdout") for path in (work / "gate" / name).iterdir())
     machine = ("-m", "gate/machine.toml")

@@ -15,6 +15,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ from cdtool.base.settings import keys_of, kind_in_words
 from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
 from cdtool.commands.judging.named_logs import OnsetTable
 from cdtool.commands.judging.settings_table import ForceTable
+from cdtool.commands.simulate.simulation_table import SimulationTable
+from cdtool.commands.tune.options import TuneTable
 from cdtool.detectors import DETECTORS
 from cdtool.formats import FORMATS
 from cdtool.machines.joint_machine import JointTable
@@ -62,7 +65,9 @@ _MODELS: Mapping[str, Any] = {
     "profile": ForceProfile,
     "rotary_axis": RotaryAxisTable,
     "signature": Signature,
+    "simulation": SimulationTable,
     "step": ForceStep,
+    "tune": TuneTable,
     "urdf_robot": UrdfRobotTable,
 }
 _SHORT = (
@@ -74,7 +79,7 @@ _SHORT = (
     (" and of at most", ", ≤"),
     (" and below", ", <"),
 )
-_KEY_PAGES = ("benchmark-file", "machine-file", "force-limits")
+_KEY_PAGES = ("benchmark-file", "machine-file", "force-limits", "simulators", "tuning")
 # The keys that every machine has stand once, in the table "machine".
 _ADDS_TO = dict.fromkeys(("axis", "rotary_axis", "planar_arm", "urdf_robot"), "machine")
 
@@ -102,10 +107,7 @@ def files() -> Mapping[Path, str]:
         DOCS / "detectors" / "index.md": _INDEX + "".join(map(_index_line, rows)),
         readme: _with_table(readme, _README, map(_readme_line, rows)),
         containers: _with_table(containers, _CONTAINERS, map(_format_line, FORMATS.names())),
-        **{
-            page: _with_keys(page)
-            for page in (DOCS / f"{name}.md" for name in ("benchmark-file", "machine-file", "force-limits"))
-        },
+        **{page: _with_keys(page) for page in (DOCS / f"{name}.md" for name in _KEY_PAGES)},
     }
 
 
@@ -144,6 +146,8 @@ def _default(item: Field[Any]) -> str:
         (value,) = value
     if value in (None, "", (), MISSING, math.inf):
         return ""
+    if isinstance(value, Enum):
+        return f'`"{value.value}"`'
     if isinstance(value, bool):
         return str(value).lower()
     return f'`"{value}"`' if isinstance(value, str) else f"{value:g}"

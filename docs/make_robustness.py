@@ -322,8 +322,8 @@ python docs/make_robustness.py --page   # only page and picture again, from robu
 * Machines: the simulated [sliding gate](simulators.md) and the simulated arm that is hit on its first link. {learned}
   impact-free runs of the unchanged machine are learned from; all settings are the defaults.
 {numbers}
-* Changes: as `cdtool simulate gate --friction 1.2` makes them. Friction is that of the load; speed is the nominal one;
-  mass is that of the load (arm: both links); the offsets are added to the logged motor current and to the
+* Changes: as `cdtool simulate gate --set friction=1.2` makes them. Friction is that of the load; speed is the nominal
+  one; mass is that of the load (arm: both links); the offsets are added to the logged motor current and to the
   accelerometers; a motor that is warmer by 10 K needs 1.1 % more current for a torque.
 {options}
 * `combined` needs a list of other thresholds and is left out.

@@ -10,8 +10,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from cdtool.base.files.strict_json import strict_json
-from cdtool.commands.schema.json_schema import KINDS, schema_of
+from cdtool.commands.console.json_schema import KINDS
+from cdtool.commands.console.json_schema import schema_text as written_text
 from cdtool.results.results import SCHEMA_VERSION, Results
 
 FILE = Path(__file__).with_name("results.schema.json")
@@ -22,11 +22,6 @@ TYPES = {str: "string", float: "number", int: "integer", bool: "boolean"}
 def schema_text() -> str:
     """The file's content."""
     return json.dumps(results_schema(), indent=1) + "\n"
-
-
-def written_text(kind: str) -> str:
-    """The schema of a machine, benchmark or protocol file, as `cdtool schema` prints it."""
-    return strict_json(schema_of(kind)) + "\n"
 
 
 def results_schema() -> dict[str, Any]:

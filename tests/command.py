@@ -34,3 +34,8 @@ def cdtool(*arguments: object) -> Outcome:
         except SystemExit as end:
             status = end.code if isinstance(end.code, int) else int(end.code is not None)
     return Outcome(int(status), out.getvalue(), err.getvalue())
+
+
+def keys(**values: object) -> tuple[str, ...]:
+    """Return --set for each key that has no dot."""
+    return tuple(word for key, value in values.items() for word in ("--set", f"{key}={value}"))

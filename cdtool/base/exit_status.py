@@ -67,18 +67,16 @@ _FIRST_TO_LAST = (
 )
 
 STATUSES: Mapping[ExitStatus, str] = {
-    ExitStatus.OK: "all good: done, every limit and force profile met; without --require-power also: inconclusive",
-    ExitStatus.VIOLATED: "a limit or force profile is violated, a limit is not assessable, or a build is worse",
+    ExitStatus.OK: "done; every limit and force profile met; compare: or inconclusive",
+    ExitStatus.VIOLATED: "a limit violated or not assessable, a force profile violated, a build worse",
     ExitStatus.UNUSABLE: "wrong usage, a wrong file, or nothing usable",
     ExitStatus.LOST: "done, but something was lost or left out, or nothing could be assessed",
-    ExitStatus.INCONCLUSIVE: "inconclusive or incomplete: the recordings, or the entries of a protocol, do not suffice",
-    ExitStatus.INTERRUPTED: "interrupted with Ctrl-C: files being written are unchanged",
-    ExitStatus.TERMINATED: "terminated by SIGTERM: files being written are unchanged",
-    ExitStatus.HUNG_UP: "terminal closed (SIGHUP): files being written are unchanged",
+    ExitStatus.INCONCLUSIVE: "inconclusive: too few recordings, or entries of a protocol are missing",
+    ExitStatus.INTERRUPTED: "interrupted with Ctrl-C",
+    ExitStatus.TERMINATED: "terminated by SIGTERM",
+    ExitStatus.HUNG_UP: "terminal closed",
 }
 """The meaning of each status, in one line."""
-
-ORDER = "If several apply: 2 before 1 before 3 before 4."
 
 _ALWAYS = frozenset({ExitStatus.OK, ExitStatus.UNUSABLE})
 _CAN_LOSE = _ALWAYS | {ExitStatus.LOST}
@@ -96,10 +94,8 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "plan": _ALWAYS,
     "tune": _CAN_LOSE,
     "convert": _CAN_LOSE,
-    "recover": _CAN_LOSE,
     "identify": _CAN_LOSE,
     "inject": _CAN_LOSE,
-    "coverage": _CAN_LOSE,
     "signature show": _ALWAYS,
     "signature check": _CAN_LOSE,
     "signature update": _CAN_LOSE,
@@ -108,8 +104,7 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "protocol check": _ALWAYS | {ExitStatus.INCONCLUSIVE},
     "store status": _ALWAYS,
     "store gc": _ALWAYS,
-    "simulate gate": _ALWAYS,
-    "simulate arm": _ALWAYS,
+    "simulate": _ALWAYS,
     "study sensors": _ALWAYS,
     "study figures": _ALWAYS,
     "list": _CAN_LOSE,
@@ -131,4 +126,13 @@ def status_of(facts: Iterable[Fact]) -> ExitStatus:
 def statuses_words(command: str) -> str:
     """Return the line of a command's --help that lists its statuses."""
     numbers = ", ".join(str(int(status)) for status in sorted(STATUSES_OF[command]))
-    return f"Exit status: {numbers}; `cdtool --help` explains them."
+    return f"Exit status: {numbers}; cdtool --help explains them."
+
+
+def help_epilog() -> str:
+    """Return the end of `cdtool --help`: a line for each status of a finished command, and one for the others."""
+    texts = [(status, f"{int(status)} {meaning}") for status, meaning in STATUSES.items()]
+    done = [text for status, text in texts if status <= ExitStatus.INCONCLUSIVE]
+    ended = ", ".join(text for status, text in texts if status > ExitStatus.INCONCLUSIVE)
+    # click does not wrap the paragraph after this mark.
+    return "\n".join(["\b", "Exit status; if several apply, 2 before 1 before 3 before 4:", *done, ended])

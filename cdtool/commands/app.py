@@ -21,43 +21,52 @@ import typer
 from typer.core import TyperGroup
 
 from cdtool.base.errors import CdtoolError, UsageError
-from cdtool.base.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
+from cdtool.base.exit_status import ExitStatus, Fact, help_epilog, status_of, statuses_words
 from cdtool.base.plain_text import counted, one_line
 from cdtool.base.remote import session
 from cdtool.commands.console.streams import lost_output, open_standard_streams
 
-COMMANDS: Mapping[str, str] = {
-    "info": "cdtool.commands.info.command:info",
-    "init": "cdtool.commands.init.command:init",
-    "learn-signature": "cdtool.commands.learn.command:learn_signature",
-    "detect": "cdtool.commands.detect.command:detect",
-    "explain": "cdtool.commands.explain.command:explain",
-    "benchmark": "cdtool.commands.benchmark.command:benchmark",
-    "report": "cdtool.commands.report.command:report",
-    "protocol": "cdtool.commands.protocol.command:protocol",
-    "score": "cdtool.commands.score.command:score",
-    "compare": "cdtool.commands.compare.command:compare",
-    "plan": "cdtool.commands.compare.plan_command:plan",
-    "tune": "cdtool.commands.tune.command:tune",
-    "identify": "cdtool.commands.identify.command:identify",
-    "inject": "cdtool.commands.inject.command:inject",
-    "coverage": "cdtool.commands.inject.coverage.command:coverage",
-    "convert": "cdtool.commands.convert.command:convert",
-    "recover": "cdtool.commands.convert.recover_command:recover",
-    "list": "cdtool.commands.list_known.command:list_known",
-    "signature": "cdtool.commands.signature.command:signature",
-    "schema": "cdtool.commands.schema.command:schema",
-    "store": "cdtool.commands.store.command:store",
-    "simulate": "cdtool.commands.simulate.command:simulate",
-    "study": "cdtool.commands.study.command:study",
+_GROUPS: Mapping[str, Mapping[str, tuple[str, str]]] = {
+    "start": {
+        "info": ("cdtool.commands.info.command:info", "Show a log's channels, units, rates and warnings."),
+        "init": ("cdtool.commands.init.command:init", "Draft a machine and a benchmark file from logs."),
+        "benchmark": ("cdtool.commands.benchmark.command:benchmark", "Score detectors: latency, misses, false alarms."),
+        "report": ("cdtool.commands.report.command:report", "Write the reports of a benchmark again."),
+        "protocol": ("cdtool.commands.protocol.command:protocol", "Draft, check and write a test protocol."),
+    },
+    "understand": {
+        "detect": ("cdtool.commands.detect.command:detect", "Run one detector over logs and show its alarms."),
+        "explain": ("cdtool.commands.explain.command:explain", "Explain alarms, and why a contact was missed."),
+    },
+    "CI": {
+        "compare": ("cdtool.commands.compare.command:compare", "Compare two builds: real changes from noise."),
+        "score": ("cdtool.commands.score.command:score", "Score the triggers of any controller or program."),
+        "plan": ("cdtool.commands.compare.plan_command:plan", "Calculate how many recordings a test needs."),
+    },
+    "model": {
+        "learn-signature": ("cdtool.commands.learn.command:learn_signature", "Learn a detector's limits from runs."),
+        "signature": ("cdtool.commands.signature.command:signature", "Show, check or update a signature."),
+        "identify": ("cdtool.commands.identify.command:identify", "Identify the model of an axis or robot."),
+        "inject": ("cdtool.commands.inject.command:inject", "Put simulated contacts into logs, and map them."),
+        "tune": ("cdtool.commands.tune.command:tune", "Tune detectors at a false-alarm budget."),
+        "simulate": ("cdtool.commands.simulate.command:simulate", "Write simulated logs with known contacts."),
+        "study": ("cdtool.commands.study.command:study", "Study an impact before the machine is built."),
+    },
+    "files": {
+        "convert": ("cdtool.commands.convert.command:convert", "Convert a log, or recover a damaged one."),
+        "store": ("cdtool.commands.store.command:store", "Show and clear a store of benchmark outcomes."),
+        "list": ("cdtool.commands.list_known.command:list_known", "List detectors, thresholds, machines, formats."),
+        "schema": ("cdtool.commands.schema.command:schema", "Print the JSON schema of a file for editors."),
+    },
 }
+COMMANDS: Mapping[str, str] = {name: place for group in _GROUPS.values() for name, (place, _) in group.items()}
 """Every command in the order of the help: the function that defines its options, or the app with its subcommands."""
 
 # The logger on which `cdtool.base.kernels` reports that it compiles.
 _LOGGER = logging.getLogger("cdtool.base.kernels")
 
-# In typer's default mode the help drops text in brackets, such as units.
-_LOOK: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": "markdown"}
+# The help is plain text: rich drops text in brackets, such as units, and frames make it twice as long.
+_LOOK: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": None}
 
 
 class _Commands(UserDict[str, Any]):
@@ -86,6 +95,13 @@ class _CommandGroup(TyperGroup):
         super().__init__(**settings)
         self.commands = _Commands(COMMANDS)
 
+    def format_commands(self, _: Any, formatter: Any) -> None:
+        """Write a line for each command, by groups; no command is imported for it."""
+        formatter.write_paragraph()
+        for group, commands in _GROUPS.items():
+            for place, (name, (_, summary)) in enumerate(commands.items()):
+                formatter.write(f"{group if place == 0 else '':<12}{name:<17}{summary}\n")
+
 
 app = typer.Typer(
     name="cdtool",
@@ -95,7 +111,7 @@ app = typer.Typer(
     **_LOOK,
 )
 
-_WHAT_FOR = "Measure how quickly, how reliably and at which contact force a machine detects a collision."
+_WHAT_FOR = "Measure when, how surely and at what force a machine detects a collision."
 # Sent by a service manager or pipeline to end a command, and by a terminal that is closed.
 _ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 
@@ -108,13 +124,7 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-def _help() -> str:
-    """Return the purpose of cdtool and the table of exit statuses."""
-    rows = "\n".join(f"- {int(status)}: {meaning}" for status, meaning in STATUSES.items())
-    return f"{_WHAT_FOR}\n\nExit status:\n\n{rows}\n\n{ORDER}"
-
-
-@app.callback(help=_help())
+@app.callback(help=_WHAT_FOR, epilog=help_epilog())
 def _options(
     version: Annotated[
         bool, typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)

@@ -62,6 +62,11 @@ def read_urdf(
     return tree
 
 
+def moving_joints(path: Path) -> tuple[str, ...]:
+    """Return the names of the moving joints of a URDF, in its order; raises ConfigurationError."""
+    return tuple(_movable(path, _parse(path)))
+
+
 def _pinocchio(path: Path) -> Any:
     try:
         return import_module("pinocchio")

@@ -73,7 +73,7 @@ def test_the_docs_list_the_statuses_of_each_command():
 def test_help_shows_the_table_and_every_command_its_statuses():
     shown = one_line(cdtool("--help").out)
     for status, meaning in STATUSES.items():
-        assert f"{int(status)}: {meaning}" in shown
+        assert f"{int(status)} {meaning}" in shown
     assert "2 before 1 before 3 before 4" in shown
     for name in commands():
         numbers = ", ".join(str(int(status)) for status in sorted(STATUSES_OF[name]))

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import cdtool
+from tests.command import cdtool, keys
 
 
 @pytest.fixture(scope="session")
 def gate_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("gate") / "logs"
-    counts = ("--free", 11, "--holdout", 2, "--stiff", 2, "--soft", 2)
+    counts = keys(free=11, holdout=2, stiff=2, soft=2)
     done = cdtool("simulate", "gate", *counts, "--seed", 5, "-o", folder)
     assert done.status == 0, done.err
     return folder

@@ -27,7 +27,7 @@ from cdtool.execution.environment import difference, environment
 from cdtool.execution.on_cluster import Sight
 from cdtool.execution.store.digest import code_version
 from cdtool.execution.workers import Workers, in_order
-from tests.command import cdtool
+from tests.command import cdtool, keys
 from tests.execution import dask_cluster
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -228,7 +228,7 @@ def test_a_scheduler_that_ends_is_one_error_and_nothing_hangs(tmp_path, site):
 
 
 def gate_with_fatal_logs(folder):
-    done = cdtool("simulate", "gate", "-o", folder, "--free", 10, "--holdout", 4, "--stiff", 4, "--soft", 3)
+    done = cdtool("simulate", "gate", "-o", folder, *keys(free=10, holdout=4, stiff=4, soft=3))
     assert done.status == 0, done.err
     (folder / "stiff" / "00a.fatal").write_text("segfault", encoding="utf-8")
     (folder / "free" / "05b.fatal").write_text("killed", encoding="utf-8")

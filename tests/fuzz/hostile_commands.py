@@ -142,7 +142,7 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("report results.json -o out.html", "results.json"),
     ("report results.json -o out.html", "results.traces.json.gz"),
     ("compare results.json other.json -o out.md", "other.json"),
-    ("plan --from results.json --detectors gm,pt --group stiff", "results.json"),
+    ("plan --difference-ms 5 --std-ms results.json --detectors gm,pt --group stiff", "results.json"),
     ("score triggers.csv -b benchmark.toml", "triggers.csv"),
     ("score triggers.csv -b labelled.toml", "labels.csv"),
     ("signature show gate.json", "gate.json"),
@@ -151,7 +151,7 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("study sensors -m machine.toml --study study.toml", "study.toml"),
     ("study sensors -m machine.toml --study study.toml", "machine.toml"),
     ("convert stiff/01.csv out.csv -m machine.toml --force", "machine.toml"),
-    ("recover log.mcap out.mcap --force", "log.mcap"),
+    ("convert log.mcap out.mcap --recover all --force", "log.mcap"),
 )
 _NUMBERS = ("0", "-1", "1", "99999999999999999999", "-99999999999999999999", "nan", "inf", "-inf", "1e308", "1e-320")
 _WORDS = ("", " ", "x", ",", "1,2,3", "9" * 5000, "\udcff\udcfe", "a\nb", "1e400", "0x10", "--", "\u202e", "/dev/zero")
@@ -187,15 +187,15 @@ _OPTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
         ),
     ),
     ("plan", ("--difference-ms", "--std-ms", "--power", "--missed-at-most", "--false-alarms-at-most", "--level")),
-    ("plan --difference-ms 5 --std-ms 3", ("--power", "--level", "--allowed", "--group", "--from")),
-    ("plan --missed-at-most 5%", ("--level", "--allowed", "--power")),
-    ("plan --false-alarms-at-most 1/1000op", ("--level", "--allowed", "--power")),
+    ("plan --difference-ms 5 --std-ms 3", ("--power", "--level", "--group", "--std-ms")),
+    ("plan --missed-at-most 5%", ("--level", "--power")),
+    ("plan --false-alarms-at-most 1/1000op", ("--level", "--power")),
     ("compare results.json other.json", ("--level", "-o")),
     (
         "study sensors -m machine.toml",
-        ("--speed", "--stiffness", "--lever", "--drive-stiffness", "--k", "--joint", "-o"),
+        ("--set", "-o"),
     ),
-    ("simulate gate --free 1 --holdout 0 --stiff 0 --soft 0 -o sim", ("--seed", "--format")),
+    ("simulate gate --set free=1 --set holdout=0 --set stiff=0 --set soft=0 -o sim", ("--seed", "--set")),
     ("benchmark benchmark.toml -o out.json", ("--detectors", "--jobs")),
     ("score triggers.csv -b benchmark.toml", ("--clock", "--jobs")),
     ("info stiff/01.csv", ("-m",)),
@@ -222,7 +222,7 @@ def make_bench(folder: Path) -> None:
     done = cdtool(
         "simulate",
         "gate",
-        *["--free", "5", "--holdout", "1", "--stiff", "2", "--soft", "1", "--seed", "5", "-o"],
+        *["--set", "free=5", "--set", "holdout=1", "--set", "stiff=2", "--set", "soft=1", "--seed", "5", "-o"],
         folder,
     )
     assert done.status == 0, done.err

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.command import Outcome
-from tests.fuzz.hostile_commands import Attempt, attempts, complaint, make_bench, run
+from tests.fuzz.hostile_commands import attempts, complaint, make_bench, run
 
 COUNT, SEED = 60, 14
 
@@ -23,19 +23,6 @@ def test_no_hostile_file_or_option_makes_a_traceback_or_more_than_a_line(bench):
         if said := complaint(run(attempt, bench)):
             complaints.append(f"{attempt.shown}: {said}")
     assert not complaints, "\n".join(complaints)
-
-
-# Found by tests/fuzz/hostile_input.py.
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("plan", "--missed-at-most", "5%", "--allowed", "99999999999999999999"),
-        ("plan", "--false-alarms-at-most", "1/1000op", "--allowed", "99999999999999999999"),
-    ],
-)
-def test_options_that_were_found_once_are_one_line(bench, arguments):
-    outcome = run(Attempt(arguments), bench)
-    assert (outcome.status, complaint(outcome)) == (2, "")
 
 
 def test_the_check_sees_a_traceback_a_wrong_status_and_a_long_line():

@@ -18,7 +18,7 @@ from tests.project.pages import ROOT
 
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 # An option of so many commands is named without one.
-COMMON = 7
+COMMON = 6
 # Texts of these modules are shown by these commands only, if the name of the module is not the command's.
 SHOWN_BY = {
     "exit_status": {"compare"},
@@ -26,7 +26,7 @@ SHOWN_BY = {
     "detection": {"detect"},
     "detection_options": {"detect", "explain", "score"},
     "prepared_detector": {"detect", "learn-signature"},
-    "recovering": {"recover"},
+    "recovering": {"convert"},
     "score_triggers": {"score"},
     "study_file": {"study new", "study", "study run"},
     "identification": {"identify"},

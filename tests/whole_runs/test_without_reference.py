@@ -12,6 +12,7 @@ from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.commands.simulate.gate_model import GateParameters
 from cdtool.commands.simulate.gate_recordings import simulate_gate
 from tests.command import cdtool as command
+from tests.command import keys
 
 DETECTORS = ["igm", "gm"]
 
@@ -19,9 +20,9 @@ DETECTORS = ["igm", "gm"]
 @pytest.mark.parametrize(("name", "more"), [("gate", ()), ("arm", ("--trial", 2))])
 @pytest.mark.parametrize("file_format", ["csv", "mcap"])
 def test_the_simulators_can_leave_the_references_out(name, more, file_format, tmp_path):
-    for folder, flag in (("with", ()), ("without", ("--no-reference",))):
-        counts = ("--free", 1, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 4)
-        done = command("simulate", name, *more, *counts, "--format", file_format, *flag, "-o", tmp_path / folder)
+    for folder, flag in (("with", ()), ("without", keys(reference="false"))):
+        counts = (*keys(free=1, holdout=0, stiff=1, soft=0, format=file_format), *flag, "--seed", 4)
+        done = command("simulate", name, *more, *counts, "-o", tmp_path / folder)
         assert done.status == 0
     kinds = [
         cdtool.read(tmp_path / folder / "stiff" / f"01.{file_format}", tmp_path / folder / "machine.toml")

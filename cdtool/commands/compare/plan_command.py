@@ -11,7 +11,7 @@ from cdtool.base.errors import UsageError
 from cdtool.commands.console import completions
 from cdtool.commands.console.console import plain, print_json
 from cdtool.commands.console.options import JsonOption, listed
-from cdtool.commands.console.place import Place, location
+from cdtool.commands.console.place import location
 
 
 def plan(
@@ -19,14 +19,10 @@ def plan(
         float | None, typer.Option("--difference-ms", help="Difference of mean latencies to detect [ms].")
     ] = None,
     std_ms: Annotated[
-        float | None, typer.Option("--std-ms", help="Estimated standard deviation of the paired differences [ms].")
-    ] = None,
-    source: Annotated[
-        Place | None,
+        str | None,
         typer.Option(
-            "--from",
-            parser=location,
-            help="Take the standard deviation from results.json of an earlier test.",
+            "--std-ms",
+            help="Standard deviation of the paired differences [ms]; or results.json of an earlier test.",
             autocompletion=completions.files(".json", ".parquet"),
         ),
     ] = None,
@@ -34,11 +30,11 @@ def plan(
         str,
         typer.Option(
             "--detectors",
-            help="With --from: the two detectors to compare, as feekf,gm; unpaired: one or two.",
+            help="Of results.json: the detectors to compare, as feekf,gm; unpaired: one or two.",
             autocompletion=completions.detector_list,
         ),
     ] = "",
-    group: Annotated[str, typer.Option("--group", help="With --from: the group of impacts.")] = "",
+    group: Annotated[str, typer.Option("--group", help="Of results.json: the group of impacts.")] = "",
     unpaired: Annotated[
         bool, typer.Option("--unpaired", help="Two sets of impacts; the standard deviation is that within a set.")
     ] = False,
@@ -52,9 +48,6 @@ def plan(
             "--false-alarms-at-most", help="Upper bound of the false-alarm rate to show, as 1/1000op or 0.1/h."
         ),
     ] = "",
-    allowed: Annotated[
-        int | None, typer.Option("--allowed", min=0, help="Misses or false alarms to allow in the test. Default: one.")
-    ] = None,
     level: Annotated[float, typer.Option("--level", help="Probability of a wrong conclusion.")] = 0.05,
     as_json: JsonOption = False,
 ) -> None:
@@ -65,21 +58,19 @@ def plan(
     from cdtool.commands.compare.planning import measured_std
     from cdtool.commands.compare.planning import plan as run
 
-    if source is not None and std_ms is not None:
-        raise UsageError("--std-ms and --from cannot be combined", "give one of them")
+    number = _number(std_ms)
+    source = std_ms if number is None else None
     without = difference_ms is None
     idle = {
         "--std-ms": std_ms is not None and without,
-        "--from": source is not None and without,
         "--unpaired": unpaired and without,
         "--detectors": bool(detectors) and source is None,
         "--group": bool(group) and source is None,
-        "--allowed": allowed is not None and not missed_at_most and not false_alarms_at_most,
     }
     for option, useless in idle.items():
         if useless:
             raise UsageError(f"{option} has no effect", _GOES_WITH[option])
-    std = measured_std(source, listed(detectors), group, unpaired=unpaired) if source else std_ms
+    std = measured_std(location(source), listed(detectors), group, unpaired=unpaired) if source else number
     found = run(
         difference_ms=difference_ms,
         std_ms=std,
@@ -87,7 +78,6 @@ def plan(
         power=power,
         missed_at_most=missed_at_most,
         false_alarms_at_most=false_alarms_at_most,
-        allowed=allowed,
         significance=level,
     )
     if as_json:
@@ -97,8 +87,15 @@ def plan(
         typer.echo(plain(answer.words))
 
 
+def _number(text: str | None) -> float | None:
+    """Return the number that a text is; None for the name of a file."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return None
+
+
 _GOES_WITH = {
-    **dict.fromkeys(("--std-ms", "--from", "--unpaired"), "use it with --difference-ms"),
-    **dict.fromkeys(("--detectors", "--group"), "use it with --from"),
-    "--allowed": "use it with --missed-at-most or --false-alarms-at-most",
+    **dict.fromkeys(("--std-ms", "--unpaired"), "use it with --difference-ms"),
+    **dict.fromkeys(("--detectors", "--group"), "use it with --std-ms results.json"),
 }

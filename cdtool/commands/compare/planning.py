@@ -127,7 +127,7 @@ def plan(  # noqa: PLR0913  # the public function: a keyword for each setting
         if measured is None:
             raise UsageError(
                 f"a difference of {difference_ms:g} ms without a standard deviation",
-                "give --std-ms 8, or --from results.json of an earlier test",
+                "give --std-ms 8, or --std-ms results.json of an earlier test",
             )
         answers.append(_difference(difference_ms, measured, unpaired, power, level))
     if missed_at_most:

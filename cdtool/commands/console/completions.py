@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
+from importlib import import_module
 
 Complete = Callable[[str], list[str]]
 
@@ -23,11 +24,6 @@ def detector_list(incomplete: str) -> list[str]:
     return _last_of_list(incomplete, detectors)
 
 
-def threshold_list(incomplete: str) -> list[str]:
-    """Return the completions of the last name of a comma-separated list of thresholds."""
-    return _last_of_list(incomplete, thresholds)
-
-
 def thresholds(incomplete: str) -> list[str]:
     """Return the thresholds' names that begin with the typed text."""
     from cdtool.thresholds import THRESHOLDS
@@ -37,15 +33,27 @@ def thresholds(incomplete: str) -> list[str]:
 
 def settings(incomplete: str) -> list[str]:
     """Return the keys of the benchmark file that begin with the typed text, each with the = before its value."""
-    from cdtool.base.settings import alternatives, bare_type, is_model, keys_of
     from cdtool.commands.judging.settings_table import JudgingTable
+    from cdtool.commands.scoring.benchmark_file import SECTIONS
 
-    def keys(model: object, prefix: str) -> Iterable[str]:
-        for name, key in keys_of(model).items():
-            tables = [bare_type(part) for part in alternatives(key.hint) if is_model(bare_type(part))]
-            yield from (f"{prefix}{name}=",) if not tables else keys(tables[0], f"{prefix}{name}.")
+    section = incomplete.partition(".")[0]
+    if section in ("inject", "tune"):
+        return _beginning(incomplete, _keys(SECTIONS.load(section).table, f"{section}."))
+    return _beginning(incomplete, [*_keys(JudgingTable), "threshold.name="])
 
-    return _beginning(incomplete, [*keys(JudgingTable, ""), "threshold.name="])
+
+def keys(place: str) -> Complete:
+    """Return the completion of the keys of a model, named as module:Class, each with the = before its value."""
+    module, _, attribute = place.partition(":")
+    return lambda incomplete: _beginning(incomplete, _keys(getattr(import_module(module), attribute)))
+
+
+def _keys(model: object, prefix: str = "") -> Iterable[str]:
+    from cdtool.base.settings import alternatives, bare_type, is_model, keys_of
+
+    for name, key in keys_of(model).items():
+        tables = [bare_type(part) for part in alternatives(key.hint) if is_model(bare_type(part))]
+        yield from (f"{prefix}{name}=",) if not tables else _keys(tables[0], f"{prefix}{name}.")
 
 
 def operations(incomplete: str) -> list[str]:

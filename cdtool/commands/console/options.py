@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -175,6 +175,11 @@ SetOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+
+
+def keys_option(meaning: str, model: str) -> Any:
+    """Return the option --set of the keys of a model, named as module:Class, with what its help says."""
+    return typer.Option("--set", metavar="KEY=VALUE", help=meaning, autocompletion=completions.keys(model))
 
 
 def listed(text: str) -> tuple[str, ...]:

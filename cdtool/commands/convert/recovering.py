@@ -99,7 +99,7 @@ def recover(
     if surveyed.unverified == surveyed.count and not unverified:
         raise RecordingError(
             f"{source}: none of its {surveyed.count} messages has a checksum",
-            "--unverified keeps them, marked as such",
+            "--recover all keeps them, marked as such",
         )
     kept = surveyed.unverified if unverified else 0
     left_out = surveyed.unverified - kept

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeGuard
 
 import typer
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from cdtool.commands.identify.presses import PressLogs
     from cdtool.execution.workers import Workers
 
+_PAYLOAD = re.compile(r"(?P<mass>[^@:]+?) ?kg(?:@(?P<link>[^:]+))?(?::(?P<centre>.+))?")
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
 _MUCH_MORE = 3.0
 _DOUBT = (
@@ -56,14 +58,8 @@ def identify(
         typer.Option("--loaded-logs", help="Of a robot: logs with a known payload, for torque constants; repeatable."),
     ] = None,
     payload: Annotated[
-        float | None, typer.Option("--payload", help="With --loaded-logs: mass of the payload [kg].")
-    ] = None,
-    payload_link: Annotated[
-        str | None, typer.Option("--payload-link", help="Link that carries the payload. Default: the last one.")
-    ] = None,
-    payload_centre: Annotated[
         str | None,
-        typer.Option("--payload-centre", help="Its centre of mass in the link's frame [m]. Default: not known."),
+        typer.Option("--payload", help="The payload of --loaded-logs: 3.2kg@LINK:X,Y,Z, with its centre of mass [m]."),
     ] = None,
     presses: Annotated[
         list[str] | None,
@@ -90,31 +86,35 @@ def identify(
 
     targets = output or []
     check_identification_files(targets, machine, force=force)
-    loaded = _loaded_runs(loaded_logs, payload, payload_link, payload_centre)
+    loaded = _loaded_runs(loaded_logs or (), payload)
     pressed = _press_logs(presses or (), lever_arm)
     if loaded is not None and pressed is not None:
         raise UsageError("--loaded-logs with --presses", "these are for robots, those for axes")
     _identify_machine(logs, machine, targets, Workers(jobs), loaded or pressed, as_json=as_json, quiet=quiet)
 
 
-def _loaded_runs(
-    logs: Sequence[str] | None, mass: float | None, link: str | None, centre: str | None
-) -> LoadedRuns | None:
-    """Return the runs with a payload; None without any. Raises UsageError for options that do not belong together."""
+def _loaded_runs(logs: Sequence[str], payload: str | None) -> LoadedRuns | None:
+    """Return the runs with a payload; None without any. Raises UsageError for one without the other."""
     from cdtool.commands.identify.identifying_robot import LoadedRuns
 
-    if bool(logs) != (mass is not None):
+    if bool(logs) != (payload is not None):
         raise UsageError("--loaded-logs and --payload belong together", "give both, or neither")
-    if not logs or mass is None:
-        for name, value in (("--payload-link", link), ("--payload-centre", centre)):
-            if value is not None:
-                raise UsageError(f"{name} without --payload", "give --payload and --loaded-logs too")
+    if payload is None:
         return None
-    if not 0.0 < mass < math.inf:
-        raise UsageError(f"--payload is {mass:g}", "give its mass in kg, above 0")
-    if link == "":
-        raise UsageError("--payload-link is empty", "give the name of a link, or leave the option out")
-    return LoadedRuns(tuple(logs), mass, link or "", _centre(centre))
+    found = _PAYLOAD.fullmatch(payload.strip())
+    try:
+        mass = float(found["mass"]) if found else math.nan
+        centre = tuple(map(float, found["centre"].split(","))) if found and found["centre"] else None
+    except ValueError:
+        mass, centre = math.nan, None
+    if found is None or not 0.0 < mass < math.inf or not _is_point(centre):
+        hint = "give it as 3.2kg@hand:0,0,0.06; link and centre of mass [m] may be left out"
+        raise UsageError(f"--payload is '{payload}'", hint)
+    return LoadedRuns(tuple(logs), mass, found["link"] or "", centre)
+
+
+def _is_point(centre: tuple[float, ...] | None) -> TypeGuard[tuple[float, float, float] | None]:
+    return centre is None or (len(centre) == 3 and all(map(math.isfinite, centre)))
 
 
 def _press_logs(presses: Sequence[str], lever_arm: float | None) -> PressLogs | None:
@@ -128,19 +128,6 @@ def _press_logs(presses: Sequence[str], lever_arm: float | None) -> PressLogs | 
     if lever_arm is not None:
         raise UsageError("--lever-arm without --presses", "give logs of presses too")
     return None
-
-
-def _centre(text: str | None) -> tuple[float, float, float] | None:
-    """Return the numbers of --payload-centre, None without it; raises UsageError."""
-    if text is None:
-        return None
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        x = y = z = math.nan
-    if not all(math.isfinite(item) for item in (x, y, z)):
-        raise UsageError(f"--payload-centre is '{text}'", "give three numbers in m separated by commas, as 0,0,0.1")
-    return (x, y, z)
 
 
 def _identify_machine(

@@ -36,7 +36,7 @@ class Missing(Enum):
     REFERENCE_TORQUE = "the torque reference"
     SATURATION = "a motion during which the limit is reached"
     PAYLOAD = "runs with a known payload"
-    PAYLOAD_CENTRE = "the payload's centre of mass (--payload-centre)"
+    PAYLOAD_CENTRE = "the payload's centre of mass (--payload 3.2kg:X,Y,Z)"
     MOTOR_INERTIA = "the motor inertia from its data sheet"
     OTHER_MOTION = "a motion that excites this joint independently of the others"
     MORE_RECORDINGS = "more recordings"

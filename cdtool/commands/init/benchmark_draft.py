@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,7 +65,9 @@ class BenchmarkDraft:
     has_detectors: bool
 
 
-def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Path) -> BenchmarkDraft:
+def draft_benchmark(
+    logs: Sequence[Path], machine_file: MachineFile, folder: Path, impact_free: Collection[Path] = ()
+) -> BenchmarkDraft:
     """Draft a benchmark file in a folder for logs that a machine file can read.
 
     Parameters
@@ -76,6 +78,8 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         Their machine file, in the same folder.
     folder : Path
         Where the benchmark file will be: its paths are relative to it.
+    impact_free : collection of Path, optional
+        The resolved paths of the logs that are known to be impact-free; one that shows a contact is left out.
 
     Returns
     -------
@@ -110,6 +114,12 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         first = first or recording
         shows = any(channel in recording for channel in SHOWS_CONTACTS)
         contacts = len(any_contacts(recording, ScoringRules())) if shows else None
+        if path.resolve() in impact_free:
+            if contacts:
+                reason = f"given as impact-free, but shows {counted(contacts, 'contact')}"
+                skipped.append(Skipped(str(path), reason))
+                continue
+            contacts = 0
         if contacts is None and any(_FREE.search(name) for name in (log_stem(path), path.resolve().parent.name)):
             named_free.append(path)  # without ground truth, its name is what shows that a log has no impact
         known.append(_Log(path, 0 if path in named_free else contacts, _noise(recording)))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdtool.base.errors import UsageError
+from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, leave_with, plain, print_json, print_skipped, with_findings
 from cdtool.commands.console.late_progress import late_progress
 from cdtool.commands.console.logs_argument import logs_argument
@@ -38,6 +39,19 @@ def init(
             "--machine", "-m", parser=location, help="With a folder: use this machine file, draft only the benchmark."
         ),
     ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option("--free", help="Impact-free logs to learn from, or a pattern, as 'free/*.csv'; repeatable."),
+    ] = None,
+    urdf: Annotated[
+        Place | None,
+        typer.Option(
+            "--urdf",
+            parser=location,
+            help="URDF of a robot: draft a urdf_robot with its joints.",
+            autocompletion=completions.files(".urdf"),
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     csv: Annotated[
         list[str] | None,
@@ -54,7 +68,7 @@ def init(
 
     Channels and units are guessed from names and numbers, groups from the ground truth; each guess is marked.
 
-    Example: cdtool init sample_logs/gate/stiff/*.csv -o study
+    Example: cdtool init stiff/*.csv --free 'free/*.csv' -o study
     """
     from cdtool.commands.init.drafting import init as draft
     from cdtool.commands.init.drafting import init_study
@@ -63,11 +77,11 @@ def init(
     if settings and machine is not None:
         raise UsageError("--csv and --machine: both state how tables are read", "write [csv] into the machine file")
     if output.suffix == ".toml":
-        if len(logs) > 1 or machine is not None:
-            what = "--machine" if machine is not None else f"{len(logs)} logs"
+        if len(logs) > 1 or machine is not None or free:
+            what = "--machine" if machine is not None else "--free" if free else f"{len(logs)} logs"
             raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
         with late_progress("analysing the log", quiet=quiet):
-            drafted = draft(logs[0], output, force=force, csv=settings)
+            drafted = draft(logs[0], output, force=force, csv=settings, urdf=urdf)
         if as_json:
             print_json(with_findings(drafted))
         else:
@@ -80,7 +94,7 @@ def init(
         leave_with(drafted.findings)
         return
     with late_progress("analysing the logs", quiet=quiet):
-        study = init_study(logs, output, machine=machine, force=force, csv=settings)
+        study = init_study(logs, output, machine=machine, force=force, csv=settings, free=free or (), urdf=urdf)
     if as_json:
         print_json(asdict(study))
     else:

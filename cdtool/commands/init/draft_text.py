@@ -49,7 +49,8 @@ class UnreadWord:
 class Draft:
     """The content to write: kind of machine, joints, clock, and channels with units.
 
-    `csv` are given settings of `[csv]`; `words` are in columns of numbers, perhaps for missing values.
+    `csv` are given settings of `[csv]`; `words` are in columns of numbers, perhaps for missing values. `robot` are the
+    keys that name a URDF and its joints.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Draft:
     low_pass: LowPassGuess | None = None
     csv: Mapping[str, Any] = field(default_factory=dict)
     words: tuple[UnreadWord, ...] = ()
+    robot: Mapping[str, Any] = field(default_factory=dict)
 
 
 def draft_text(draft: Draft, left_out: Mapping[str, str], reverse: Sequence[Finding]) -> str:
@@ -79,7 +81,7 @@ def draft_text(draft: Draft, left_out: Mapping[str, str], reverse: Sequence[Find
         *_line("name", draft.name),
         *_line("joints", draft.joints, draft.joints_why),
         *_line("coordinates", side.coordinates, *_coordinates_why(side)),
-        *_placeholders(side, len(draft.joints)),
+        *(_robot(draft) if draft.robot else _placeholders(side, len(draft.joints))),
         "",
         *_pinned(draft),
         "[channels.mcap]" if draft.topics else "[channels]",
@@ -207,6 +209,16 @@ def _placeholders(side: Side, joints: int) -> list[str]:
         return made + _line("transmission_ratio", each(1.0), "", text)
     why = f"{side.gear.why}, {side.gear.position} over {side.gear.speed}"
     return made + _line("transmission_ratio", float(f"{side.gear.ratio:.4g}"), why, f"{text}correct if both units are")
+
+
+def _robot(draft: Draft) -> list[str]:
+    checks = {
+        "joint_map": "the joints of the log in the order of the URDF",
+        "locked": "joints that are not in the log, and where they stand [rad or m]",
+    }
+    made = [line for key, value in draft.robot.items() for line in _line(key, value, "", checks.get(key, ""))]
+    inertia = "kg m2 or kg, of rotor and gear, referred to the joint; not in the log; 0 is a placeholder"
+    return made + _line("drive_inertia", [0.0] * len(draft.joints), "", inertia)
 
 
 def _line(key: str, value: object, why: str = "", check: str = "") -> list[str]:

@@ -10,16 +10,18 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from cdtool.base.errors import CdtoolError, RecordingError, UsageError
-from cdtool.base.files.writing import write_text
+from cdtool.base.files.writing import write_text, write_texts
 from cdtool.base.findings import Finding, worst_first
 from cdtool.base.log_names import log_stem
-from cdtool.base.remote.remote_path import location
+from cdtool.base.plain_text import counted
+from cdtool.base.remote.remote_path import location, relative_name
 from cdtool.base.settings import Place
+from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.init.benchmark_draft import draft_benchmark
 from cdtool.commands.init.channel_guess import guess_channels
 from cdtool.commands.init.derived_speed import propose_low_pass
-from cdtool.commands.init.draft_text import Clock, Draft, UnreadWord, draft_text
-from cdtool.commands.init.machine_side import side_of
+from cdtool.commands.init.draft_text import Clock, Draft, UnreadWord, draft_text, toml
+from cdtool.commands.init.machine_side import Side, side_of
 from cdtool.commands.init.names.units import Evidence, fits_as_well, is_si
 from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
 from cdtool.commands.init.speed_ratio import Ratio, ratio_of
@@ -29,7 +31,7 @@ from cdtool.commands.init.unmapped import Unmapped, unmapped_columns
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.information import info
 from cdtool.commands.judging.log_findings import before_contact
-from cdtool.commands.judging.runs import read, several_logs
+from cdtool.commands.judging.runs import find_logs, read, several_logs
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.channels.reading import choose_format, element_names, has_topics, log_parts, with_nanoseconds
 from cdtool.formats.csv import Csv
@@ -37,6 +39,7 @@ from cdtool.formats.csv_dialect.pins import read_pins
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.formats.source import Format, Source
 from cdtool.machines.plausibility import check_channels
+from cdtool.machines.urdf_reader import moving_joints
 from cdtool.results.results import Skipped
 from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.truth.force_vector import with_scalar_force
@@ -71,6 +74,7 @@ def init(
     *,
     force: bool = False,
     csv: Mapping[str, Any] | None = None,
+    urdf: str | Path | None = None,
 ) -> Drafted:
     """Write a draft of a machine file for a log.
 
@@ -84,6 +88,8 @@ def init(
         Replace an existing file.
     csv : mapping, optional
         Keys of `[csv]` for a table that cannot be read without them, as {"header": False}; they are part of the draft.
+    urdf : str or Path, optional
+        The URDF of the robot: the draft is of a urdf_robot with its joints.
 
     Returns
     -------
@@ -109,14 +115,19 @@ def init(
     (True, True, True)
     """
     target = location(output)
-    _refuse_existing(force, target)
-    return _written([location(log)], target, csv or {})
+    _refuse_existing(force, {"machine": target})
+    return _written([location(log)], target, csv or {}, urdf)
 
 
-def _written(logs: Sequence[Path], target: Path, csv: Mapping[str, Any]) -> Drafted:
-    drafted = replace(_settled(logs, _drafted(logs[0], csv)), path=str(target))
-    write_text(target, drafted.text)
-    return drafted
+def _written(logs: Sequence[Path], target: Path, csv: Mapping[str, Any], urdf: str | Path | None) -> Drafted:
+    draft = _drafted(logs[0], csv)
+    draft = draft if urdf is None else _of_robot(draft, location(urdf).absolute())
+    drafted = _settled(logs, draft)
+    # While guesses are settled the draft is elsewhere, and names the URDF by its whole path.
+    text = drafted.text if urdf is None else _with_relative_urdf(drafted.text, location(urdf), target.parent)
+    files = with_schema("machine", target, text)
+    write_texts(files)
+    return replace(drafted, path=str(target), text=files[target])
 
 
 @dataclass(frozen=True, repr=False)
@@ -147,6 +158,8 @@ def init_study(
     machine: str | Path | None = None,
     force: bool = False,
     csv: Mapping[str, Any] | None = None,
+    free: Sequence[str] = (),
+    urdf: str | Path | None = None,
 ) -> DraftedStudy:
     """Write drafts of a machine file and of a benchmark file for some logs into a folder.
 
@@ -162,6 +175,10 @@ def init_study(
         Replace existing files, except a label file.
     csv : mapping, optional
         Keys of `[csv]` of the drafted machine file, for tables that cannot be read without them.
+    free : sequence of str, optional
+        Further logs, or patterns of them, that are impact-free: limits are learned from them.
+    urdf : str or Path, optional
+        The URDF of the robot: the drafted machine file is of a urdf_robot with its joints.
 
     Returns
     -------
@@ -186,23 +203,30 @@ def init_study(
     """
     target, paths = location(folder), [location(log) for log in several_logs(logs)]
     file = target / "benchmark.toml"
-    _refuse_existing(force, file, *([target / "machine.toml"] if machine is None else []))
+    impact_free = find_logs(free, Path(), "--free") if free else []
+    known = {path.resolve() for path in impact_free}
+    paths = [*(path for path in paths if path.resolve() not in known), *impact_free]
+    if urdf is not None and machine is not None:
+        raise UsageError("--urdf and --machine: both describe the machine", "write urdf into the machine file")
+    _refuse_existing(force, {"benchmark": file, **({"machine": target / "machine.toml"} if machine is None else {})})
     target.mkdir(parents=True, exist_ok=True)
-    drafted = None if machine is not None else _written(paths, target / "machine.toml", csv or {})
+    drafted = None if machine is not None else _written(paths, target / "machine.toml", csv or {}, urdf)
     machine_path = location(machine) if machine is not None else target / "machine.toml"
-    made = draft_benchmark(paths, read_machine_file(machine_path), target)
-    write_text(file, made.text)
+    made = draft_benchmark(paths, read_machine_file(machine_path), target, known)
+    files = with_schema("benchmark", file, made.text)
+    write_texts(files)
     kept = tuple(str(target / name) for name in made.beside if (target / name).exists())
     beside = tuple(str(target / name) for name in made.beside if str(target / name) not in kept)
     for name in beside:
         write_text(location(name), made.beside[location(name).name])
     return DraftedStudy(
-        drafted, str(machine_path), str(file), made.text, beside, made.skipped, made.has_detectors, kept
+        drafted, str(machine_path), str(file), files[file], beside, made.skipped, made.has_detectors, kept
     )
 
 
-def _refuse_existing(force: bool, *targets: Path) -> None:
-    for target in targets:
+def _refuse_existing(force: bool, targets: Mapping[str, Path]) -> None:
+    for kind, target in targets.items():
+        refuse_other_schema(kind, target, force=force)
         if target.exists() and not force:
             raise UsageError(f"{target}: already exists", "choose another name with -o, or overwrite it with --force")
 
@@ -343,6 +367,31 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     return Draft(
         log_stem(log), log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words
     )
+
+
+def _of_robot(draft: Draft, urdf: Path) -> Draft:
+    """Return the draft of a urdf_robot: its joints by their names, or else in the order of the URDF.
+
+    Raises ConfigurationError for a URDF that cannot be read, UsageError if it has fewer joints than the log.
+    """
+    names, logged = moving_joints(urdf), draft.joints
+    if len(names) < len(logged):
+        raise UsageError(
+            f"{urdf}: has {counted(len(names), 'moving joint')}, the log {len(logged)}", "give the URDF of this robot"
+        )
+    robot: dict[str, object] = {"urdf": str(urdf)}
+    used = logged if set(logged) <= set(names) else names[: len(logged)]
+    if used != logged:
+        robot["joint_map"] = dict(zip(logged, used, strict=True))
+    if locked := [name for name in names if name not in used]:
+        robot["locked"] = dict.fromkeys(locked, 0.0)
+    side = Side("urdf_robot", "load", "a URDF is given")
+    return replace(draft, side=side, evidence=replace(draft.evidence, side=side), robot=robot)
+
+
+def _with_relative_urdf(text: str, urdf: Path, folder: Path) -> str:
+    """Return the text of a draft that names its URDF relative to the folder of the draft."""
+    return text.replace(toml(str(urdf.absolute())), toml(relative_name(urdf, folder)), 1)
 
 
 def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:

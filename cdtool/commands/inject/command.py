@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress
 from cdtool.commands.console.options import (
     ClusterOption,
+    ForceOption,
     JobsOption,
     JsonOption,
     QuietOption,
     RetriesOption,
+    SetOption,
     TimeoutOption,
+    listed,
 )
 from cdtool.commands.console.place import Place, location
+
+if TYPE_CHECKING:
+    from cdtool.commands.inject.injecting import Injected
 
 
 def inject(
@@ -29,15 +36,21 @@ def inject(
             autocompletion=completions.files(".toml"),
         ),
     ],
-    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder, new or empty.")],
-    file_format: Annotated[
-        str | None,
+    output: Annotated[
+        list[Place] | None,
         typer.Option(
-            "--format",
-            help="csv, mcap or parquet; csv and parquet have one clock.",
-            autocompletion=completions.one_of(("csv", "mcap", "parquet")),
+            "--output",
+            "-o",
+            parser=location,
+            help="A folder for the logs; or the map, repeatable: .html, .json, .png, .svg, .pdf. Default: a table.",
         ),
     ] = None,
+    force: ForceOption = False,
+    detectors: Annotated[
+        str | None,
+        typer.Option("--detectors", help="Detectors instead of the file's.", autocompletion=completions.detector_list),
+    ] = None,
+    settings: SetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
@@ -45,36 +58,58 @@ def inject(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Put simulated contacts into impact-free logs: every channel changes as it would, and the onset is exact.
+    """Put simulated contacts into impact-free logs, and write these logs, or map where the machine notices them.
 
-    The machine file needs a table [model], see docs/injection.md.
+    Every channel changes as it would, and the onset is exact; the machine file needs a table [model]. The map has
+    latency, force and misses over position and stiffness of the obstacle.
 
-    Example: cdtool inject benchmark.toml -o injected
+    Example: cdtool inject inject.toml -o injected
+
+    Example: cdtool inject coverage.toml -o map.html -o map.png
     """
-    from cdtool.base.errors import UsageError, nearest
-    from cdtool.commands.inject.inject_section import FORMATS
-    from cdtool.commands.inject.injecting import inject as run
+    from cdtool.commands.inject.coverage.coverage import coverage
+    from cdtool.commands.inject.coverage.files import PAGE, check_coverage_files, coverage_summary, write_coverage
+    from cdtool.commands.inject.coverage.shown import show_coverage
+    from cdtool.commands.inject.injecting import inject as write_logs
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.execution.workers import Workers
 
-    if file_format is not None and file_format not in FORMATS:
-        raise UsageError(f"--format is '{file_format}'", nearest(file_format, FORMATS))
-    with progress("injecting", quiet=quiet) as advance:
-        done = run(
-            file,
-            output,
-            file_format=file_format,
-            workers=Workers(jobs, timeout, retries, cluster),
-            progress=advance,
+    targets, workers = output or [], Workers(jobs, timeout, retries, cluster)
+    names, given = listed(detectors or ""), given_settings(settings or ())
+    folders = [target for target in targets if not target.suffix]
+    if folders and len(targets) > 1:
+        raise UsageError(f"--output is {plain(folders[0])} and others", "give one folder, or the files of a map")
+    if folders:
+        with progress("injecting", quiet=quiet) as advance:
+            made = write_logs(file, folders[0], detectors=names, settings=given, workers=workers, progress=advance)
+        print_skipped(made.skipped, ())
+        if as_json:
+            print_json(made)
+        else:
+            _show_logs(made)
+        leave(made.skipped)
+        return
+    check_coverage_files(targets, [file], force=force)
+    with_traces = any(target.suffix.lower() == PAGE for target in targets)
+    with progress("coverage", quiet=quiet) as advance:
+        done = coverage(
+            file, detectors=names, settings=given, with_traces=with_traces, workers=workers, progress=advance
         )
-    print_skipped(done.skipped, ())
+    print_skipped(done.skipped, done.findings)
+    write_coverage(done, targets)
     if as_json:
-        print_json(done)
+        print_json(coverage_summary(done))
     else:
-        groups = dict.fromkeys(case.group for case in done.logs.cases)
-        typer.echo(f"{plain(done.folder)}: {counted(len(done.logs.cases), 'injected contact')} in {', '.join(groups)}")
-        doubts = dict.fromkeys(doubt for case in done.logs.cases for doubt in case.doubts)
-        for doubt in doubts:
-            many = sum(doubt in case.doubts for case in done.logs.cases)
-            typer.echo(f"note: {doubt.replace('_', ' ')}: {many} of {len(done.logs.cases)}")
-        typer.echo(f"written: {plain(done.folder)}/benchmark.toml, with {counted(done.copied, 'impact-free log')}")
+        show_coverage(done, quiet=quiet)
+        for target in () if quiet else targets:
+            typer.echo(f"written: {plain(target)}")
     leave(done.skipped)
+
+
+def _show_logs(made: Injected) -> None:
+    groups = dict.fromkeys(case.group for case in made.logs.cases)
+    typer.echo(f"{plain(made.folder)}: {counted(len(made.logs.cases), 'injected contact')} in {', '.join(groups)}")
+    for doubt in dict.fromkeys(doubt for case in made.logs.cases for doubt in case.doubts):
+        many = sum(doubt in case.doubts for case in made.logs.cases)
+        typer.echo(f"note: {doubt.replace('_', ' ')}: {many} of {len(made.logs.cases)}")
+    typer.echo(f"written: {plain(made.folder)}/benchmark.toml, with {counted(made.copied, 'impact-free log')}")

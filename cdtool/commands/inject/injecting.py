@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ from cdtool.base.version import __version__
 from cdtool.commands.inject.inject_section import InjectSection
 from cdtool.commands.inject.injected_logs import CONTACTS, InjectedLogs, write_injected, write_recording
 from cdtool.commands.inject.with_injected import mark_as_made, section_of
-from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.commands.judging.settings_table import apply_settings
+from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.reading import read_as_logged
@@ -50,7 +51,8 @@ def inject(
     file: str | Path,
     output: str | Path,
     *,
-    file_format: str | None = None,
+    detectors: Sequence[str] = (),
+    settings: Mapping[str, Any] | None = None,
     workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Injected:
@@ -63,8 +65,10 @@ def inject(
     output : str or Path
         A new or empty folder: a group of recordings per obstacle, contacts.csv with the exact contacts, injected.json
         with the origin of each, copies of the logs to learn from, and machine.toml and benchmark.toml for all of them.
-    file_format : str, optional
-        Suffix of the recordings, such as "csv" or "mcap"; that of the section by default.
+    detectors : sequence of str, optional
+        Detectors in place of the file's, for the written benchmark file.
+    settings : mapping, optional
+        Values in place of keys of the file, as {"inject.format": "mcap"}.
     workers : Workers, optional
         How the work is done; in this process by default.
     progress : callable, optional
@@ -91,10 +95,11 @@ def inject(
     >>> len(done.logs.cases), done.logs.cases[0].group
     (32, 'injected_stiff')
     """
-    setup = read_benchmark_file(file)
+    setup = read_benchmark_file(file, settings=settings)
+    if detectors:
+        setup = with_detectors(setup, detectors)
+        setup = replace(setup, settings={**setup.settings, "detectors": list(setup.detectors)})
     section = section_of(setup)
-    if file_format is not None:
-        section = replace(section, file_format=file_format)
     folder = location(output)
     require_free_folder(folder)
     with replaced_folder(folder) as part:
@@ -140,7 +145,7 @@ def _write_benchmark(
 ) -> None:
     import tomlkit
 
-    given = read_toml(setup.path, "a benchmark file")
+    given = apply_settings(read_toml(setup.path, "a benchmark file"), setup.settings)
     values: dict[str, Any] = {"machine": "machine.toml"}
     values |= {key: value for key, value in given.items() if key not in _OF_LOGS}
     values.setdefault("detectors", list(setup.detectors))

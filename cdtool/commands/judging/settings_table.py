@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import UsageError
 from cdtool.base.files.bounded_loading import ContentError, parse_toml
-from cdtool.base.settings import NotNegative, Positive, setting
+from cdtool.base.settings import Model, NotNegative, Place, Positive, read, setting
 from cdtool.commands.judging.named_logs import OnsetTable
 from cdtool.thresholds.signature import Signature
 
@@ -88,6 +88,16 @@ def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> di
     return found
 
 
+def read_settings(model: type[Model], texts: Iterable[str]) -> Model:
+    """Return the model with the values of --set KEY=VALUE; raises ConfigurationError with every mistake."""
+    given = given_settings(texts)
+    place = Place("--set", by_option={key: f"--set {key}" for key in given})
+    found = read(model, apply_settings({}, given), place)
+    place.finish()
+    assert found is not None, "without a mistake the model is made"
+    return found
+
+
 def given_settings(texts: Iterable[str]) -> dict[str, Any]:
     """Return the values of --set KEY=VALUE, as TOML has them; a bare word is a text. Raises UsageError.
 
@@ -98,7 +108,7 @@ def given_settings(texts: Iterable[str]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
-            hint = "give KEY=VALUE, as activation.debounce=9; docs/benchmark-file.md has the keys"
+            hint = "give KEY=VALUE; the page of the command in docs/ has the keys"
             raise UsageError(f"--set is '{text}'", hint)
         try:
             found[name] = parse_toml(f"value = {value}")["value"]

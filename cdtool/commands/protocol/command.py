@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from cdtool.commands.protocol.checking import CheckedProtocol
 
 protocol = typer.Typer(
-    help="Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies.",
+    help="Draft and check the file of a test protocol, and write it; cdtool benchmark -p adds latencies.",
     no_args_is_help=True,
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
 )
 _FACTS: Mapping[str, tuple[Fact, ...]] = {"fail": (Fact.FORCE_VIOLATED,), "incomplete": (Fact.INCOMPLETE,), "pass": ()}
 _SHOWN = 10
@@ -32,10 +32,12 @@ _SHOWN = 10
 
 @protocol.callback()
 def _protocol() -> None:
-    """Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies."""
+    """Draft and check the file of a test protocol, and write it; cdtool benchmark -p adds latencies."""
 
 
-@protocol.command("init", epilog=statuses_words("protocol init"))
+@protocol.command(
+    "init", short_help="Draft a protocol file from a benchmark file.", epilog=statuses_words("protocol init")
+)
 def init(
     benchmark: Annotated[
         Place | None,
@@ -60,7 +62,9 @@ def init(
     typer.echo(f"  cdtool protocol check {_quoted(drafted.path)}")
 
 
-@protocol.command("check", epilog=statuses_words("protocol check"))
+@protocol.command(
+    "check", short_help="List what is missing in a protocol file.", epilog=statuses_words("protocol check")
+)
 def check(
     file: Annotated[
         Place,
@@ -89,7 +93,9 @@ def check(
     leave(facts=[Fact.INCOMPLETE] if reasons else [])
 
 
-@protocol.command("write", epilog=statuses_words("protocol write"))
+@protocol.command(
+    "write", short_help="Write the protocol without running detectors.", epilog=statuses_words("protocol write")
+)
 def write(
     file: Annotated[
         Place,
@@ -103,7 +109,7 @@ def write(
 ) -> None:
     """Write the protocol without running detectors, for recordings of a force rig that have only a force.
 
-    `cdtool benchmark -p` writes the same with their latencies. Exits with 1 if it fails and 4 if it is incomplete.
+    cdtool benchmark -p writes the same with their latencies. Exits with 1 if it fails and 4 if it is incomplete.
 
     Example: cdtool protocol write sample_logs/gate/protocol.toml -o protocol.html
     """

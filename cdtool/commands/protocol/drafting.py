@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from cdtool.base.errors import UsageError
-from cdtool.base.files.writing import write_text
+from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import relative_name
+from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.judging.matched_log import CutLog
 from cdtool.commands.protocol.assessment.plan import (
     FILL_IN,
@@ -89,6 +90,7 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
         raise UsageError(f"--output is {output}", "give a name that ends in .toml")
     if output.exists() and not force:
         raise UsageError(f"{output}: already exists", "choose another name, or overwrite it with --force")
+    refuse_other_schema("protocol", output, force=force)
     setup = read_benchmark_file(benchmark, learning=False, detectors=["all"]) if benchmark is not None else None
     points = _points(setup, output.parent) if setup else []
     read = {point.name: list(_read(setup, point.logs)) for point in points} if setup else {}
@@ -113,9 +115,9 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
         lines += _table("[[protocol.point]]", MeasuringPoint, empty)
     lines += ["", "# [[protocol.deviation]]", '# text = ""', '# reason = ""']
     lines += ["", "# [[protocol.exclusion]]", '# logs = ["point_1/03.csv"]', '# reason = ""']
-    text = "\n".join(lines) + "\n"
-    write_text(output, text)
-    return DraftedProtocol(output, text, sum(f"# {FILL_IN}" in line for line in lines[1:]))
+    written = with_schema("protocol", output, "\n".join(lines) + "\n")
+    write_texts(written)
+    return DraftedProtocol(output, written[output], sum(f"# {FILL_IN}" in line for line in lines[1:]))
 
 
 def _points(setup: BenchmarkFile, folder: Path) -> list[_Point]:

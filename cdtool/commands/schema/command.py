@@ -8,7 +8,6 @@ import typer
 
 from cdtool.base.errors import UsageError, nearest
 from cdtool.commands.console.completions import one_of
-from cdtool.commands.console.console import print_json
 
 _KINDS = ("machine", "benchmark", "protocol")
 
@@ -24,6 +23,6 @@ def schema(
     """
     if kind not in _KINDS:
         raise UsageError(f"unknown kind '{kind}'", nearest(kind, _KINDS))
-    from cdtool.commands.schema.json_schema import schema_of
+    from cdtool.commands.console.json_schema import schema_text
 
-    print_json(schema_of(kind))
+    typer.echo(schema_text(kind), nl=False)

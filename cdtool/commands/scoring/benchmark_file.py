@@ -94,12 +94,13 @@ class MadeGroups(Protocol):
         ...
 
 
-# The sections that a command of their own reads and carries out: groups of logs, and documents of the results.
+# The sections that a command of their own reads and carries out: groups of logs, documents, searches.
 SECTIONS = Registry(
     "section",
     {
         "inject": "cdtool.commands.inject.with_injected:InjectedGroups",
         "protocol": "cdtool.commands.protocol.of_benchmark:ProtocolOfBenchmark",
+        "tune": "cdtool.commands.tune.options:TuningOptions",
     },
 )
 
@@ -180,6 +181,7 @@ class BenchmarkTable(JudgingTable):
     )
     inject: Annotated[dict[str, Any] | None, setting("contacts that are put into impact-free logs")] = None
     protocol: Annotated[dict[str, Any] | None, setting("the test protocol of the benchmark")] = None
+    tune: Annotated[dict[str, Any] | None, setting("what cdtool tune minimises and tries")] = None
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ class BenchmarkFile:
     their first contact; None: they have no contact. `split`: which runs stay together where runs set a limit for
     others. `made`: the groups that a command makes before they are scored; `not_made`: their logs and contacts that
     were left out. `force_limits`: the file of the force profiles; None: the shipped ones. `settings`: what took the
-    place of keys of the file.
+    place of keys of the file. `tune`: the section [tune]; None: it has none.
     """
 
     path: Path
@@ -228,6 +230,7 @@ class BenchmarkFile:
     not_made: tuple[Skipped, ...] = ()
     force_limits: Path | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
+    tune: Any = None
 
     def with_made(self, workers: Workers, progress: Progress | None = None) -> BenchmarkFile:
         """Return the benchmark with the groups that a command makes for it; unchanged without one."""
@@ -474,6 +477,7 @@ def _resolved(
         made=made,
         force_limits=_force_limits(table.force, file.parent),
         settings=settings,
+        tune=None if table.tune is None else read(SECTIONS.load("tune").table, table.tune, place.below("tune")),
     )
     for joint in table.joints:
         if joint not in machine.joints:

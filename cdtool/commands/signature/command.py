@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 signature = typer.Typer(
     help="Show a signature, check it against runs, add runs to it.",
     no_args_is_help=True,
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
 )
 
 

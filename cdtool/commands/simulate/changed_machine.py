@@ -6,9 +6,12 @@ The position of an obstacle, the travel of a free stroke and the time that is lo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from typing import Annotated
 
-from cdtool.base.errors import UsageError
+from msgspec import Meta
+
+from cdtool.base.settings import Positive, check, setting
 from cdtool.commands.simulate.arm_model import ArmRun
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Array, Pair
 from cdtool.commands.simulate.gate_model import GateParameters, GateRun
@@ -16,36 +19,31 @@ from cdtool.commands.simulate.gate_model import GateParameters, GateRun
 # The flux of neodymium magnets falls by this share per kelvin [1/K] (temperature coefficient of their remanence).
 FLUX_PER_KELVIN = -1.1e-3
 
-_FACTORS = ("friction", "speed", "mass")
-
 
 @dataclass(frozen=True)
 class ChangedMachine:
     """What has changed, as factors of the unchanged machine or in units; the defaults are no change.
 
-    `friction`: factor of all friction of the load [-]. `speed`: factor of the nominal speed [-]. `mass`: factor of the
-    load's mass, of an arm that of both links and their inertias [-]. `current_offset` [A]: added to the logged motor
-    current, of an arm to those of both motors. `acceleration_offset` [m/s2]: added to the accelerometers. `warming`
-    [K]: of the motor, whose magnets weaken by 0.11 %/K, so that the same torque needs more current. Raises UsageError
-    for a factor that is not above 0, a value that is not finite, and a motor that is warmer by 300 K or more.
+    Raises UsageError for a value outside its range.
     """
 
-    friction: float = 1.0
-    speed: float = 1.0
-    mass: float = 1.0
-    current_offset: float = 0.0
-    acceleration_offset: float = 0.0
-    warming: float = 0.0
+    friction: Annotated[Positive, setting("factor of the load's Coulomb, static and viscous friction")] = 1.0
+    speed: Annotated[
+        Positive, setting("factor of the nominal speed; the obstacle and the time after a contact stay")
+    ] = 1.0
+    mass: Annotated[
+        Positive, setting("factor of the load's mass: of the leaf, or of both links with their inertias")
+    ] = 1.0
+    current_offset: Annotated[float, setting("added to the logged motor current, of every motor", unit="A")] = 0.0
+    acceleration_offset: Annotated[float, setting("added to the accelerometers", unit="m/s2")] = 0.0
+    warming: Annotated[
+        float,
+        Meta(gt=-300.0, lt=300.0),
+        setting("of the motor: its magnets weaken by 0.11 %/K, the current for a torque rises", unit="K"),
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if not math.isfinite(value):
-                raise UsageError(f"{item.name} is {value:g}", "give a finite number")
-            if item.name in _FACTORS and value <= 0.0:
-                raise UsageError(f"{item.name} is {value:g}", "give a factor above 0; 1.2: 20 % more")
-        if abs(self.warming) >= 300.0:
-            raise UsageError(f"warming is {self.warming:g} K", "give a change below 300 K")
+        check(self)
 
     @property
     def current_factor(self) -> float:

@@ -66,9 +66,9 @@ def without_references(machine_toml: str) -> str:
 def without_benchmark(counts: Mapping[str, int]) -> str:
     """Return why recordings of so many runs of each group make no benchmark; empty where they do."""
     if counts.get("free", 0) < _LEAST_RUNS:
-        return f"a benchmark learns from {_LEAST_RUNS} runs or more: --free"
+        return f"a benchmark learns from {_LEAST_RUNS} runs or more: --set free=10"
     if not any(counts.get(group, 0) for group in GROUPS if group != "free"):
-        return "a benchmark needs logs to score: --holdout, --stiff or --soft"
+        return "a benchmark needs logs to score: set holdout, stiff or soft"
     return ""
 
 
@@ -88,7 +88,7 @@ def write_folder(
     """
     planned = list(_plan(counts, file_format))
     if not planned:
-        raise UsageError("no recording is requested", "give a number above 0 for --free, --holdout, --stiff or --soft")
+        raise UsageError("no recording is requested", "give a number above 0 for free, holdout, stiff or soft")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} exists and is not an empty folder", "choose another --output")
     with replaced_folder(folder) as part:

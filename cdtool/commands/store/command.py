@@ -17,7 +17,7 @@ from cdtool.commands.console.place import Place, location
 store = typer.Typer(
     help="Show what a store of benchmark outcomes contains, and remove what is no longer used.",
     no_args_is_help=True,
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
 )
 
 

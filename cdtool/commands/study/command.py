@@ -9,15 +9,13 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import statuses_words
 from cdtool.commands.console.console import number, plain, print_json, table
-from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption
+from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption, keys_option
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
     from cdtool.commands.study.study import SensorStudy
 
-study = typer.Typer(
-    help="Study an impact before the machine is built.", no_args_is_help=True, rich_markup_mode="markdown"
-)
+study = typer.Typer(help="Study an impact before the machine is built.", no_args_is_help=True, rich_markup_mode=None)
 
 NOT_SEEN = "not seen"
 
@@ -27,7 +25,9 @@ def _study() -> None:
     """Study an impact before the machine is built."""
 
 
-@study.command("sensors", epilog=statuses_words("study sensors"))
+@study.command(
+    "sensors", short_help="Rank the sensors by when they detect an impact.", epilog=statuses_words("study sensors")
+)
 def sensors(
     machine: MachineOption,
     file: Annotated[
@@ -36,29 +36,24 @@ def sensors(
             "--study", parser=location, help="TOML: [impact], [drive], [controller], [sensors.*]; docs/study.md."
         ),
     ] = None,
-    joint: Annotated[str, typer.Option("--joint", help="Joint to study; required if there are several.")] = "",
-    speed: Annotated[float | None, typer.Option("--speed", help="Load speed at contact [m/s].")] = None,
-    stiffness: Annotated[float | None, typer.Option("--stiffness", help="Obstacle stiffness [N/m].")] = None,
-    lever: Annotated[
-        float | None,
-        typer.Option("--lever", help="Rotary axis, arm, robot: distance from the axis to the contact [m]."),
+    settings: Annotated[
+        list[str] | None,
+        keys_option(
+            "A key of the study file in place of its value, repeatable, as impact.speed=0.2.",
+            "cdtool.commands.study.study_file:StudyTable",
+        ),
     ] = None,
-    drive_stiffness: Annotated[
-        float | None, typer.Option("--drive-stiffness", help="Drive stiffness at the load [N/m, N m/rad].")
-    ] = None,
-    factor: Annotated[
-        float, typer.Option("--k", help="Detection limit: k sigma of the noise plus the resolution.")
-    ] = 5.0,
-    as_json: JsonOption = False,
     output: Annotated[
         Place | None, typer.Option("--output", "-o", parser=location, help="A figure: .png, .svg, .pdf.")
     ] = None,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Rank the sensors by when they detect an impact, with the force and the limiting factor (thesis figure 4.10).
 
-    Example: cdtool study sensors -m sample_logs/gate/machine.toml --speed 0.2 --stiffness 5e5
+    Example: cdtool study sensors -m sample_logs/gate/machine.toml --set impact.speed=0.2
     """
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.study.study import study_sensors
 
     if output:
@@ -68,14 +63,7 @@ def sensors(
         if output.suffix.lower() not in SUFFIXES:
             raise UsageError(f"--output is '{output}'", f"the name must end in {', '.join(SUFFIXES)}")
         refuse_foreign_figure(output, force=force)
-    given = {
-        "impact.speed": speed,
-        "impact.stiffness": stiffness,
-        "impact.lever": lever,
-        "drive.stiffness": drive_stiffness,
-    }
-    options = {key: value for key, value in given.items() if value is not None}
-    done = study_sensors(machine, file, joint=joint, factor=factor, options=options)
+    done = study_sensors(machine, file, settings=given_settings(settings or ()))
     if output:
         from cdtool.commands.study.sensor_plot import plot_ranking
 
@@ -86,11 +74,10 @@ def sensors(
         _show(done)
 
 
-@study.command("figures", epilog=statuses_words("study figures"))
+@study.command("figures", short_help="Draw the thesis's figures of impacts.", epilog=statuses_words("study figures"))
 def figures(
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")],
     force: ForceOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Draw the thesis's figures of impacts: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
 
@@ -98,11 +85,7 @@ def figures(
     """
     from cdtool.commands.study.impact_plots import draw_impact_figures
 
-    written = draw_impact_figures(output, force=force)
-    if as_json:
-        print_json([str(path) for path in written])
-        return
-    for path in written:
+    for path in draw_impact_figures(output, force=force):
         typer.echo(plain(path))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from cdtool.commands.study.study_file import read_study
 from cdtool.formats.machine_file import read_machine_file
@@ -34,9 +35,7 @@ def study_sensors(
     machine: str | Path,
     study: str | Path | None = None,
     *,
-    joint: str = "",
-    factor: float = 5.0,
-    options: Mapping[str, float] | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> SensorStudy:
     """Rank the sensors of a machine by how early they respond to an impact.
 
@@ -45,13 +44,9 @@ def study_sensors(
     machine : str or Path
         The machine file.
     study : str or Path, optional
-        A TOML file with the tables [impact], [drive], [controller] and [sensors.NAME].
-    joint : str, optional
-        The joint of an arm or robot that is hit while the others are at rest.
-    factor : float, optional
-        k: a sensor has responded when its value exceeds k standard deviations of its noise.
-    options : mapping of str to float, optional
-        Values by key, such as {"impact.speed": 0.2}; they take precedence over the file.
+        A TOML file with joint, k and the tables [impact], [drive], [controller] and [sensors.NAME].
+    settings : mapping, optional
+        Values in place of keys of the file, as {"impact.speed": 0.2}.
 
     Returns
     -------
@@ -77,8 +72,8 @@ def study_sensors(
     ['load_cell', 'accelerometer', 'torque_sensor', 'motor_position', 'motor_speed', 'motor_torque']
     """
     file = read_machine_file(machine)
-    found = read_study(file, study, joint, options)
-    ranking = rank_sensors(found.case, found.sensors, factor)
+    found = read_study(file, study, settings)
+    ranking = rank_sensors(found.case, found.sensors, found.factor)
     frequency = found.first_frequency
     waves = None if frequency is None else check_waves(ranking.swing_duration, frequency)
     return SensorStudy(file.machine.name, found.joint, ranking, waves, found.assumptions)

@@ -17,7 +17,8 @@ from msgspec import Meta
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.remote.remote_path import location
-from cdtool.base.settings import NotNegative, Place, Positive, read
+from cdtool.base.settings import NotNegative, Place, Positive, read, setting
+from cdtool.commands.judging.settings_table import apply_settings
 from cdtool.formats.machine_file import MachineFile
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
 from cdtool.impact.drives import SpeedController
@@ -119,6 +120,12 @@ class SensorsTable:
 class StudyTable:
     """A study file as it is written; docs/study.md has the meaning of each key and its default."""
 
+    joint: Annotated[
+        str, setting("the joint that is hit while the others are at rest; required if there are several")
+    ] = ""
+    factor: Annotated[
+        Positive, setting("a sensor has responded beyond this many standard deviations of its noise", key="k")
+    ] = 5.0
     impact: ImpactTable = ImpactTable()
     drive: DriveTable = DriveTable()
     controller: ControllerTable = ControllerTable()
@@ -130,43 +137,30 @@ class Study:
     """What to simulate and rank, the load's first natural frequency [Hz] if known, and the assumptions made."""
 
     joint: str
+    factor: float
     case: ImpactCase
     sensors: tuple[Sensor, ...]
     first_frequency: float | None
     assumptions: tuple[str, ...]
 
 
-def read_study(
-    machine: MachineFile, file: str | Path | None, joint: str = "", options: Mapping[str, float] | None = None
-) -> Study:
-    """Read the impact and the sensors; `options` by key (impact.speed) override the file.
+def read_study(machine: MachineFile, file: str | Path | None, settings: Mapping[str, Any] | None = None) -> Study:
+    """Read the impact and the sensors; `settings` take the place of keys of the file, as "impact.speed".
 
     Raises UsageError, or ConfigurationError naming file and key; the inertias are required.
     """
-    options = options or {}
-    for name, value in options.items():
-        if not 0.0 < value < math.inf:
-            raise UsageError(f"{name} is {value:g}", "give a number above 0")
-    place = Place(str(file or "study"))
-    table = read(StudyTable, _merged(read_toml(location(file), "a study file") if file else {}, options), place)
+    given = settings or {}
+    place = Place(str(file or "study"), by_option={key: f"--set {key}" for key in given})
+    values = read_toml(location(file), "a study file") if file else {}
+    table = read(StudyTable, apply_settings(values, given), place)
     place.finish()
     assert table is not None
     reader = StudyReader(table)
-    part = _studied_joint(machine, joint, reader)
+    part = _studied_joint(machine, table.joint, reader)
     case = _case(part, reader)
     frequency = reader.optional("impact", "first_frequency", "the load is rigid except for its drive")
     sensors = _sensors(part, reader)
-    return Study(part.name, case, sensors, frequency, tuple(reader.assumed))
-
-
-def _merged(values: dict[str, Any], options: Mapping[str, float]) -> dict[str, Any]:
-    merged = dict(values)
-    for name, value in options.items():
-        table, _, key = name.partition(".")
-        known = merged.get(table, {})
-        if isinstance(known, dict):
-            merged[table] = {**known, key: value}
-    return merged
+    return Study(part.name, table.factor, case, sensors, frequency, tuple(reader.assumed))
 
 
 def _case(part: StudiedJoint, reader: StudyReader) -> ImpactCase:
@@ -337,7 +331,7 @@ def _studied_joint(file: MachineFile, wanted: str, reader: StudyReader) -> Studi
         )
     if not wanted and len(machine.joints) > 1:
         names = ", ".join(machine.joints)
-        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"select one with --joint: {names}")
+        raise UsageError(f"{file.path} has {len(machine.joints)} joints", f"set joint to one of them: {names}")
     if wanted and wanted not in machine.joints:
         raise UsageError(f"{file.path} has no joint '{wanted}'", nearest(wanted, machine.joints))
     at = machine.joints.index(wanted) if wanted else 0
@@ -372,7 +366,7 @@ def _lever(machine: JointMachine, rotary: bool, reader: StudyReader) -> float:
             raise UsageError("a lever is given for a linear axis", "use it only for a rotary axis")
         return 1.0
     if not given and not isinstance(machine, Axis):
-        raise UsageError("no lever is given", "give --lever, the distance from the joint's axis to the contact [m]")
+        raise UsageError("no lever is given", "set impact.lever, the distance from the joint's axis to the contact [m]")
     return reader.number("impact", "lever", 1.0, "m", "contact to axis")
 
 

@@ -47,37 +47,6 @@ def tune(
             autocompletion=completions.detector_list,
         ),
     ] = None,
-    thresholds: Annotated[
-        str | None,
-        typer.Option(
-            "--thresholds",
-            help="Thresholds to try, as signature,glr. Default: all.",
-            autocompletion=completions.threshold_list,
-        ),
-    ] = None,
-    objective: Annotated[
-        str,
-        typer.Option(
-            "--objective",
-            help="latency (mean), p95, or force (mean force at the alarm).",
-            autocompletion=completions.one_of(("latency", "p95", "force")),
-        ),
-    ] = "latency",
-    impacts: Annotated[
-        str | None,
-        typer.Option(
-            "--impacts",
-            help="real, injected or both, if the file has both kinds.",
-            autocompletion=completions.one_of(("real", "injected", "both")),
-        ),
-    ] = None,
-    worse_at_most: Annotated[
-        float, typer.Option("--worse-at-most", min=0.0, help="Share by which a group may get worse than by default.")
-    ] = 0.1,
-    shortest_debounce: Annotated[
-        float, typer.Option("--shortest-debounce", min=0.0, help="Shortest debounce to try [ms].")
-    ] = 3.0,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Decides which recordings assess which others.")] = 0,
     settings: SetOption = None,
     force: ForceOption = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of candidates to measure in parallel.")] = 1,
@@ -85,6 +54,8 @@ def tune(
     as_json: JsonOption = False,
 ) -> None:
     """Tune gains, threshold and debounce at a false-alarm budget, with results on recordings not used for the choice.
+
+    Keys of [tune] say what is minimised and tried, as --set tune.objective=p95; docs/tuning.md has all of them.
 
     Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
     """
@@ -98,19 +69,9 @@ def tune(
     from cdtool.results.results import Skipped
 
     names = listed(detectors or "")
-    options = TuningOptions(
-        false_alarm_budget,
-        detectors=names,
-        thresholds=listed(thresholds or ""),
-        objective=objective,
-        impacts=impacts,
-        worse_at_most=worse_at_most,
-        shortest_debounce=1e-3 * shortest_debounce,
-        seed=seed,
-        workers=Workers(jobs),
-        watch=_unwatched if quiet else _watch,
-    )
     setup = read_benchmark_file(file, detectors=names, settings=given_settings(settings or ()))
+    watch = _unwatched if quiet else _watch
+    options = TuningOptions.of(setup, false_alarm_budget, detectors=names, workers=Workers(jobs), watch=watch)
     searches = open_folder(output, setup.inputs, setup.detectors, force=force)
     with progress("reading", quiet=quiet) as advance:
         done = tune_detectors(setup, replace(options, journals=searches, progress=advance))

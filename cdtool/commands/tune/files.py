@@ -11,6 +11,7 @@ from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import plain
 from cdtool.base.remote.remote_path import is_remote
+from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.tune.tuned_files import (
     LABELS,
     LABELS_MARK,
@@ -55,6 +56,8 @@ def check_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] 
         kinds[folder / f"benchmark_{name}.toml"] = _KINDS[".toml"]
         kinds[folder / signature_name(name)] = SIGNATURE
     refuse_inputs(kinds, inputs)
+    for schema in ("machine", "benchmark"):
+        refuse_other_schema(schema, folder / MACHINE, force=force)
     for target, kind in kinds.items():
         refuse_other_kind(target, kind, force=force)
 
@@ -74,10 +77,10 @@ def write_tuning(tuning: Tuning, folder: Path) -> tuple[Path, ...]:
     from cdtool.commands.tune.page import tuning_html
 
     learned = {tuned.detector: tuned_signature(tuning, tuned).signature for tuned in tuning.detectors}
-    texts = {folder / MACHINE: machine_text(tuning, folder)}
+    texts = with_schema("machine", folder / MACHINE, machine_text(tuning, folder))
     for name, tuned in files_of(tuning):
         factor = learned[tuned.detector].current[0].safety_factor
-        texts[folder / name] = benchmark_text(tuning, tuned, factor, folder)
+        texts |= with_schema("benchmark", folder / name, benchmark_text(tuning, tuned, factor, folder))
     texts[folder / PAGE] = tuning_html(tuning)
     texts[folder / JSON] = strict_json(tuning_summary(tuning)) + "\n"
     if (labels := labels_text(tuning, folder)) is not None:

@@ -1,20 +1,21 @@
-"""How detectors are tuned: the settings of `cdtool tune`."""
+"""How detectors are tuned: the section [tune] of a benchmark file, and what else `cdtool tune` is given."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
 
 from cdtool.base.errors import UsageError, nearest
+from cdtool.base.settings import CountFromZero, NotNegative, setting
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.tune.search.grid import SHORTEST_DEBOUNCE
 from cdtool.commands.tune.search.objective import WORSE_AT_MOST, Goal
 from cdtool.execution.workers import Progress, Workers
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.thresholds import THRESHOLDS
 
-# Which contacts a detector is tuned on.
-IMPACTS = ("real", "injected", "both")
 # Called after each round of a search: the detector, the candidates measured so far, and the best so far in words.
 Watch = Callable[[str, int, str], None]
 
@@ -23,45 +24,57 @@ def unwatched(detector: str, count: int, best: str) -> None:
     """Ignore a round of a search."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class TuneTable:
+    """[tune]: what is minimised, and what is tried."""
+
+    objective: Annotated[
+        Goal, setting("what is minimised: mean latency, its 95th percentile, or the mean force at the alarm")
+    ] = Goal.LATENCY
+    thresholds: Annotated[tuple[str, ...], setting("the thresholds to try; default: all")] = ()
+    impacts: Annotated[
+        Literal["real", "injected", "both"] | None,
+        setting("the contacts to tune on; required if the file has real and injected ones"),
+    ] = None
+    worse_at_most: Annotated[
+        NotNegative, setting("share by which a group of contacts may get worse than by default")
+    ] = WORSE_AT_MOST
+    shortest_debounce_ms: Annotated[NotNegative, setting("the shortest debounce to try", unit="ms")] = (
+        1e3 * SHORTEST_DEBOUNCE
+    )
+    seed: Annotated[CountFromZero, setting("decides which recordings assess which others")] = 0
+
+    def __post_init__(self) -> None:
+        known = THRESHOLDS.usable_names() if self.thresholds else []
+        for name in self.thresholds:
+            if name not in known:
+                hint = 'give a list, as ["signature", "glr"]' if "," in name else nearest(name, known)
+                raise UsageError(f"unknown threshold '{name}'", hint)
+
+
 @dataclass(frozen=True)
-class TuningOptions:
-    """How detectors are tuned: what `cdtool.tune` describes. Raises UsageError for what is unknown or out of range."""
+class TuningOptions(TuneTable):
+    """How detectors are tuned: what `cdtool.tune` describes. Raises UsageError for a budget that is not one."""
 
     false_alarm_budget: str
-    _: KW_ONLY
     detectors: Sequence[str] = ()
-    thresholds: Sequence[str] = ()
-    objective: str = Goal.LATENCY.value
-    impacts: str | None = None
-    worse_at_most: float = WORSE_AT_MOST
-    shortest_debounce: float = SHORTEST_DEBOUNCE
-    seed: int = 0
     journals: Path | None = None
     workers: Workers | None = None
     progress: Progress | None = None
     watch: Watch = unwatched
 
+    table: ClassVar[type[TuneTable]] = TuneTable
+
     def __post_init__(self) -> None:
+        super().__post_init__()
         Budget.parse(self.false_alarm_budget)
-        choices = {
-            "objective": (self.objective, [item.value for item in Goal]),
-            "impacts": (self.impacts or IMPACTS[0], IMPACTS),
-            **{f"threshold {name}": (name, THRESHOLDS.usable_names()) for name in self.thresholds},
-        }
-        for what, (given, known) in choices.items():
-            if given not in known:
-                words = f"unknown threshold '{given}'" if what.startswith("threshold ") else f"{what} is '{given}'"
-                raise UsageError(words, nearest(given, known))
-        for what, value in (("worse_at_most", self.worse_at_most), ("shortest_debounce", self.shortest_debounce)):
-            if not 0.0 <= value < float("inf"):
-                raise UsageError(f"{what} is {value:g}", "give 0 or more")
+
+    @classmethod
+    def of(cls, setup: BenchmarkFile, false_alarm_budget: str, **more: Any) -> TuningOptions:
+        """Return the options with the values of [tune]."""
+        return cls(false_alarm_budget, **vars(setup.tune or TuneTable()), **more)
 
     @property
     def budget(self) -> Budget:
         """Return the false-alarm budget."""
         return Budget.parse(self.false_alarm_budget)
-
-    @property
-    def goal(self) -> Goal:
-        """Return what is minimised."""
-        return Goal(self.objective)

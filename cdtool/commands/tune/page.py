@@ -59,7 +59,7 @@ def tuning_html(tuning: Tuning) -> str:
         visible(headline),
         visible(f"From {counted(len(tuning.runs.operations), 'impact-free run')} and contacts: {contacts}."),
         tone,
-        (f"minimised: {_GOALS[tuning.options.goal]}", f"seed {tuning.options.seed}"),
+        (f"minimised: {_GOALS[tuning.options.objective]}", f"seed {tuning.options.seed}"),
         tuple(section for section in sections if section.tables or section.images or section.note),
     ).html()
 
@@ -150,7 +150,7 @@ def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
     figures = []
     if len(groups) > 1 and tuned.pareto and all(len(point.costs) > 1 for point in tuned.pareto):
         words = "Apparent costs of two groups: a choice with less in one of them has more in the other."
-        figures.append((partial(draw_pareto, tuned, groups, tuning.options.goal), words))
+        figures.append((partial(draw_pareto, tuned, groups, tuning.options.objective), words))
     if any(len(item.tried) > 1 for item in tuned.sensitivities):
         words = "Cost around the choice, one gain or setting changed at a time; grey: at most 5 % more."
         figures.append((partial(draw_sensitivity, tuned.sensitivities), words))

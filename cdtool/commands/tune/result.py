@@ -114,7 +114,7 @@ class TuningPlots:
             raise UsageError(
                 "a front needs two groups of contacts", "see plot.sensitivity() for the cost around the choice"
             )
-        figure = draw_pareto(tuned, groups, self.result.options.goal)
+        figure = draw_pareto(tuned, groups, self.result.options.objective)
         return described(figure, f"{tuned.detector}: cost of {groups[1]} against that of {groups[0]} of every choice")
 
     def sensitivity(self, detector: str | None = None) -> Figure:

@@ -230,7 +230,7 @@ def tuning_summary(tuning: Tuning) -> dict[str, Any]:
         "benchmark": tuning.setup.path.name,
         "benchmark_sha256": tuning.setup.digest,
         "false_alarm_budget": str(options.budget),
-        "objective": options.objective,
+        "objective": options.objective.value,
         "impacts": options.impacts,
         "thresholds": list(options.thresholds) or "all",
         "injected_groups": [name for name, group in tuning.setup.impacts.items() if group.injected is not None],

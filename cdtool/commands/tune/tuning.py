@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,10 +28,10 @@ from cdtool.commands.tune.recordings_to_tune import ReadRecordings, read_recordi
 from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.search.candidate import Candidate, Measured
 from cdtool.commands.tune.search.coordinate_search import movable_gains
-from cdtool.commands.tune.search.grid import SHORTEST_DEBOUNCE, debounces_to_try, rules_to_try
+from cdtool.commands.tune.search.grid import debounces_to_try, rules_to_try
 from cdtool.commands.tune.search.held_out import HeldOut, Pooled, pooled
 from cdtool.commands.tune.search.measuring import Choice, Measuring, Pair
-from cdtool.commands.tune.search.objective import WORSE_AT_MOST, Goal, Objective
+from cdtool.commands.tune.search.objective import Goal, Objective
 from cdtool.commands.tune.search.recordings import TuningRecordings
 from cdtool.commands.tune.search.search import Scored, Searched, search
 from cdtool.commands.tune.search.tuned import (
@@ -67,12 +67,7 @@ def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
     false_alarm_budget: str,
     *,
     detectors: Sequence[str] = (),
-    thresholds: Sequence[str] = (),
-    objective: str = Goal.LATENCY.value,
-    impacts: str | None = None,
-    worse_at_most: float = WORSE_AT_MOST,
-    shortest_debounce: float = SHORTEST_DEBOUNCE,
-    seed: int = 0,
+    settings: Mapping[str, Any] | None = None,
     journals: Path | None = None,
     workers: Workers | None = None,
     progress: Progress | None = None,
@@ -89,19 +84,8 @@ def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
         As "1/100op" or "0.1/h", met on average, or "1/100op at 95%".
     detectors : sequence of str, optional
         Detectors in place of the file's.
-    thresholds : sequence of str, optional
-        The kinds of thresholds that are tried; all by default. That of the benchmark file is what they are compared
-        with.
-    objective : {"latency", "p95", "force"}
-        What is minimised: mean latency, its 95th percentile, or the mean force at the alarm.
-    impacts : {"real", "injected", "both"}, optional
-        The contacts to tune on; needed only if the benchmark file has real and injected ones.
-    worse_at_most : float
-        The share by which a group of contacts may get worse than by default.
-    shortest_debounce : float
-        The shortest debounce to try [s].
-    seed : int
-        Decides how the recordings are dealt to the folds.
+    settings : mapping, optional
+        Values in place of keys of the file, as {"tune.objective": "p95"}; docs/tuning.md has those of [tune].
     journals : Path, optional
         A folder for what is measured, from which an interrupted search goes on.
     workers : Workers, optional
@@ -130,33 +114,21 @@ def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
     Traceback (most recent call last):
     cdtool.base.errors.UsageError: 10 impact-free runs for a false-alarm budget of 1/20op: 19 are needed to set...
     """
-    options = TuningOptions(
-        false_alarm_budget,
-        detectors=detectors,
-        thresholds=thresholds,
-        objective=objective,
-        impacts=impacts,
-        worse_at_most=worse_at_most,
-        shortest_debounce=shortest_debounce,
-        seed=seed,
-        journals=journals,
-        workers=workers,
-        progress=progress,
-        watch=watch,
-    )
-    return tune_detectors(file, options)
+    if not isinstance(file, BenchmarkFile):
+        file = read_benchmark_file(file, detectors=detectors, settings=settings)
+    more = {"journals": journals, "workers": workers, "progress": progress, "watch": watch}
+    return tune_detectors(file, TuningOptions.of(file, false_alarm_budget, detectors=detectors, **more))
 
 
-def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> TuningResult:
-    """Search gains, threshold and debounce of the detectors of a benchmark file; `cdtool.tune` states the errors."""
+def tune_detectors(setup: BenchmarkFile, options: TuningOptions) -> TuningResult:
+    """Search gains, threshold and debounce of the detectors of a benchmark; `cdtool.tune` states the errors."""
     workers, progress = options.workers or Workers(), options.progress
-    setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=options.detectors)
     setup = with_detectors(setup, options.detectors) if options.detectors else setup
     refuse_limits_by_hand(replace(setup, budget=options.budget))
     setup = _with_impacts(setup, options.impacts, workers, progress)
     with workers.ready():
         read = read_recordings(setup, options.budget, options.seed, workers, progress)
-        if options.goal is Goal.FORCE and not np.isfinite(read.recordings.peak_of).any():
+        if options.objective is Goal.FORCE and not np.isfinite(read.recordings.peak_of).any():
             raise UsageError("objective is 'force', but no log has the force of its contact", "map the load cell")
         made: list[TunedDetector] = []
         unusable: dict[str, str] = {}
@@ -198,7 +170,7 @@ def _with_impacts(
     if impacts is None and real and setup.made is not None:
         raise UsageError(
             f"{setup.path} has real contacts ({', '.join(real)}) and injected ones",
-            "choose with impacts: real, injected or both",
+            "set tune.impacts to real, injected or both",
         )
     if impacts == "real":
         return replace(setup, made=None)
@@ -232,7 +204,7 @@ class _TuningOf:
         default = Candidate.of(self._detector, rule)
         measuring = self._measuring(recordings, activations)
         measuring.remember(default, signals)
-        objective = Objective(self.options.goal, recordings, self.options.worse_at_most)
+        objective = Objective(self.options.objective, recordings, self.options.worse_at_most)
         journal = self._journal(journals, measuring)
         words = [_debounce_words(activation) for activation in activations]
         gains = movable_gains(self._detector, default)
@@ -312,7 +284,7 @@ class _TuningOf:
         """Return the debounces to try [samples] and their activations, the benchmark file's first."""
         given = self.setup.activation
         own = given.debounce or max(1, round(DEBOUNCE_TIME / period))
-        others = [count for count in debounces_to_try(period, self.options.shortest_debounce) if count != own]
+        others = [count for count in debounces_to_try(period, 1e-3 * self.options.shortest_debounce_ms) if count != own]
         return [own, *others], (given, *(replace(given, debounce=count) for count in others))
 
     def _rules(self, default: Threshold, channels: set[str]) -> list[Threshold]:

@@ -110,15 +110,15 @@ def test_the_other_commands_read_and_write_urls(gate, memory, tmp_path):
         cdtool("compare", "memory://out/results.json", "memory://out/results.json", "-o", "memory://out/c.md").status
         == 0
     )
-    assert cdtool("plan", "--from", "memory://out/results.json", "--difference", "5").status in (0, 2)
+    assert cdtool("plan", "--std-ms", "memory://out/results.json", "--difference-ms", "5").status in (0, 2)
     assert cdtool("info", f"{gate}/stiff/01.mcap", "-m", f"{gate}/machine.toml").status == 0
     assert cdtool("init", f"{gate}/stiff/03.csv", "-o", "memory://out/machine.toml").status in (0, 3)
-    assert cdtool("recover", f"{gate}/stiff/01.mcap", "-o", "memory://out/clean.mcap").status == 0
+    assert cdtool("convert", f"{gate}/stiff/01.mcap", "memory://out/clean.mcap", "--recover", "all").status == 0
     done = cdtool(
         "explain", f"{gate}/stiff/03.csv", "-b", f"{gate}/benchmark.toml", "-d", "feekf", "--plot", "memory://out/e.png"
     )
     assert done.status == 0, done.err
-    assert cdtool("simulate", "gate", "-o", "memory://simulated", "--stiff", "1").status == 0
+    assert cdtool("simulate", "gate", "-o", "memory://simulated", "--set", "stiff=1").status == 0
     written = set(memory.find("/out"))
     assert {f"/out/{name}" for name in ("report.md", "c.md", "machine.toml", "clean.mcap", "e.png")} <= written
     assert memory.exists("/simulated/benchmark.toml")

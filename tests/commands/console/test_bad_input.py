@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import Outcome, cdtool
+from tests.command import Outcome, cdtool, keys
 
 HEADER = "t,i_motor,n_motor,phi,acc_x,load_cell,n_ref,i_ref"
 
@@ -112,8 +112,8 @@ def test_an_incomplete_last_line_is_dropped_and_reported(detect, tmp_path, good,
 
 
 def test_a_truncated_mcap_file_is_read_up_to_the_cut_with_status_3(detect, tmp_path):
-    arguments = ("simulate", "gate", "--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0, "--seed", 5)
-    assert cdtool(*arguments, "--format", "mcap", "-o", tmp_path / "m").status == 0
+    arguments = ("simulate", "gate", *keys(free=0, holdout=0, stiff=1, soft=0), "--seed", 5)
+    assert cdtool(*arguments, *keys(format="mcap"), "-o", tmp_path / "m").status == 0
     whole = (tmp_path / "m" / "stiff" / "01.mcap").read_bytes()
     path = written(tmp_path / "cut.mcap", whole[: int(0.95 * len(whole))])
     done = detect(path)
@@ -138,7 +138,7 @@ def test_names_from_files_cannot_control_the_terminal(detect, tmp_path):
 
 def test_a_folder_that_cannot_be_created_is_one_line(tmp_path, gate_folder, feekf_signature):
     blocked = written(tmp_path / "file", "in the way")
-    done = cdtool("simulate", "gate", "--free", 1, "-o", blocked / "gate")
+    done = cdtool("simulate", "gate", "--set", "free=1", "-o", blocked / "gate")
     assert done.status == 2 and done.err.count("\n") == 1 and "file" in done.err
     logs = sorted((gate_folder / "stiff").glob("*.csv"))
     arguments = ("-m", gate_folder / "machine.toml", "-s", feekf_signature)

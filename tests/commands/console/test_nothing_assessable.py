@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.command import cdtool
+from tests.command import cdtool, keys
 
 SAMPLES = Path(__file__).parents[3] / "sample_logs" / "gate"
 COLUMNS = ["t", "i_motor", "n_motor", "phi", "acc_x", "load_cell"]
@@ -80,8 +80,8 @@ def test_an_uncut_log_of_two_strokes_gets_a_hint_how_to_cut_it(tmp_path, more):
 def rebounding(tmp_path_factory) -> Path:
     """Return the folder of a gate that rebounds after its impact, without reference channels."""
     folder = tmp_path_factory.mktemp("gate") / "gate"
-    counts = ("--free", 8, "--holdout", 0, "--stiff", 1, "--soft", 0)
-    assert cdtool("simulate", "gate", *counts, "--no-reference", "-o", folder).status == 0
+    counts = keys(free=8, holdout=0, stiff=1, soft=0)
+    assert cdtool("simulate", "gate", *counts, "--set", "reference=false", "-o", folder).status == 0
     text = (folder / "benchmark.toml").read_text(encoding="utf-8")
     text = re.sub("(?m)^detectors = .*", 'detectors = ["feekf", "pt"]', text)
     (folder / "benchmark.toml").write_text(text, encoding="utf-8")

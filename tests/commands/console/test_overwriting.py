@@ -146,7 +146,7 @@ def test_plots_are_drawn_again_over_figures_of_cdtool_only(folder):
         ("detect", *log, "--plot", plot),
         ("explain", *log, "--plot", plot),
         ("signature", "show", signature, "--plot", plot),
-        ("study", "sensors", "-m", folder / "machine.toml", "--speed", 0.2, "--stiffness", 5e5, "-o", plot),
+        ("study", "sensors", "-m", folder / "machine.toml", "--set", "impact.speed=0.2", "-o", plot),
     )
     for words in commands:
         plot.write_text(TEXT, encoding="utf-8")

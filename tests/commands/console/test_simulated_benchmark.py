@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from tests.command import cdtool
+from tests.command import cdtool, keys
 
 
 def _simulated(folder, free, holdout, stiff, machine="gate"):
-    counts = ("--free", free, "--holdout", holdout, "--stiff", stiff, "--soft", 0)
+    counts = keys(free=free, holdout=holdout, stiff=stiff, soft=0)
     done = cdtool("simulate", machine, *counts, "--seed", 5, "-o", folder)
     assert done.status == 0, done.err
     return done.out
@@ -24,7 +24,8 @@ def test_the_written_benchmark_runs(tmp_path, counts):
 
 
 @pytest.mark.parametrize(
-    ("counts", "why"), [((0, 1, 1), "--free"), ((1, 0, 1), "--free"), ((2, 0, 0), "--holdout, --stiff or --soft")]
+    ("counts", "why"),
+    [((0, 1, 1), "--set free=10"), ((1, 0, 1), "--set free=10"), ((2, 0, 0), "set holdout, stiff or soft")],
 )
 def test_an_unusable_benchmark_is_not_written_and_the_reason_is_shown(tmp_path, counts, why):
     shown = _simulated(tmp_path / "gate", *counts).splitlines()
@@ -34,5 +35,5 @@ def test_an_unusable_benchmark_is_not_written_and_the_reason_is_shown(tmp_path, 
 
 
 def test_more_logs_than_a_folder_holds_are_refused_at_once(tmp_path):
-    done = cdtool("simulate", "gate", "--free", "99999999999999999999", "-o", tmp_path / "logs")
+    done = cdtool("simulate", "gate", "--set", "free=99999999999999999999", "-o", tmp_path / "logs")
     assert done.status == 2 and "100000" in done.err and not (tmp_path / "logs").exists()

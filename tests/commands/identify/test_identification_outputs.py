@@ -117,14 +117,12 @@ def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_writ
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--payload", 2.0], "belong together"),
+        (["--payload", "2kg"], "belong together"),
         (["--loaded-logs", "x.csv"], "belong together"),
-        (["--loaded-logs", "x.csv", "--payload", -2.0], "--payload is -2"),
-        (["--payload-link", "hand"], "--payload-link without --payload"),
-        (["--payload-centre", "0,0,1"], "--payload-centre without --payload"),
-        (["--loaded-logs", "x.csv", "--payload", 2.0, "--payload-centre", "0,1"], "--payload-centre is '0,1'"),
-        (["--loaded-logs", "x.csv", "--payload", 2.0, "--payload-centre", "0,inf,1"], "--payload-centre is '0,inf,1'"),
-        (["--loaded-logs", "x.csv", "--payload", 2.0, "--payload-link", ""], "--payload-link is empty"),
+        *(
+            (["--loaded-logs", "x.csv", "--payload", text], f"--payload is '{text}'")
+            for text in ("-2kg", "2", "infkg", "2kg@", "2kg:0,1", "2kg@hand:0,inf,1", "2kg:a,b,c", "kg")
+        ),
     ],
 )
 def test_a_payload_without_its_logs_is_one_line(options: list[object], message: str) -> None:

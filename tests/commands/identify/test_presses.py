@@ -127,7 +127,7 @@ def test_a_rotary_axis_needs_the_lever_arm_of_its_load_cell(tmp_path: Path) -> N
     [
         (("--lever-arm", "0.5"), "--lever-arm without --presses"),
         (("--presses", "x.csv", "--lever-arm", "-1"), "--lever-arm is -1"),
-        (("--presses", "x.csv", "--loaded-logs", "y.csv", "--payload", "1"), "these are for robots, those for axes"),
+        (("--presses", "x.csv", "--loaded-logs", "y.csv", "--payload", "1kg"), "these are for robots, those for axes"),
     ],
 )
 def test_options_that_do_not_belong_together_are_one_line(axis: Path, options: tuple[str, ...], message: str) -> None:

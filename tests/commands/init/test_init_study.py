@@ -3,11 +3,16 @@
 import json
 import shutil
 import tomllib
+from importlib.util import find_spec
+from pathlib import Path
 
+import jsonschema
 import pytest
 
 import cdtool as api
 from tests.command import cdtool, one_line
+
+ROBOT = Path(__file__).parents[3] / "sample_logs" / "ur10e"
 
 
 @pytest.fixture
@@ -139,12 +144,65 @@ def test_a_log_that_cannot_be_read_is_named_and_the_others_are_drafted(gate, tmp
         (("a.csv", "-m", "x.toml", "-o", "m.toml"), "--output is the file m.toml, with --machine"),
         (("a.csv", "b.csv"), "--output is the file machine.toml, with 2 logs"),
         (("missing.csv", "-o", "study"), "missing.csv"),
+        (("a.csv", "--free", "b.csv"), "--output is the file machine.toml, with --free"),
+        (("a.csv", "--free", "no/*.csv", "-o", "study"), "--free: no file matches 'no/*.csv'"),
+        (("a.csv", "--urdf", "r.urdf", "-m", "m.toml", "-o", "study"), "--urdf and --machine: both describe"),
     ],
 )
 def test_a_wrong_call_is_one_line(arguments, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = cdtool("init", *arguments)
     assert done.status == 2 and words in one_line(done.err) and "Traceback" not in done.err
+
+
+def test_logs_given_as_impact_free_are_learned_from_unless_they_show_a_contact(gate, tmp_path):
+    (gate / "free").rename(gate / "quiet")
+    struck = gate / "quiet" / "99.csv"
+    shutil.copy(gate / "stiff" / "01.csv", struck)
+    pattern = f"{gate}/quiet/*.csv"
+    done = cdtool(
+        "init", *csv_logs(gate, "stiff"), "--free", pattern, "-m", gate / "machine.toml", "-o", tmp_path / "s"
+    )
+    assert done.status == 3 and "99.csv: given as impact-free, but shows 1 contact" in done.err
+    values = drafted(tmp_path / "s")
+    named = [item for group in ("learn", "holdout") for item in values.get(group, {}).get("logs", [])]
+    assert any("quiet/" in item for item in named) and not any("99" in item for item in named)
+    assert list(values["impacts"]) == ["stiff"]
+
+
+@pytest.mark.skipif(find_spec("pinocchio") is None, reason="pinocchio is not installed (cdtool[urdf])")
+def test_a_robot_is_drafted_with_the_joints_of_its_urdf(tmp_path):
+    log, urdf = ROBOT / "link4.csv.gz", ROBOT / "ur10e.urdf"
+    done = cdtool("init", log, "--urdf", urdf, "-o", tmp_path / "m.toml")
+    assert done.status == 0, done.err
+    machine = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["machine"]
+    assert machine["type"] == "urdf_robot" and (tmp_path / machine["urdf"]).resolve() == urdf
+    assert machine["joint_map"] == {f"joint_{n}": f"joint{n}" for n in range(1, 7)}
+    assert cdtool("info", log, "-m", tmp_path / "m.toml").status == 0
+    few = cdtool(
+        "init", log, "--urdf", ROBOT.parents[1] / "docs" / "examples" / "scara.urdf", "-o", tmp_path / "f.toml"
+    )
+    assert few.status == 2 and "has 4 moving joints, the log 6" in few.err
+
+
+@pytest.mark.parametrize("name", ["study/machine.toml", "study/benchmark.toml", "protocol.toml"])
+def test_a_draft_names_the_schema_beside_it_and_follows_it(name, gate, tmp_path):
+    assert cdtool("init", *csv_logs(gate, "stiff"), "-o", tmp_path / "study").status == 0
+    assert (
+        cdtool("protocol", "init", tmp_path / "study" / "benchmark.toml", "-o", tmp_path / "protocol.toml").status == 0
+    )
+    path = tmp_path / name
+    schema = path.with_suffix(".schema.json")
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith(f"#:schema ./{schema.name}\n")
+    validator = jsonschema.Draft7Validator(json.loads(schema.read_text(encoding="utf-8")))
+    assert not list(validator.iter_errors(tomllib.loads(text)))
+
+
+def test_a_schema_that_cdtool_did_not_write_is_kept(gate, tmp_path):
+    (tmp_path / "machine.schema.json").write_text("{}", encoding="utf-8")
+    done = cdtool("init", csv_logs(gate, "stiff")[0], "-o", tmp_path / "m.toml")
+    assert done.status == 2 and "contains no JSON schema of cdtool" in done.err and not (tmp_path / "m.toml").exists()
 
 
 def test_existing_files_are_replaced_only_with_force(gate, tmp_path):

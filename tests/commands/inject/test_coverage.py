@@ -1,4 +1,4 @@
-"""`cdtool coverage`: a map of the sample gate, its figure and its table."""
+"""`cdtool inject -o map.html`: a map of the sample gate, its figure and its table."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_stiffer_the_obstacle_the_sooner_and_inertia_misses_soft_ones(gate: 
 
 def test_the_command_draws_the_map_and_prints_a_table(gate: Path) -> None:
     targets = [item for name in ("map.png", "map.html", "map.json") for item in ("-o", gate / name)]
-    done = command("coverage", gate / "coverage.toml", *targets)
+    done = command("inject", gate / "coverage.toml", *targets)
     assert done.status == 0
     page = (gate / "map.html").read_text(encoding="utf-8")
     assert page.count('<script type="application/json" class="trace">') > 6
@@ -61,7 +61,7 @@ def test_the_command_draws_the_map_and_prints_a_table(gate: Path) -> None:
     assert len(recordings) == 24 and all(item["recording"].endswith(".csv") for item in recordings)
     assert (gate / "map.png").read_bytes().startswith(b"\x89PNG")
     assert "2 positions from 0.3 to 1.2 m" in done.out
-    again = command("coverage", gate / "coverage.toml", "--json", "--detectors", "gm")
+    again = command("inject", gate / "coverage.toml", "--json", "--detectors", "gm")
     cells = json.loads(again.out)["cells"]
     assert len(cells) == 6
     assert {cell["detector"] for cell in cells} == {"momentum"}
@@ -76,15 +76,17 @@ def test_positions_of_two_units_make_no_map(gate: Path) -> None:
 
 
 def test_another_suffix_is_refused_before_anything_is_computed(gate: Path) -> None:
-    done = command("coverage", gate / "coverage.toml", "-o", gate / "map.docx")
+    done = command("inject", gate / "coverage.toml", "-o", gate / "map.docx")
     assert done.status == 2
+    both = command("inject", gate / "coverage.toml", "-o", gate / "logs", "-o", gate / "map.png")
+    assert both.status == 2 and "give one folder, or the files of a map" in both.err
     assert not (gate / "injected_coverage").exists()
 
 
 @pytest.mark.parametrize("name", ["map.html", "map.json", "map.png"])
 def test_a_file_of_another_program_is_kept(gate: Path, name: str) -> None:
     (gate / name).write_text("mine", encoding="utf-8")
-    done = command("coverage", gate / "coverage.toml", "-o", gate / name)
+    done = command("inject", gate / "coverage.toml", "-o", gate / name)
     assert done.status == 2
     assert "--force" in done.err
     assert (gate / name).read_text(encoding="utf-8") == "mine"
@@ -94,7 +96,7 @@ def test_a_file_of_another_program_is_kept(gate: Path, name: str) -> None:
 def test_the_file_that_is_read_is_never_overwritten(gate: Path) -> None:
     path = gate / "coverage.json"
     path.write_text((gate / "coverage.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    done = command("coverage", path, "-o", path, "--force")
+    done = command("inject", path, "-o", path, "--force")
     assert done.status == 2
     assert "is read by this command" in done.err
 
@@ -120,7 +122,7 @@ def test_logs_of_clearly_different_speed_split_the_map(gate: Path, monkeypatch: 
         return {log: 0.1 * (place + 1) for place, log in enumerate(speeds)}
 
     monkeypatch.setattr("cdtool.commands.inject.coverage.coverage.speed_classes", by_log)
-    done = command("coverage", gate / "coverage.toml", "--detectors", "gm")
+    done = command("inject", gate / "coverage.toml", "--detectors", "gm")
     assert done.status == 0
     lines = [line.split()[1:5] for line in done.out.splitlines() if line.startswith("momentum ")]
     assert lines[:2] == [["5", "0.1", "2", "0"], ["5", "0.2", "2", "0"]]
@@ -140,7 +142,7 @@ def test_a_cell_and_the_table_have_the_range_of_the_brackets(gate: Path) -> None
     done = cdtool.coverage(gate / "coverage.toml", detectors=["gm"])
     cell = done.map.cells["momentum"][CellKey(0.3, 5e3)]
     assert cell.range_ms[1] > cell.range_ms[0] + 1.0
-    printed = command("coverage", gate / "coverage.toml", "--detectors", "gm").out
+    printed = command("inject", gate / "coverage.toml", "--detectors", "gm").out
     line = next(line for line in printed.splitlines() if line.startswith("momentum") and " 5 " in line)
     highest = max(done.map.cells["momentum"][CellKey(position, 5e3)].range_ms[1] for position in (0.3, 1.2))
     assert f"to {highest:.3g}" in line

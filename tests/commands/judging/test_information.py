@@ -109,8 +109,9 @@ def test_the_right_columns_of_a_real_robot_are_not_suspected(tmp_path):
 
 def test_a_torque_without_values_causes_no_traceback(tmp_path):
     from tests.command import cdtool as command
+    from tests.command import keys
 
-    made = command("simulate", "gate", "--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0, "-o", tmp_path / "gate")
+    made = command("simulate", "gate", *keys(free=1, holdout=0, stiff=0, soft=0), "-o", tmp_path / "gate")
     assert made.status == 0
     path = tmp_path / "gate" / "free" / "01.csv"
     header, *rows = path.read_text(encoding="utf-8").splitlines()

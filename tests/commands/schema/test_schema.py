@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.commands.schema.json_schema import KINDS, schema_of
+from cdtool.commands.console.json_schema import KINDS, schema_of
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.formats.machine_file import read_machine_file
 from tests.command import cdtool

@@ -19,6 +19,7 @@ from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.recording import Recording
 from tests.command import cdtool as command
+from tests.command import keys
 
 ARM = ArmParameters()
 COUNTS = {"free": 1, "holdout": 1, "stiff": 3, "soft": 1}
@@ -118,8 +119,8 @@ def test_logs_stay_small(folder: Path) -> None:
 
 
 def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path, tmp_path: Path) -> None:
-    counts = ("--free", 0, "--holdout", 0, "--stiff", 4, "--soft", 0)
-    done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--format", "mixed", "-o", tmp_path / "b")
+    counts = keys(free=0, holdout=0, stiff=4, soft=0)
+    done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--set", "format=mixed", "-o", tmp_path / "b")
     assert done.status == 0, done.err
     for name in ("stiff/01.mcap", "stiff/02.mcap", "stiff/03.csv", "machine.toml"):
         assert (tmp_path / "b" / name).read_bytes() == (folder / name).read_bytes()
@@ -130,7 +131,7 @@ def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path,
 
 def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> None:
     assert cdtool.simulate_arm(tmp_path / "python", {"stiff": 1}, seed=6, trial=2) == 1
-    counts = ("--free", 0, "--holdout", 0, "--stiff", 1, "--soft", 0)
+    counts = keys(free=0, holdout=0, stiff=1, soft=0)
     assert command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "line").status == 0
     names = sorted(path.relative_to(tmp_path / "line") for path in (tmp_path / "line").rglob("*.*"))
     assert len(names) == 3
@@ -148,5 +149,6 @@ def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_
     with pytest.raises(UsageError, match="unknown trial 3"):
         simulate_arm(tmp_path / "third", COUNTS, seed=1, trial=3)  # type: ignore[arg-type]
     assert command("simulate", "arm", "--trial", 3, "-o", tmp_path / "third").status == 2
-    assert command("simulate", "arm", "--format", "cvs", "-o", tmp_path / "third").status == 2
+    assert command("simulate", "gate", "--trial", 2, "-o", tmp_path / "third").status == 2
+    assert command("simulate", "arm", "--set", "format=cvs", "-o", tmp_path / "third").status == 2
     assert not any(tmp_path.iterdir())

@@ -40,7 +40,7 @@ def barrier(tmp_path: Path) -> Path:
 
 
 def test_the_gate_is_ranked_from_the_contact_to_the_controller():
-    found = ranked("-m", GATE, "--speed", 0.2, "--stiffness", "5e5")
+    found = ranked("-m", GATE, "--set", "impact.speed=0.2", "--set", "impact.stiffness=5e5")
     assert list(found) == ORDER
     assert found["load_cell"]["time_ms"] < 2.0
     assert found["motor_torque"]["force_n"] > 10 * found["load_cell"]["force_n"]
@@ -69,24 +69,24 @@ def test_the_table_says_what_was_assumed_and_what_limits():
         "without the machine's own variation",
     ):
         assert words in done.out, words
-    given = cdtool("study", "sensors", "-m", GATE, "--speed", 0.2, "--drive-stiffness", 2e6).out
+    given = cdtool("study", "sensors", "-m", GATE, "--set", "impact.speed=0.2", "--set", "drive.stiffness=2e6").out
     assert "assumed: impact.speed" not in given and "assumed: drive.stiffness" not in given
 
 
 def test_a_stiffer_drive_shows_the_impact_earlier_and_an_option_overrides_the_file():
-    soft, stiff = (ranked("-m", GATE, "--study", STUDY, "--drive-stiffness", k) for k in (8e4, 8e6))
+    soft, stiff = (ranked("-m", GATE, "--study", STUDY, "--set", f"drive.stiffness={k}") for k in (8e4, 8e6))
     assert stiff["motor_speed"]["time_ms"] < 0.7 * soft["motor_speed"]["time_ms"]
     assert soft == ranked("-m", GATE, "--study", STUDY)
 
 
 def test_a_larger_k_never_detects_earlier():
-    low, high = (ranked("-m", GATE, "--k", k) for k in (3, 8))
+    low, high = (ranked("-m", GATE, "--set", f"k={k}") for k in (3, 8))
     assert all(low[name]["time_ms"] <= high[name]["time_ms"] for name in ORDER)
     assert low["motor_torque"]["time_ms"] < high["motor_torque"]["time_ms"]
 
 
 def test_a_rotary_axis_is_referred_to_the_lever_of_its_contact(barrier, tmp_path):
-    found = ranked("-m", barrier, "--lever", 2.0, "--speed", 0.5)
+    found = ranked("-m", barrier, "--set", "impact.lever=2.0", "--set", "impact.speed=0.5")
     assert set(found) == set(ORDER)
     # 12 kg m2 and 0.0005 / 0.01^2 = 5 kg m2 at 2 m: the same as 3 kg and 1.25 kg on a slide with r = 0.02 m/rad.
     slide = tmp_path / "slide.toml"
@@ -94,7 +94,7 @@ def test_a_rotary_axis_is_referred_to_the_lever_of_its_contact(barrier, tmp_path
         '[machine]\ntype = "linear_axis"\nmotor_inertia = 0.0005\nload_mass = 3.0\ntransmission_ratio = 0.02\n',
         encoding="utf-8",
     )
-    assert ranked("-m", slide, "--speed", 0.5) == found
+    assert ranked("-m", slide, "--set", "impact.speed=0.5") == found
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_a_coarser_or_noisier_sensor_is_never_earlier_and_moves_no_other_row(tmp
 
 def test_a_joint_of_an_arm_is_studied_while_the_other_stands(tmp_path):
     # The forearm of the simulated arm: M22 without its motor, hit 0.3 m from the elbow, is that rotary axis.
-    done = cdtool("study", "sensors", "-m", ARM, "--joint", "forearm", "--lever", 0.3)
+    done = cdtool("study", "sensors", "-m", ARM, "--set", "joint=forearm", "--set", "impact.lever=0.3")
     assert done.status == 0
     assert "the other joints are at rest: 0.06984 kg m2 at forearm, without its motor" in done.out
     alone = tmp_path / "forearm.toml"
@@ -131,8 +131,8 @@ def test_a_joint_of_an_arm_is_studied_while_the_other_stands(tmp_path):
         "transmission_ratio = 0.016666666666666666\nviscous_friction = 0.00011111111111111112\n",
         encoding="utf-8",
     )
-    same = ranked("-m", alone, "--lever", 0.3)
-    for name, found in ranked("-m", ARM, "--joint", "forearm", "--lever", 0.3).items():
+    same = ranked("-m", alone, "--set", "impact.lever=0.3")
+    for name, found in ranked("-m", ARM, "--set", "joint=forearm", "--set", "impact.lever=0.3").items():
         assert found["time_ms"] == pytest.approx(same[name]["time_ms"], abs=1e-3)
         assert found["peak_so_far_n"] == pytest.approx(same[name]["peak_so_far_n"], rel=1e-3)
 
@@ -183,12 +183,12 @@ def test_the_figures_of_the_thesis_are_drawn_again(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--speed", 0), "impact.speed is 0"),
-        (("--stiffness", "-1"), "impact.stiffness is -1"),
-        (("--stiffness", "nan"), "impact.stiffness is nan"),
-        (("--k", 0), "k is 0"),
-        (("--lever", 1), "a lever is given for a linear axis"),
-        (("--joint", "gat"), "no joint 'gat' (did you mean gate?"),
+        (("--set", "impact.speed=0"), "--set impact.speed: is 0"),
+        (("--set", "impact.stiffness=-1"), "--set impact.stiffness: is -1"),
+        (("--set", "impact.stiffness=nan"), "--set impact.stiffness: is nan"),
+        (("--set", "k=0"), "--set k: is 0"),
+        (("--set", "impact.lever=1"), "a lever is given for a linear axis"),
+        (("--set", "joint=gat"), "no joint 'gat' (did you mean gate?"),
         (("--study", "absent.toml"), "absent.toml: no such file"),
         (("--study", "wrong.toml"), "wrong.toml: sensors.encoder.counts: unknown key (did you mean counts_per_turn?"),
         (("--study", "kind.toml"), "kind.toml: impact: is 3"),
@@ -213,13 +213,13 @@ def test_a_machine_without_inertias_is_refused(tmp_path):
     bare.write_text(BARRIER.format(motor=0.0), encoding="utf-8")
     done = cdtool("study", "sensors", "-m", bare)
     assert done.status == 2 and "machine.motor_inertia is missing or 0" in done.err
-    done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "ur10e.toml", "--joint", "elbow")
+    done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "ur10e.toml", "--set", "joint=elbow")
     assert done.status == 2 and "coordinates = 'motor' with motor_inertia" in done.err
     done = cdtool("study", "sensors", "-m", ROOT / "docs" / "examples" / "scara.toml")
     assert done.status == 2 and "must all rotate or all slide" in done.err
     done = cdtool("study", "sensors", "-m", ARM)
-    assert done.status == 2 and "2 joints (select one with --joint: arm, forearm)" in done.err
-    done = cdtool("study", "sensors", "-m", ARM, "--joint", "arm")
+    assert done.status == 2 and "2 joints (set joint to one of them: arm, forearm)" in done.err
+    done = cdtool("study", "sensors", "-m", ARM, "--set", "joint=arm")
     assert done.status == 2 and "no lever is given" in done.err
 
 
@@ -231,8 +231,8 @@ def test_a_joint_is_required_if_there_are_several(tmp_path):
         encoding="utf-8",
     )
     done = cdtool("study", "sensors", "-m", gantry)
-    assert done.status == 2 and "2 joints (select one with --joint: x, y)" in done.err
-    assert ranked("-m", gantry, "--joint", "x") != ranked("-m", gantry, "--joint", "y")
+    assert done.status == 2 and "2 joints (set joint to one of them: x, y)" in done.err
+    assert ranked("-m", gantry, "--set", "joint=x") != ranked("-m", gantry, "--set", "joint=y")
 
 
 def test_the_page_shows_what_the_command_prints(monkeypatch, tmp_path):

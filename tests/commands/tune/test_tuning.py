@@ -22,6 +22,7 @@ from cdtool.commands.tune.files import open_folder, write_tuning
 from cdtool.commands.tune.options import TuningOptions
 from cdtool.commands.tune.page import tuning_html
 from cdtool.commands.tune.recordings_to_tune import read_recordings
+from cdtool.commands.tune.search.objective import Goal
 from cdtool.commands.tune.tuned_files import tuning_summary
 from cdtool.commands.tune.tuning import tune_detectors
 from cdtool.execution.workers import Workers
@@ -33,11 +34,11 @@ from tests.command import cdtool as command
 BUDGET = "1/20op"
 OPTIONS = TuningOptions(BUDGET, detectors=("momentum",), thresholds=("signature", "glr"))
 QUICK = TuningOptions("1/5op", detectors=("momentum",), thresholds=("limit",))
-ARGUMENTS = ("--detectors", "gm", "--thresholds", "signature,glr", "--false-alarm-budget", "1/20op")
+ARGUMENTS = ("--detectors", "gm", "--set", "tune.thresholds=['signature', 'glr']", "--false-alarm-budget", "1/20op")
 
 
-def tune(file, options, **more):
-    return tune_detectors(file, replace(options, **more))
+def tune(setup, options, **more):
+    return tune_detectors(setup, replace(options, **more))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def journals(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def done(gate: Path, journals: Path):
-    return tune(gate / "benchmark.toml", OPTIONS, journals=journals)
+    return tune(read_benchmark_file(gate / "benchmark.toml"), OPTIONS, journals=journals)
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +156,7 @@ def test_another_seed_deals_the_recordings_otherwise(quick):
 
 @pytest.mark.parametrize("goal", ["p95", "force"])
 def test_other_objectives(quick, goal):
-    made = tune(quick, replace(QUICK, objective=goal))
+    made = tune(quick, replace(QUICK, objective=Goal(goal)))
     tuned = made.detectors[0]
     assert tuned.honest.score <= tuned.default_nested.score + 0.1
     assert tuned.nested.groups["stiff"].force_n > 100.0
@@ -166,7 +167,9 @@ def test_the_files_can_be_used(written, gate):
     names = {path.name for path in folder.iterdir()}
     assert names == {
         "machine.toml",
+        "machine.schema.json",
         "benchmark.toml",
+        "benchmark.schema.json",
         "signature_momentum.json",
         "tuning.html",
         "tuning.json",
@@ -191,7 +194,7 @@ def test_the_files_can_be_used(written, gate):
 def test_files_state_what_was_chosen_and_why(written):
     folder, outcome = written
     text = (folder / "benchmark.toml").read_text(encoding="utf-8")
-    assert text.startswith("# Tuned by cdtool tune from benchmark.toml for momentum at 1/20op.")
+    assert text.startswith("#:schema ./benchmark.schema.json\n# Tuned by cdtool tune from benchmark.toml for momentum")
     assert "# These results are from recordings not used for the choice." in text
     assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12, "safety_factor": ANY}
     machine = (folder / "machine.toml").read_text(encoding="utf-8")
@@ -278,10 +281,12 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--objective", "speed"), "objective is 'speed'"),
-        (("--thresholds", "glx"), "unknown threshold 'glx'"),
-        (("--impacts", "all"), "impacts is 'all'"),
-        (("--impacts", "injected"), "has no section [inject]"),
+        (("--set", "tune.objective=speed"), "--set tune.objective: is 'speed'"),
+        (("--set", "tune.thresholds=glx"), "unknown threshold 'glx'"),
+        (("--set", "tune.impacts=all"), "--set tune.impacts: is 'all'"),
+        (("--set", "tune.impacts=injected"), "has no section [inject]"),
+        (("--set", "tune.worse_at_most=-1"), "--set tune.worse_at_most: is -1"),
+        (("--set", "tune.sed=1"), "did you mean seed?"),
         (("--false-alarm-budget", "often"), "false-alarm budget is 'often'"),
         (("--detectors", "gx"), "gx"),
     ],
@@ -355,7 +360,7 @@ def test_the_force_is_not_minimised_where_none_is_known(quick, tmp_path):
     setup = read_benchmark_file(quick.path.parent / "labelled.toml")
     setup = replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
     with pytest.raises(UsageError, match="no log has the force of its contact"):
-        tune(setup, QUICK, objective="force")
+        tune(setup, QUICK, objective=Goal.FORCE)
     made = tune(setup, QUICK)
     folder = tmp_path / "a [b] c" / "out"
     open_folder(folder, ())
@@ -393,6 +398,6 @@ def test_a_detector_that_cannot_be_tuned_is_reported(quick, gate, tmp_path):
     (gate / "no_acceleration.toml").write_text(machine, encoding="utf-8")
     text = (gate / "benchmark.toml").read_text(encoding="utf-8").replace('"machine.toml"', '"no_acceleration.toml"')
     (gate / "no_acceleration_benchmark.toml").write_text(text, encoding="utf-8")
-    arguments = ("--detectors", "gm,feekf", "--thresholds", "limit", "--false-alarm-budget", "1/2op")
+    arguments = ("--detectors", "gm,feekf", "--set", "tune.thresholds=limit", "--false-alarm-budget", "1/2op")
     done = command("tune", gate / "no_acceleration_benchmark.toml", *arguments, "-o", tmp_path / "t")
     assert done.status == 3 and "friction_ekf: not tuned:" in done.err

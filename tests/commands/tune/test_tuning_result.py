@@ -13,7 +13,7 @@ from tests.commands.notebook.values import GATE
 
 @pytest.fixture(scope="module")
 def tuned():
-    return cdtool.tune(GATE / "benchmark.toml", "1/2op", detectors=["momentum"], thresholds=["limit"])
+    return cdtool.tune(GATE / "benchmark.toml", "1/2op", detectors=["momentum"], settings={"tune.thresholds": "limit"})
 
 
 def test_it_is_one_line_and_a_frame_with_a_row_per_detector_and_group(tuned):

@@ -1,4 +1,4 @@
-"""cdtool recover: messages are recovered unchanged, and unverified ones never get a checksum."""
+"""cdtool convert --recover: messages are recovered unchanged, and unverified ones never get a checksum."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_messages_of_a_cut_chunk_are_left_out_or_written_without_a_checksum(tmp_
 def test_without_any_checksum_nothing_is_recovered_unless_requested(tmp_path):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source, use_chunking=False)
-    with pytest.raises(RecordingError, match=r"none of its 24 messages has a checksum \(--unverified keeps them"):
+    with pytest.raises(RecordingError, match=r"none of its 24 messages has a checksum \(--recover all keeps them"):
         recover(source, output)
     assert not output.exists()
     assert recover(source, output, unverified=True).whole

@@ -1,1 +1,1 @@
-"""`cdtool coverage`: where a machine notices a contact, over position and stiffness."""
+"""The map of `cdtool inject`: where a machine notices a contact, over position and stiffness."""

@@ -1,10 +1,11 @@
-"""`cdtool coverage`: where a machine notices a contact, from injected contacts over position and stiffness."""
+"""The map of injected contacts: where a machine notices a contact, over position and stiffness."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.inject.coverage.coverage_map import (
@@ -54,6 +55,7 @@ def coverage(
     file: str | Path,
     *,
     detectors: Sequence[str] = (),
+    settings: Mapping[str, Any] | None = None,
     with_traces: bool = False,
     workers: Workers | None = None,
     progress: Progress | None = None,
@@ -66,6 +68,8 @@ def coverage(
         A benchmark file with a section [inject].
     detectors : sequence of str, optional
         Detectors in place of the file's.
+    settings : mapping, optional
+        Values in place of keys of the file, as {"inject.seed": 1}.
     with_traces : bool, optional
         Also return the trigger plot of the worst contact of each cell: missed, otherwise the slowest. At most 200.
     workers : Workers, optional
@@ -96,7 +100,7 @@ def coverage(
     ((0.99, 1.04), ['momentum'])
     """
     workers = workers or Workers()
-    setup = read_benchmark_file(file)
+    setup = read_benchmark_file(file, settings=settings)
     setup = with_detectors(setup, detectors) if detectors else setup
     section = section_of(setup)
     units = {mark.unit for mark in section.positions}

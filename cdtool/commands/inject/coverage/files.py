@@ -1,4 +1,4 @@
-"""The files that `cdtool coverage` writes, by suffix: figure, HTML page, JSON."""
+"""The files of the map that `cdtool inject` writes, by suffix: figure, HTML page, JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdtool.report.number_text import number
 from cdtool.report.output_names import check_output_names
 
 PAGE, JSON = ".html", ".json"
-_TOOL = "cdtool coverage"
+_TOOL = "cdtool inject"
 _KINDS: Mapping[str, Kind] = {
     **FIGURES,
     PAGE: Kind(b"<title>Coverage", f"HTML page of {_TOOL}"),

@@ -178,7 +178,7 @@ def currents(folder: Path) -> list[object]:
 
 
 def test_the_command_identifies_torque_constants(tmp_path: Path) -> None:
-    arguments = [*currents(tmp_path), "--payload", 0.7, "--payload-link", "forearm", "--payload-centre", "0.25,0,0"]
+    arguments = [*currents(tmp_path), "--payload", "0.7kg@forearm:0.25,0,0"]
     outputs = ["-o", tmp_path / "new.toml", "-o", tmp_path / "new.html", "-o", tmp_path / "new.json"]
     done = command(*arguments, *outputs)
     assert done.status == 0, done.err
@@ -226,7 +226,7 @@ coulomb_slope = 50.0
 """
     (tmp_path / "machine.toml").write_text(text + channels_of(6, "[9.0, 9.0, 9.0, 9.0, 9.0, 9.0]"), encoding="utf-8")
     command_line = ["identify", tmp_path / "free.csv", "-m", tmp_path / "machine.toml", "-o", tmp_path / "new.toml"]
-    payload = ["--loaded-logs", tmp_path / "loaded.csv", "--payload", 3.0, "--payload-centre", "0.15,0.05,0.08"]
+    payload = ["--loaded-logs", tmp_path / "loaded.csv", "--payload", "3kg:0.15,0.05,0.08"]
     done = command(*command_line, *payload)
     assert done.status == 0, done.err
     found = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))["channels"]["torque"]["scale"]
@@ -236,16 +236,16 @@ coulomb_slope = 50.0
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("payload", "message"),
     [
-        (["--payload-link", "hand"], "hand"),
-        (["--payload-centre", "0,0,0.1"], "off the link's axis"),
+        ("0.7kg@hand", "hand"),
+        ("0.7kg:0,0,0.1", "off the link's axis"),
     ],
 )
 def test_a_payload_that_does_not_fit_is_one_line_and_nothing_is_written(
-    tmp_path: Path, options: list[object], message: str
+    tmp_path: Path, payload: str, message: str
 ) -> None:
-    arguments = [*currents(tmp_path), "--payload", 0.7, "-o", tmp_path / "new.toml", *options]
+    arguments = [*currents(tmp_path), "--payload", payload, "-o", tmp_path / "new.toml"]
     done = command(*arguments)
     assert done.status != 0
     assert len(done.err.strip().splitlines()) == 1

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import msgspec
 
+from cdtool.base.files.foreign import Kind, refuse_other_kind
+from cdtool.base.files.strict_json import strict_json
 from cdtool.base.registry import Registry
 from cdtool.base.settings import alternatives, bare_type, is_model, keys_of
 from cdtool.commands.scoring.benchmark_file import SECTIONS, BenchmarkTable
@@ -20,6 +25,30 @@ from cdtool.machines.axis_model.model_table import ModelTable
 from cdtool.thresholds import THRESHOLDS
 
 KINDS = ("machine", "benchmark", "protocol")
+
+
+_WRITTEN = Kind(b'"title": "cdtool ', "JSON schema of cdtool")
+
+
+def with_schema(kind: str, file: Path, text: str) -> dict[Path, str]:
+    """Return the texts of a drafted file and of the schema beside it, which its first line names for editors."""
+    schema, own = _beside(kind, file), re.sub(r"^#:schema .*\n", "", text, flags=re.MULTILINE)
+    return {file: f"#:schema ./{schema.name}\n{own}", schema: schema_text(kind)}
+
+
+def refuse_other_schema(kind: str, file: Path, *, force: bool) -> None:
+    """Raise UsageError if the schema beside a file would replace what cdtool did not write."""
+    refuse_other_kind(_beside(kind, file), _WRITTEN, force=force)
+
+
+def _beside(kind: str, file: Path) -> Path:
+    return file.with_name(f"{kind}.schema.json")
+
+
+@cache
+def schema_text(kind: str) -> str:
+    """Return the JSON schema of a machine, benchmark or protocol file, as `cdtool schema` prints it."""
+    return strict_json(schema_of(kind)) + "\n"
 
 
 def schema_of(kind: str) -> dict[str, Any]:
@@ -75,7 +104,8 @@ def _benchmark() -> dict[str, Any]:
     rules = {name: _table(THRESHOLDS.load(name)) for name in THRESHOLDS.names()}
     rules["signature"]["properties"] = {}  # its settings are in [signature]
     made["properties"]["threshold"]["anyOf"] = [{"enum": list(rules)}, _chosen("name", rules, required=False)]
-    made["properties"]["inject"] |= _table(SECTIONS.load("inject").table)
+    for name in ("inject", "tune"):
+        made["properties"][name] |= _table(SECTIONS.load(name).table)
     made["properties"]["protocol"] |= _protocol_table()
     return made
 
