@@ -415,7 +415,7 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
     named = next((found.stream.joints for found in channels.found.values() if found.stream.joints), ())
     if len(named) == channels.joints:
         return named, "names from the columns"
-    return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
+    return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "numbered in the order of the columns"
 
 
 def _clock(channels: Channels, clock: DraftedClock | None, ratio: Ratio | None, geared: bool) -> Clock:

@@ -65,6 +65,10 @@ def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: 
 
     setup = tuning.setup
     document: Any = tomlkit.parse(read_text(setup.path, ConfigurationError).removeprefix("\ufeff"))
+    for key, value in setup.settings.items():  # of --set, in place of the file's
+        table, _, name = key.rpartition(".")
+        if table != "threshold":  # the tuned one is written below
+            (opened_table(document, table) if table else document)[name] = value
     _rebase(document, setup.path.parent, folder)
     document["machine"] = MACHINE
     document["detectors"] = [tuned.detector]
