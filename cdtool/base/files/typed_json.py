@@ -1,6 +1,6 @@
 """Frozen dataclasses as JSON values and back, by the types of their fields.
 
-An instance is an object of its fields, a tuple a list, an array its shape and its bytes in base64. `Any` is a JSON
+An instance is an object of its fields, a tuple a list, an array the list of its numbers. `Any` is a JSON
 value as it is, `Annotated[Any, tuple]` one whose lists are tuples. Numbers are exact, NaN and infinity included. Equal
 texts that are read are one text in memory.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import types
-from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
@@ -166,20 +165,17 @@ def _mapping(inner: tuple[Any, ...]) -> _Form:
 
 
 def _array(inner: tuple[Any, ...]) -> _Form:
-    dtype = np.dtype(get_args(inner[1])[0]).newbyteorder("<")
-
-    def encode(array: Any) -> list[Any]:
-        raw = np.ascontiguousarray(array, dtype=dtype).tobytes()
-        return [list(array.shape), b64encode(raw).decode("ascii")]
+    dtype = np.dtype(get_args(inner[1])[0])
 
     def typed(values: Any) -> Any:
+        if not isinstance(values, list):
+            raise ValueError(" is not a list")
         try:
-            shape, text = values
-            return np.frombuffer(b64decode(text, validate=True), dtype=dtype).reshape(shape)
-        except (TypeError, ValueError) as fault:
+            return np.array(values, dtype=dtype)
+        except (TypeError, ValueError, OverflowError) as fault:
             raise ValueError(f" is not an array: {fault}") from fault
 
-    return _Form(encode, typed)
+    return _Form(lambda array: array.tolist(), typed)
 
 
 def _record(kind: type[Any]) -> _Form:

@@ -29,8 +29,6 @@ from cdtool.report.plots.latency_plot import plot_latencies
 from cdtool.report.plots.style import HATCHES, look_of
 from cdtool.report.plots.trigger_plot import plot_triggers
 from cdtool.report.writers.base import Report
-from cdtool.results.traces.file import _trace as trace_from
-from cdtool.results.traces.file import as_read, trace_values
 from cdtool.results.traces.trace import ContactOutcome, Trace, make_trace
 from cdtool.thresholds.limit import Limit
 from cdtool.truth.matching import Matching, match
@@ -332,21 +330,12 @@ def test_the_triggers_of_all_detectors_are_shaded_from_each_alarm_until_it_is_re
     (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
     trace = make_trace("free", detection.operation, (), (detection,), (matching,))
     assert trace.panels[0].rearmed == detection.verdict.rearmed
-    assert as_read([trace])[0].panels[0].rearmed == pytest.approx(detection.verdict.rearmed)
     with drawing():
         axes = trigger_plot._figure(trace).axes[0]
     shaded = [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
     held = sorted((box.x0, box.x1) for box in shaded if 0.0 < box.width < 2.0)
     assert [start for start, _ in held] == pytest.approx([alarm.time for alarm in detection.verdict.alarms])
     assert [end for _, end in held] == pytest.approx(detection.verdict.rearmed)
-
-
-def test_traces_of_earlier_versions_have_no_times_of_rearming_and_are_still_read(five_alarms):
-    (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
-    values = trace_values(make_trace("free", detection.operation, (), (detection,), (matching,)))
-    for panel in values["panels"]:
-        del panel["rearmed"]
-    assert trace_from(values).panels[0].rearmed == ()
 
 
 def test_every_reason_for_not_assessable_has_a_hatch_and_a_name_in_the_page():
