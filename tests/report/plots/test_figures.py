@@ -25,9 +25,9 @@ from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.report.html.plots import plot_data
 from cdtool.report.plots import latency_plot, trigger_plot
 from cdtool.report.plots.figures import SUFFIXES, drawing, new_figure, save
-from cdtool.report.plots.latency_plot import plot_latencies
+from cdtool.report.plots.latency_plot import latency_figure
 from cdtool.report.plots.style import HATCHES, look_of
-from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.report.plots.trigger_plot import trigger_figure
 from cdtool.report.writers.base import Report
 from cdtool.results.traces.trace import ContactOutcome, Trace, make_trace
 from cdtool.thresholds.limit import Limit
@@ -143,7 +143,7 @@ def missed_by(trace: Trace, name: str) -> Trace:
 
 def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(bench: Bench, simulated, tmp_path):
     trace = missed_by(bench.trace(simulated("stiff", 2), "stiff"), "pure_inertia")
-    plot_triggers(trace, tmp_path / "a.svg")
+    save(trigger_figure(trace), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     order = [next(i for i, text in enumerate(shown) if text.startswith(name)) for name in NAMES]
     by_name = dict(zip(NAMES, order, strict=True))
@@ -157,7 +157,7 @@ def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(ben
 def test_the_row_of_a_detector_that_could_not_assess_the_contact_states_this(bench: Bench, simulated, tmp_path):
     trace = bench.trace(simulated("stiff", 2), "stiff", ("momentum",))
     blind = replace(trace.panels[0], seen=(ContactOutcome("not_assessable", nan, nan, "the axis stands still"),))
-    plot_triggers(replace(trace, panels=(blind,)), tmp_path / "a.svg")
+    save(trigger_figure(replace(trace, panels=(blind,))), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert "not assessable" in shown and "the axis stands still" in shown
     assert not any(text.endswith(" ms") for text in shown)
@@ -166,13 +166,13 @@ def test_the_row_of_a_detector_that_could_not_assess_the_contact_states_this(ben
 def test_a_trace_without_a_load_cell_has_only_rows_of_detectors(bench: Bench, simulated):
     trace = bench.trace(simulated("stiff", 2), "stiff")
     with drawing():
-        assert len(trigger_plot._figure(trace).axes) == len(NAMES) + 1
-        figure = trigger_plot._figure(replace(trace, force_time=np.empty(0), force=np.empty(0)))
+        assert len(trigger_plot.trigger_figure(trace).axes) == len(NAMES) + 1
+        figure = trigger_plot.trigger_figure(replace(trace, force_time=np.empty(0), force=np.empty(0)))
     assert len(figure.axes) == len(NAMES)
 
 
 def test_triggers_of_a_run_without_contact_state_this(bench: Bench, simulated, tmp_path):
-    plot_triggers(bench.trace(simulated("none", 77), "holdout"), tmp_path / "a.svg")
+    save(trigger_figure(bench.trace(simulated("none", 77), "holdout")), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert shown.count("no alarm") == len(NAMES)
     assert any("no contact" in text for text in shown)
@@ -184,18 +184,18 @@ def test_the_same_input_gives_the_same_bytes(bench: Bench, simulated, evaluated,
     written = []
     for name in ("a", "b"):
         plot_detected(found, tmp_path / f"{name}d{suffix}")
-        plot_triggers(trace, tmp_path / f"{name}t{suffix}")
-        plot_latencies(evaluated, tmp_path / f"{name}l{suffix}")
+        save(trigger_figure(trace), tmp_path / f"{name}t{suffix}")
+        save(latency_figure(evaluated), tmp_path / f"{name}l{suffix}")
         written.append([(tmp_path / f"{name}{kind}{suffix}").read_bytes() for kind in "dtl"])
     assert written[0] == written[1]
     assert all(len(content) > 1000 for content in written[0])
 
 
 def test_neither_the_users_settings_nor_ours_leak(evaluated, tmp_path):
-    plot_latencies(evaluated, tmp_path / "a.png")
+    save(latency_figure(evaluated), tmp_path / "a.png")
     with matplotlib.rc_context({"text.usetex": True, "savefig.dpi": 30, "lines.linewidth": 9, "savefig.bbox": "tight"}):
         before = dict(matplotlib.rcParams)
-        plot_latencies(evaluated, tmp_path / "b.png")
+        save(latency_figure(evaluated), tmp_path / "b.png")
         assert dict(matplotlib.rcParams) == before
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
@@ -209,7 +209,7 @@ def test_hostile_names_are_drawn_as_plain_text(bench: Bench, simulated, tmp_path
     plot_detected(bench.detected(recording, "momentum"), tmp_path / f"d{suffix}")
     trace = bench.trace(recording, name, ("momentum",))
     panel = replace(trace.panels[0], detector=name, joint=name, unit=name, reason=name)
-    plot_triggers(replace(trace, recording=name, joints=2, panels=(panel,)), tmp_path / f"t{suffix}")
+    save(trigger_figure(replace(trace, recording=name, joints=2, panels=(panel,))), tmp_path / f"t{suffix}")
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(f"{figure}{suffix}" for figure in "dt")
     if suffix == ".svg":
         for figure in "dt":
@@ -224,8 +224,8 @@ def test_no_text_of_any_figure_is_read_as_mathematics(bench: Bench, simulated, e
     with drawing():
         figures = [
             detection_plot._figure(found),
-            trigger_plot._figure(bench.trace(recording, "stiff")),
-            latency_plot._figure(evaluated),
+            trigger_plot.trigger_figure(bench.trace(recording, "stiff")),
+            latency_plot.latency_figure(evaluated),
         ]
         for figure in figures:
             figure.draw_without_rendering()
@@ -245,8 +245,8 @@ def test_nothing_is_clipped_at_the_edge_of_a_figure(bench: Bench, simulated, six
         figures = [
             detection_plot._figure(found),
             detection_plot._figure(six),
-            trigger_plot._figure(trace),
-            trigger_plot._figure(replace(trace, joints=2, panels=(wide, *trace.panels[1:]))),
+            trigger_plot.trigger_figure(trace),
+            trigger_plot.trigger_figure(replace(trace, joints=2, panels=(wide, *trace.panels[1:]))),
         ]
         for figure in figures:
             assert_within(figure)
@@ -254,14 +254,14 @@ def test_nothing_is_clipped_at_the_edge_of_a_figure(bench: Bench, simulated, six
 
 def test_a_figure_that_cannot_be_written_is_an_error_with_a_hint(evaluated, tmp_path):
     with pytest.raises(CdtoolError, match="no folder") as fault:
-        plot_latencies(evaluated, tmp_path / "no" / "a.png")
+        save(latency_figure(evaluated), tmp_path / "no" / "a.png")
     assert "create the folder first" in fault.value.hint
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(CdtoolError) as fault:
-        plot_latencies(evaluated, tmp_path / "folder.png")
+        save(latency_figure(evaluated), tmp_path / "folder.png")
     assert "is a folder" in fault.value.message
     with pytest.raises(UsageError, match=r"a\.gif") as fault:
-        plot_latencies(evaluated, tmp_path / "a.gif")
+        save(latency_figure(evaluated), tmp_path / "a.gif")
     assert ".svg" in fault.value.hint
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
@@ -331,7 +331,7 @@ def test_the_triggers_of_all_detectors_are_shaded_from_each_alarm_until_it_is_re
     trace = make_trace("free", detection.operation, (), (detection,), (matching,))
     assert trace.panels[0].rearmed == detection.verdict.rearmed
     with drawing():
-        axes = trigger_plot._figure(trace).axes[0]
+        axes = trigger_plot.trigger_figure(trace).axes[0]
     shaded = [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
     held = sorted((box.x0, box.x1) for box in shaded if 0.0 < box.width < 2.0)
     assert [start for start, _ in held] == pytest.approx([alarm.time for alarm in detection.verdict.alarms])
