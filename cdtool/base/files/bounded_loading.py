@@ -17,6 +17,7 @@ import tomllib
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from sys import intern
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -190,7 +191,9 @@ def parse_json(content: bytes) -> Any:
     if not text.strip():
         raise ContentError("it is empty")
     try:
-        return json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_integer)
+        return json.loads(
+            text, parse_constant=_refuse, parse_float=_finite, parse_int=_integer, object_pairs_hook=_object
+        )
     except json.JSONDecodeError as fault:
         raise ContentError(f"truncated or damaged at line {fault.lineno}") from fault
     except RecursionError as fault:
@@ -200,7 +203,7 @@ def parse_json(content: bytes) -> Any:
 def parse_own_json(text: str | bytes) -> Any:
     """Return the values of JSON from inside a file that cdtool wrote, with NaN as it may hold; raises ValueError."""
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=_object)
     except RecursionError as fault:
         raise ContentError("nested too deeply") from fault
 
@@ -264,6 +267,11 @@ def _depth(content: bytes) -> int:
         return 0
     steps = np.where((brackets == ord("[")) | (brackets == ord("{")), 1, -1).astype(np.int8)
     return int(np.cumsum(steps, dtype=np.int32).max())
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object in which equal texts are one text in memory: rows repeat their names."""
+    return {key: intern(value) if type(value) is str else value for key, value in pairs}
 
 
 def _refuse(constant: str) -> float:

@@ -76,7 +76,7 @@ def encode_traces(traces: Sequence[Trace], results_sha256: str = "") -> bytes:
     >>> encode_traces([]) == encode_traces([])
     True
     """
-    text = encoded(TraceFile(SCHEMA_VERSION, results_sha256, tuple(traces)), TraceFile)
+    text = encoded(TraceFile(SCHEMA_VERSION, results_sha256, tuple(traces)))
     return gzip.compress(text.encode(), compresslevel=6, mtime=0)
 
 
@@ -118,7 +118,7 @@ def read_traces(path: Path, results: str | None = None) -> tuple[Trace, ...]:
             _check(trace)
     except ContentError as fault:
         raise RecordingError(f"{path}: damaged, or not a traces file: {fault}", again) from fault
-    except (ValueError, OverflowError) as fault:
+    except ValueError as fault:
         raise RecordingError(f"{path}: damaged, or not a traces file", again) from fault
     if results is not None and hashlib.sha256(results.encode("utf-8", "replace")).hexdigest() != found.results_sha256:
         raise RecordingError(f"{path}: belongs to other results", "put the two files of one benchmark together")
