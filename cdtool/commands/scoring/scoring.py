@@ -204,7 +204,7 @@ def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[CutL
 def _loads(
     setup: BenchmarkFile, group: str, path: Path, ranges: LearnedRanges | None
 ) -> tuple[list[tuple[Path, Callable[[], Recording]]], LogRows]:
-    """Return how a log, or each of its runs, is read, and what is said of the whole log; raises CdtoolError."""
+    """Return how a log, or each of its runs, is read, and the rows of the whole log; raises CdtoolError."""
     base, cut = setup.path.parent, RunCut.of(setup.operations)
 
     def known(name: Path) -> PlausibleRanges | None:
