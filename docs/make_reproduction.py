@@ -24,7 +24,7 @@ from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.signature_store import write_signature
 from cdtool.recordings.recording import Recording
 from cdtool.report.plots.figures import drawing, new_figure, save
-from cdtool.report.plots.trigger_plot import most_informative, plot_triggers
+from cdtool.report.plots.trigger_plot import most_informative, trigger_figure
 from cdtool.results.summary import Summary
 from cdtool.results.traces.decimation import decimate
 from cdtool.thresholds.signature import Signature
@@ -195,7 +195,7 @@ def triggers(done: dict[str, BenchmarkResult]) -> None:
     }
     for (machine, group), number in names.items():
         trace = most_informative([trace for trace in done[machine].traces if trace.group == group])
-        plot_triggers(trace, IMAGES / f"reproduction_{number}.png")
+        save(trigger_figure(trace), IMAGES / f"reproduction_{number}.png")
 
 
 def write_page(parts: dict[str, str]) -> None:

@@ -18,7 +18,6 @@ from cdtool.base.remote.remote_path import check_place, is_remote
 from cdtool.base.value_words import fault_and_place
 from cdtool.report.writers import WRITERS, known_suffixes, own_writers, writer_of
 from cdtool.report.writers.base import Report, Subject, Writer
-from cdtool.results.traces.file import as_read
 
 _FIGURES_IN_FOLDER = re.compile(r"(latency|survival|amoc|forces|(forces|triggers)_[a-z0-9-]+)\.png")
 
@@ -62,8 +61,6 @@ def write_outputs(
     in_folder = [writer.in_folder for writer in own_writers(subject) if writer.in_folder]
     refuse_inputs([*targets, *(folder / name for folder in folders for name in in_folder)], inputs)
     check_outputs(targets, force=force, subject=subject)
-    if targets and isinstance(report, Report):
-        report = replace(report, traces=as_read(report.traces))
     written = []
     step = _steps(progress, sum(_folder_steps(report) if _is_folder(target, subject) else 1 for target in targets))
     for target in targets:

@@ -6,6 +6,7 @@ together with its meaning, from which the published schema is made.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache
@@ -201,6 +202,13 @@ class SweepResult:
     mean_ms: float | None = meant("latency of the detected contacts")
     median_ms: float | None = meant("of the latency, missed contacts taken as later than all; null where not reached")
     in_use: bool = meant("the benchmark's own limits", default=False)
+
+    @property
+    def median(self) -> float:
+        """The median latency [ms]: infinite where it is not reached, NaN if no contact could be assessed."""
+        if not self.detected and not self.missed:
+            return math.nan
+        return math.inf if self.median_ms is None else self.median_ms
 
 
 @dataclass(frozen=True, slots=True)

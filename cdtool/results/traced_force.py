@@ -37,6 +37,11 @@ class TracedForce:
     verdict: ForceVerdict
     alarms: Mapping[str, float]
 
+    @property
+    def name(self) -> str:
+        """Return the name of the recording, with the number of any contact but the first."""
+        return self.recording if self.contact == 1 else f"{self.recording}, contact {self.contact}"
+
 
 def force_profiles(results: Results) -> dict[str, ForceProfile]:
     """Return the profiles with which the results were compared.

@@ -17,6 +17,7 @@ import tomllib
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from sys import intern
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,14 +32,11 @@ if TYPE_CHECKING:
 MIB = 2**20
 # Text written by a person: a machine, benchmark, label or trigger file, a URDF.
 MOST_TEXT = 16 * MIB
-MOST_TOML = 4 * MIB
+# tomllib needs up to 200 times as much memory.
+MOST_TOML = MIB
 # Results, signatures and traces, on disk and unpacked.
 MOST_JSON = 512 * MIB
 MOST_DEPTH = 64
-MOST_KEY_PARTS = 32
-_MOST_TOML_WORDS = 200_000
-_MOST_TOML_ENTRIES = 50_000
-_MOST_WORD = 1000
 #: More broken lines are another kind of file.
 _MOST_BROKEN_LINES = 20
 _SWAPPED = ("a signature file", "a machine file")  # given, needed: commands take both
@@ -52,16 +50,8 @@ _PIECE = MIB
 _MOST_DIGITS = 19
 _LARGEST_INTEGER = 2**63
 
-_TOML_TOKEN = re.compile(
-    r'(?P<lines>"""[^"\\]*+(?:(?:\\.|"(?!""))[^"\\]*+)*+"{3,5}|\'\'\'.*?\'{3,5})'
-    r"|(?P<unclosed>\"\"\"|''')"
-    r'|(?P<text>"[^"\\\n]*+(?:\\[^\n][^"\\\n]*+)*+"?|\'[^\'\n]*+\'?)'
-    r"|#[^\n]*"
-    r"|(?P<word>[A-Za-z0-9_+-]+)"
-    r"|[^\S\n]+"
-    r"|(?P<mark>.)",
-    re.DOTALL,
-)
+# The time that tomllib takes for a key is quadratic in its parts.
+_LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')\s*+\.\s*+){16}""")
 # The end is optional: the rest of an unterminated text is searched only once, not from each of its quotes.
 _JSON_TEXT = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"?', re.DOTALL)
 _NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
@@ -130,16 +120,20 @@ def read_text(path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT) ->
 
 def parse_toml(text: str) -> dict[str, Any]:
     """Return the tables of a TOML text; raises ContentError with the line, or with the key of a number out of range."""
-    _check_toml(text)
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise ContentError(f"a key of more than 16 parts at line {line}")
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
-        found = ContentError(str(fault))
-        line = re.search(r"at line (\d+)", str(fault))  # of tomllib, which has no attribute for it before Python 3.14
-        found.line = int(line[1]) if line else None
-        raise found from fault
-    except (ValueError, RecursionError) as fault:
-        raise ContentError(f"{fault}") from fault
+        broken = ContentError(str(fault))
+        at = re.search(r"at line (\d+)", str(fault))  # of tomllib, which has no attribute for it before Python 3.14
+        broken.line = int(at[1]) if at else None
+        raise broken from fault
+    except RecursionError as fault:
+        raise ContentError("nested too deeply") from fault
+    except ValueError as fault:  # of `int`
+        raise ContentError("a whole number of more than 4300 digits") from fault
     for key, number in _integers(values, ""):
         if not -_LARGEST_INTEGER <= number < _LARGEST_INTEGER:
             raise ContentError(f"{key} is a whole number of {len(str(abs(number)))} digits: more than 64 bits")
@@ -185,13 +179,9 @@ def _not_toml(path: Path, text: str, what: str, fault: ContentError) -> Configur
     return ConfigurationError(f"{path}: is {kind}, not {what}", f"give {what}{swapped}")
 
 
-def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
-    """Return the values of strict JSON in UTF-8: finite numbers, integers of at most 64 bits; raises ContentError.
-
-    `size_on_disk` [bytes]: of the file from which it was unpacked.
-    """
-    if size_on_disk is None:
-        _check_memory(_memory(content), _FREE + _RATIO * len(content))
+def parse_json(content: bytes) -> Any:
+    """Return the values of strict JSON in UTF-8: finite numbers, integers of at most 64 bits; raises ContentError."""
+    _check_memory(_memory(content), _FREE + _RATIO * len(content))
     if _depth(content) > MOST_DEPTH:
         raise ContentError(f"nested more than {MOST_DEPTH} deep")
     try:
@@ -201,7 +191,9 @@ def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
     if not text.strip():
         raise ContentError("it is empty")
     try:
-        return json.loads(text, parse_constant=_refuse, parse_float=_finite, parse_int=_integer)
+        return json.loads(
+            text, parse_constant=_refuse, parse_float=_finite, parse_int=_integer, object_pairs_hook=_object
+        )
     except json.JSONDecodeError as fault:
         raise ContentError(f"truncated or damaged at line {fault.lineno}") from fault
     except RecursionError as fault:
@@ -211,16 +203,13 @@ def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
 def parse_own_json(text: str | bytes) -> Any:
     """Return the values of JSON from inside a file that cdtool wrote, with NaN as it may hold; raises ValueError."""
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=_object)
     except RecursionError as fault:
         raise ContentError("nested too deeply") from fault
 
 
 def unpack_json(content: bytes) -> Any:
-    """Return the values of gzipped strict JSON; ContentError before unpacking that takes far too much memory.
-
-    Otherwise as `parse_json`.
-    """
+    """Return the values of gzipped JSON that cdtool wrote; ContentError, also before it takes far too much memory."""
     bound = _FREE + _PACKED_RATIO * len(content)
     pieces: list[bytes] = []
     memory = 0
@@ -228,7 +217,7 @@ def unpack_json(content: bytes) -> Any:
         memory += _memory(piece)
         _check_memory(memory, bound)
         pieces.append(piece)
-    return parse_json(b"".join(pieces), len(content))
+    return parse_own_json(b"".join(pieces))
 
 
 def _unpacked(content: bytes) -> Iterator[bytes]:
@@ -245,38 +234,6 @@ def _unpacked(content: bytes) -> Iterator[bytes]:
         raise ContentError("not a complete gzip file") from fault
     if stream.unused_data:
         raise ContentError(f"{len(stream.unused_data)} bytes after its end")
-
-
-def _check_toml(text: str) -> None:
-    """Raise ContentError for a text that takes tomllib far more memory, time or stack than a person's file."""
-    depth = dots = entries = escapes = 0
-    for number, token in enumerate(_TOML_TOKEN.finditer(text)):
-        found, kind = token[0], token.lastgroup
-        if kind in ("text", "lines"):
-            escapes += found.count("\\")
-        if number + escapes > _MOST_TOML_WORDS or entries > _MOST_TOML_ENTRIES:
-            raise ContentError(f"more than {_MOST_TOML_ENTRIES} keys or {_MOST_TOML_WORDS} words")
-        if kind == "unclosed":
-            raise ContentError(f"a text that begins {_line(text, token)} is not terminated")
-        if kind == "word" and len(found) > _MOST_WORD:
-            raise ContentError(f"a number or key of {len(found)} characters {_line(text, token)}")
-        if kind in (None, "text", "lines", "word"):
-            continue
-        if found == ".":
-            dots += 1
-            entries += dots > 1
-            if dots >= MOST_KEY_PARTS:
-                raise ContentError(f"a key of more than {MOST_KEY_PARTS} parts {_line(text, token)}")
-            continue
-        dots = 0
-        entries += found in "=[{"
-        depth = max(0, depth + (found in "[{") - (found in "]}"))
-        if depth > MOST_DEPTH:
-            raise ContentError(f"nested more than {MOST_DEPTH} deep {_line(text, token)}")
-
-
-def _line(text: str, token: re.Match[str]) -> str:
-    return f"at line {text.count(chr(10), 0, token.start()) + 1}"
 
 
 def _integers(value: Any, key: str) -> Iterator[tuple[str, int]]:
@@ -310,6 +267,11 @@ def _depth(content: bytes) -> int:
         return 0
     steps = np.where((brackets == ord("[")) | (brackets == ord("{")), 1, -1).astype(np.int8)
     return int(np.cumsum(steps, dtype=np.int32).max())
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object in which equal texts are one text in memory: rows repeat their names."""
+    return {key: intern(value) if type(value) is str else value for key, value in pairs}
 
 
 def _refuse(constant: str) -> float:

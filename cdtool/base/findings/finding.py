@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Any
 
 from cdtool.base.findings.kinds import Severity, kind_of
 from cdtool.base.findings.words import FindingWords
@@ -35,7 +35,7 @@ class Finding:
 
     kind: str
     channel: str = ""
-    numbers: Mapping[str, Annotated[Any, tuple]] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)
     severity: Severity = ""  # type: ignore[assignment]  # completed below
     file: str = ""
 
@@ -45,6 +45,7 @@ class Finding:
         if self.numbers.keys() != set(kind.numbers):
             raise ValueError(f"a finding '{self.kind}' has the numbers {kind.numbers}, not {tuple(self.numbers)}")
         object.__setattr__(self, "severity", self.severity or kind.severity)
+        object.__setattr__(self, "numbers", {name: _with_tuples(value) for name, value in self.numbers.items()})
 
     def __hash__(self) -> int:
         return hash((self.kind, self.channel, self.severity, self.file))  # its numbers may be nested
@@ -86,6 +87,11 @@ class Finding:
             "kind": self.kind,
             "numbers": dict(self.numbers),
         }
+
+
+def _with_tuples(value: Any) -> Any:
+    """Return a value whose lists are tuples: a finding that was read from JSON equals the one that was written."""
+    return tuple(map(_with_tuples, value)) if isinstance(value, list | tuple) else value
 
 
 def remark(text: str, channel: str = "", severity: Severity = "warning") -> Finding:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.protocol.assessment.assessment import check_point, judge
-from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason
 from cdtool.commands.protocol.measuring import Assignment, assign, profiles_of
 from cdtool.commands.protocol.protocol_file import ProtocolFile, read_protocol_file
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
@@ -57,21 +57,21 @@ def check_protocol(path: str | Path) -> CheckedProtocol:
     more: list[Reason] = []
     setup: BenchmarkFile | None = None
     if file.benchmark is None:
-        more.append(Reason(ReasonKind.NO_VALUE, {"key": "protocol.benchmark", "file": file.path.name}))
+        more.append(Reason("no_value", {"key": "protocol.benchmark", "file": file.path.name}))
     else:
         try:
             setup = read_benchmark_file(file.benchmark, learning=False, detectors=["all"])
             if setup.detectors:  # the next command scores them
                 read_benchmark_file(file.benchmark)
         except CdtoolError as fault:
-            more.append(Reason(ReasonKind.BENCHMARK_UNREADABLE, {"message": str(fault)}, due="test_day"))
+            more.append(Reason("benchmark_unreadable", {"message": str(fault)}, due="test_day"))
     assignment = assign(file, setup) if setup else Assignment((), {})
     if setup is None:
         points = [check_point(point, file.profile_of(point), 0) for point in file.plan.points]
     else:
         if not setup.machine_file.maps("force"):
             values = {"key": "channels.force", "file": setup.machine_file.path.name}
-            more.append(Reason(ReasonKind.NO_VALUE, values))
+            more.append(Reason("no_value", values))
         logs_pressure = setup.machine_file.maps(CONTACT_PRESSURE)
         points = [
             check_point(item.point, profiles_of(item, file, setup), len(item.logs), logs_pressure=logs_pressure)

@@ -84,7 +84,7 @@ def check(
     reasons = checked.verdict.reasons
     if as_json:
         items = [
-            {"kind": item.kind.value, "due": item.due, **{key: _plain(value) for key, value in item.values.items()}}
+            {"kind": item.kind, "due": item.due, **{key: _plain(value) for key, value in item.values.items()}}
             for item in reasons
         ]
         print_json({"complete": not reasons, "incomplete": items, "recordings": checked.recordings})

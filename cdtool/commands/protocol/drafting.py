@@ -11,8 +11,6 @@ from statistics import median
 from textwrap import wrap
 from typing import Any
 
-import numpy as np
-
 from cdtool.base.errors import UsageError
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import counted, digits
@@ -27,14 +25,12 @@ from cdtool.commands.protocol.assessment.plan import (
     MeasuringPoint,
     TestParticulars,
 )
+from cdtool.commands.protocol.assessment.speed import speed_before
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.scoring.scoring import logs_to_score
 from cdtool.results.results import Skipped
 from cdtool.truth.force.limits import ForceProfile, read_force_limits
 from cdtool.truth.missing_samples import cell_samples
-
-# Time before the contact over which its speed is averaged [s].
-_BEFORE = 0.1
 
 
 @dataclass(frozen=True)
@@ -176,22 +172,10 @@ def _point(point: _Point, read: Sequence[CutLog]) -> dict[str, tuple[str, str]]:
         known["profile"] = (_text(point.profile.name), "as in the benchmark file")
         if stiffness := point.profile.obstacle_stiffness_n_per_mm:
             known["obstacle_stiffness_n_per_mm"] = (digits(stiffness), "CHECK: as the profile requires")
-    speeds = [speed for item in read for speed in _speeds(item)]
-    if speeds:
+    speeds = [speed_before(item.recording, contact) for item in read for contact in item.contacts]
+    if speeds := [speed for speed in speeds if speed is not None and math.isfinite(speed)]:
         known["speed_m_per_s"] = (digits(round(median(speeds), 3)), "CHECK: measured before the contacts")
     return known
-
-
-def _speeds(read: CutLog) -> Iterator[float]:
-    """Yield the speed before each contact [m/s], of a machine that moves in m/s."""
-    if "speed" not in read.recording or read.recording["speed"].unit != "m/s":
-        return
-    series = read.recording["speed"]
-    for contact in read.contacts:
-        part = series.between(contact.start - _BEFORE, contact.start).values
-        speed = float(np.nanmean(np.max(np.abs(part), axis=1))) if part.size and np.isfinite(part).any() else math.nan
-        if math.isfinite(speed):
-            yield speed
 
 
 def _profiles_known() -> list[str]:

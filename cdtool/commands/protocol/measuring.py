@@ -18,7 +18,7 @@ from cdtool.commands.judging.runs import absent_truth, find_logs, resolve_all
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.commands.protocol.assessment.plan import MeasuringPoint
 from cdtool.commands.protocol.assessment.pressure import pressure_record
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind
+from cdtool.commands.protocol.assessment.reasons import Reason
 from cdtool.commands.protocol.assessment.speed import speed_before
 from cdtool.commands.protocol.protocol_file import ProtocolFile
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
@@ -136,7 +136,7 @@ def _found(patterns: Sequence[str], file: ProtocolFile, key: str) -> tuple[list[
             found += find_logs([pattern], file.path.parent, f"{file.path}: protocol.{key}.logs", runs=True)
         except ConfigurationError:
             values = {"entry": f"protocol.{key}.logs", "pattern": pattern}
-            missing.append(Reason(ReasonKind.NO_FILE, values, due="test_day"))
+            missing.append(Reason("no_file", values, due="test_day"))
     return found, missing
 
 

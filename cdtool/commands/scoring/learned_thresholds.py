@@ -14,7 +14,7 @@ from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.learning.calibration import calibrate, in_fixed_order, kept
 from cdtool.commands.learning.fitting import NoUsableRunError, Pair, fitting, signals_of, with_left_out
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
-from cdtool.commands.scoring.scoring import LeftOut
+from cdtool.commands.scoring.scoring import left_out_by
 from cdtool.execution.starting import shares_memory
 from cdtool.execution.workers import Workers, in_order
 from cdtool.machines.dynamics import Machine
@@ -65,7 +65,7 @@ def learn_thresholds(
         return learned
     if of_run and not setup.learn:
         raise UsageError(f"a false-alarm budget of {setup.budget} is set on runs", "add impact-free logs: [learn] logs")
-    left_out = LeftOut()
+    left_out: dict[str, Sequence[Skipped]] = {}
     unused: list[set[str]] = []
     # Without a budget, to learn takes no longer than to start processes. Logs that are scored too need all pairs here.
     at_once = setup.budget and not setup.both and shares_memory()
@@ -81,13 +81,13 @@ def learn_thresholds(
                 learned.findings.append(RecordingFinding.of(detector.name, unassessable))
             continue
         skipped = [*of_detector.skipped, *of_detector.made.skipped]
-        left_out.add(detector.name, skipped)
+        left_out[detector.name] = skipped
         unused.append({item.recording for item in (*skipped, *of_detector.made.creeping)})
         learned.calibration.extend(of_detector.made.calibration)
         learned.thresholds[detector.name] = of_detector.made.thresholds
         learned.findings.extend(of_detector.made.findings)
         learned.pairs[detector.name] = of_detector.pairs
-    learned.skipped.extend(left_out.combined())
+    learned.skipped.extend(left_out_by(left_out))
     learned.unused.update(set.intersection(*unused) if unused else ())
     if learned.unusable and len(learned.unusable) == len(detectors):
         raise _none_usable(learned.unusable, known=bool(operations))

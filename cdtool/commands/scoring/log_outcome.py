@@ -15,7 +15,7 @@ from cdtool.commands.judging.judged_operation import Judged
 from cdtool.commands.judging.matched_log import MatchedLog, UncutStrokes
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.detector_inputs import inputs_of
-from cdtool.commands.scoring.scoring import LeftOut, LogRows, ScoredLog
+from cdtool.commands.scoring.scoring import LogRows, ScoredLog, left_out_by
 from cdtool.report.explanation_words import words
 from cdtool.results.curves.sweep import Swept
 from cdtool.results.explanation.explanation import explain_operation
@@ -117,10 +117,7 @@ class LogOutcome:
     @property
     def skipped(self) -> tuple[Skipped, ...]:
         """Return what was left out of the log; what all detectors left out for the same reason is listed once."""
-        left_out = LeftOut()
-        for item in self.detectors:
-            left_out.add(item.detector, item.failed)
-        return (*self.rows.skipped, *left_out.combined())
+        return (*self.rows.skipped, *left_out_by({item.detector: item.failed for item in self.detectors}))
 
     @property
     def findings(self) -> tuple[RecordingFinding, ...]:

@@ -33,7 +33,6 @@ from cdtool.commands.judging.runs import (
 from cdtool.commands.judging.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.force_rows import force_rows
-from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.motion.applicable import HOLD
@@ -46,27 +45,16 @@ from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.verdict import ForceVerdict, assess_force
 
 
-class LeftOut:
-    """Runs left out by detectors: a reason shared by all detectors is listed once, others name their detectors."""
-
-    def __init__(self) -> None:
-        self._detectors: dict[str, None] = {}
-        self._reasons: dict[Skipped, dict[str, None]] = {}
-
-    def add(self, detector: str, skipped: Iterable[Skipped]) -> None:
-        """Add what one detector left out; may be empty."""
-        self._detectors[detector] = None
+def left_out_by(detectors: Mapping[str, Iterable[Skipped]]) -> list[Skipped]:
+    """Return the runs that detectors left out: a reason that all share is listed once, others name their detectors."""
+    names: dict[Skipped, dict[str, None]] = {}
+    for detector, skipped in detectors.items():
         for item in skipped:
-            self._reasons.setdefault(item, {})[detector] = None
-
-    def combined(self) -> list[Skipped]:
-        """Return each run with each reason once."""
-        return [
-            item
-            if len(names) == len(self._detectors)
-            else Skipped(item.recording, f"{', '.join(names)}: {item.reason}")
-            for item, names in self._reasons.items()
-        ]
+            names.setdefault(item, {})[detector] = None
+    return [
+        item if len(by) == len(detectors) else Skipped(item.recording, f"{', '.join(by)}: {item.reason}")
+        for item, by in names.items()
+    ]
 
 
 @dataclass(frozen=True)
@@ -124,10 +112,7 @@ class ScoredLog:
     @property
     def left_out(self) -> list[Skipped]:
         """Return everything that was left out; what all detectors left out for the same reason is listed once."""
-        combined = LeftOut()
-        for name, failed in self.detections.failed.items():
-            combined.add(name, failed)
-        return [*self.rows.skipped, *combined.combined()]
+        return [*self.rows.skipped, *left_out_by(self.detections.failed)]
 
 
 # Returns the detections in the operations of a log or run, given by its path.
@@ -187,22 +172,13 @@ def score_runs(
     A log or detector that fails is left out and reported, and nothing is raised. `factors`: the safety factors of the
     sweep by detector. `group` is empty for a log outside all groups. Values outside the plausible `ranges` are masked.
     """
-    cut = RunCut.of(setup.operations)
-    if cut is None:
-        return [_score(setup, group, path, detect, factors, path, partial(_whole, setup, group, path, ranges))]
     begin = perf_counter()
     try:
-        runs = read_runs(path, setup.machine_file, cut)
+        loads, of_log = _loads(setup, group, path, ranges)
     except CdtoolError as fault:
         return [_unread(setup, path, fault, perf_counter() - begin)]
-    seconds = perf_counter() - begin
-    skipped, findings = reported(runs, path, setup.path.parent)
-    rows = LogRows(None, skipped=tuple(skipped), findings=tuple(findings))
-    scored = [ScoredLog(rows, reading=seconds)]
-    for logged in runs.runs:
-        run = location(logged.recording.source)
-        scored.append(_score(setup, group, path, detect, factors, run, partial(_run, setup, run, logged, ranges)))
-    return scored
+    scored = [ScoredLog(of_log, reading=perf_counter() - begin)] if RunCut.of(setup.operations) else []
+    return [*scored, *(_score(setup, group, path, detect, factors, name, load) for name, load in loads)]
 
 
 def _unread(setup: BenchmarkFile, path: Path, fault: CdtoolError, seconds: float) -> ScoredLog:
@@ -212,17 +188,12 @@ def _unread(setup: BenchmarkFile, path: Path, fault: CdtoolError, seconds: float
 
 def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[CutLog | Skipped]:
     """Yield a log as it is scored, or each of its runs; the reason for one that cannot be used."""
-    cut = RunCut.of(setup.operations)
-    loads = [(path, partial(_whole, setup, group, path, None))]
-    if cut is not None:
-        try:
-            runs = read_runs(path, setup.machine_file, cut)
-        except CdtoolError as fault:
-            yield unread(path, setup.path.parent, fault)
-            return
-        yield from reported(runs, path, setup.path.parent)[0]
-        names = [location(logged.recording.source) for logged in runs.runs]
-        loads = [(name, partial(_run, setup, name, item, None)) for name, item in zip(names, runs.runs, strict=True)]
+    try:
+        loads, of_log = _loads(setup, group, path, None)
+    except CdtoolError as fault:
+        yield unread(path, setup.path.parent, fault)
+        return
+    yield from of_log.skipped
     for name, load in loads:
         try:
             yield _cut_log(setup, group, path, name, load)
@@ -230,21 +201,27 @@ def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[CutL
             yield unread(name, setup.path.parent, fault)
 
 
-def _whole(setup: BenchmarkFile, group: str, path: Path, ranges: LearnedRanges | None) -> Recording:
-    base = setup.path.parent
-    known = _of_others(ranges, shown_path(path, base))
-    return read_named(path, setup.machine_file_of(group), base, known, setup.onset)
+def _loads(
+    setup: BenchmarkFile, group: str, path: Path, ranges: LearnedRanges | None
+) -> tuple[list[tuple[Path, Callable[[], Recording]]], LogRows]:
+    """Return how a log, or each of its runs, is read, and the rows of the whole log; raises CdtoolError."""
+    base, cut = setup.path.parent, RunCut.of(setup.operations)
 
+    def known(name: Path) -> PlausibleRanges | None:
+        return None if ranges is None else ranges.without(shown_path(name, base))
 
-def _run(setup: BenchmarkFile, path: Path, logged: LoggedRecording, ranges: LearnedRanges | None) -> Recording:
-    base = setup.path.parent
-    known = _of_others(ranges, shown_path(path, base))
-    return named_on_load_side(logged, path, setup.machine_file, base, known, setup.onset)
-
-
-def _of_others(ranges: LearnedRanges | None, name: str) -> PlausibleRanges | None:
-    """Return the plausible ranges that a log is compared with; none if none are learned."""
-    return None if ranges is None else ranges.without(name)
+    if cut is None:
+        return [
+            (path, lambda: read_named(path, setup.machine_file_of(group), base, known(path), setup.onset))
+        ], LogRows(None)
+    runs = read_runs(path, setup.machine_file, cut)
+    skipped, findings = reported(runs, path, base)
+    names = [location(logged.recording.source) for logged in runs.runs]
+    loads = [
+        (name, partial(named_on_load_side, logged, name, setup.machine_file, base, known(name), setup.onset))
+        for name, logged in zip(names, runs.runs, strict=True)
+    ]
+    return [*loads], LogRows(None, skipped=tuple(skipped), findings=tuple(findings))
 
 
 def _cut_log(setup: BenchmarkFile, group: str, log: Path, path: Path, load: Callable[[], Recording]) -> CutLog:

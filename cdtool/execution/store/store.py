@@ -140,7 +140,7 @@ class Store:
     def keep_sources(self, name: str, sources: _Sources) -> None:
         """Keep the files from which a recording was read."""
         if not self.is_remote and sources != self.last_sources(name):
-            self.keep("sources", digest_of(name), encoded(sources, _Sources))
+            self.keep("sources", digest_of(name), encoded(sources))
 
     def sources_of(self, name: str, files: Sequence[Path]) -> _Sources | None:
         """Return the files of a recording as they are now; None if one of them cannot be read, or changes meanwhile."""

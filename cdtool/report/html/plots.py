@@ -22,10 +22,11 @@ from cdtool.report.table import Log
 from cdtool.report.table import shown as named
 from cdtool.report.tables.results import part_of
 from cdtool.report.writers.base import Report
-from cdtool.results.results import ContactResult, ForceResult, Results, SweepResult, grouped
-from cdtool.results.summary import Summary, latencies
+from cdtool.results.curves.amoc import AmocCurve, amoc_curves
+from cdtool.results.curves.survival_curves import survival_curves
+from cdtool.results.results import ContactResult, ForceResult, Results, grouped
+from cdtool.results.summary import Summary
 from cdtool.results.traces.trace import Trace
-from cdtool.statistics.kaplan_meier import survival
 from cdtool.statistics.rates import poisson_at_most
 from cdtool.statistics.small_sample import FEWEST
 
@@ -56,7 +57,7 @@ def plot_data(report: Report) -> dict[str, Any]:
         "axes": AXES,
         "reasons": REASONS,
         "latency": (_histograms if many else _latency)(results, of_groups, contacts),
-        "survival": _survival(results, groups, contacts, MOST_STEPS if many else None),
+        "survival": _survival(results, groups, MOST_STEPS if many else None),
         "amoc": _amoc(results, groups),
         "force": _force(report),
     }
@@ -90,7 +91,6 @@ def shown(name: object) -> str:
 
 def _latency(results: Results, summaries: Sequence[Summary], contacts: Contacts) -> list[dict[str, Any]]:
     recordings = {(item.group, item.recording): i for i, item in enumerate(results.recordings)}
-    detectors = {name: i for i, name in enumerate(results.detectors)}
     found: dict[str, dict[str, Any]] = {}
     for item in summaries:
         if not item.contacts:
@@ -101,11 +101,7 @@ def _latency(results: Results, summaries: Sequence[Summary], contacts: Contacts)
         missed = [row for row in rows if row.outcome == "missed"]
         group["rows"].append(
             {
-                "detector": detectors[item.detector],
-                "median": [short(value) for value in _median(item)],
-                "open": _open_end(item),
-                "words": f"median {with_interval(item.median)} ms",
-                "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
+                **_about(results, item),
                 "latency": [short(row.latency_ms) for row in detected],
                 "recording": [recordings.get((row.group, row.recording), -1) for row in detected],
                 "contact": [row.contact for row in detected],
@@ -119,7 +115,6 @@ def _latency(results: Results, summaries: Sequence[Summary], contacts: Contacts)
 
 def _histograms(results: Results, summaries: Sequence[Summary], contacts: Contacts) -> list[dict[str, Any]]:
     """Return for each group the numbers of contacts in classes of latency, which all its detectors share."""
-    detectors = {name: i for i, name in enumerate(results.detectors)}
     found = []
     for group in results.groups:
         items = [item for item in summaries if item.group == group and item.contacts]
@@ -130,11 +125,7 @@ def _histograms(results: Results, summaries: Sequence[Summary], contacts: Contac
         edges = _edges(np.concatenate(latency))
         rows = [
             {
-                "detector": detectors[item.detector],
-                "median": [short(value) for value in _median(item)],
-                "open": _open_end(item),
-                "words": f"median {with_interval(item.median)} ms",
-                "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
+                **_about(results, item),
                 "numbers": np.histogram(np.clip(of_detector, edges[0], edges[-1]), edges)[0].tolist(),
             }
             for item, of_detector in zip(items, latency, strict=True)
@@ -153,72 +144,68 @@ def _edges(latency: FloatArray) -> FloatArray:
     return np.linspace(0.0, highest * 1.0001, CLASSES + 1)
 
 
-def _median(item: Summary) -> tuple[float, ...]:
-    """Return the median with its interval; only the median if a plot draws none."""
-    median = item.median
-    return (median.value,) if draws_no_interval(item) else (median.value, median.low, median.high)
+def _about(results: Results, item: Summary) -> dict[str, Any]:
+    """Return what a row of latencies says of a detector: its median with the interval, and its outcomes.
+
+    The interval is left out if a plot draws none; `open` is where one without an upper end begins [ms], and in words.
+    """
+    median, least = item.median, open_end(item)
+    shown_ends = (median.value,) if draws_no_interval(item) else (median.value, median.low, median.high)
+    return {
+        "detector": results.detectors.index(item.detector),
+        "median": [short(value) for value in shown_ends],
+        "open": (short(least[0]), least[1]) if least else None,
+        "words": f"median {with_interval(median)} ms",
+        "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
+    }
 
 
-def _open_end(item: Summary) -> tuple[float | int | None, str] | None:
-    """Return where an open interval begins [ms], and it in words; null if both ends are drawn."""
-    least = open_end(item)
-    return (short(least[0]), least[1]) if least else None
-
-
-def _survival(results: Results, groups: Sequence[str], contacts: Contacts, most: int | None) -> list[dict[str, Any]]:
+def _survival(results: Results, groups: Sequence[str], most: int | None) -> list[dict[str, Any]]:
+    curves = grouped([item for item in survival_curves(results) if item.contacts > item.not_assessable], "group")
     found = []
-    for group in groups:
+    for group in (group for group in groups if group in curves):
         rows = []
-        for i, name in enumerate(results.detectors):
-            latency, censored = latencies(contacts.get((group, name), ()))
-            if not len(latency):
-                continue
-            curve = survival(latency, censored)
+        for item in curves[group]:
             # A step begins where the share changes; the other points show nothing new.
-            kept = np.flatnonzero(np.diff(curve.share, prepend=2.0))
+            kept = np.flatnonzero(np.diff(item.curve.share, prepend=2.0))
             if most and len(kept) > most:
                 kept = kept[np.unique(np.linspace(0, len(kept) - 1, most).round().astype(np.intp))]
-            keys = ("times", "share", *(("low", "high") if len(latency) >= FEWEST else ()))
-            columns = {key: _numbers(getattr(curve, key)[kept]) for key in keys}
-            rows.append({"detector": i, **columns, "until": short(float(latency.max())), "n": len(latency)})
-        if rows:
-            found.append({"group": shown(group), "rows": rows, "height": PLOT_HEIGHT})
+            count = item.contacts - item.not_assessable
+            keys = ("times", "share", *(("low", "high") if count >= FEWEST else ()))
+            columns = {key: _numbers(getattr(item.curve, key)[kept]) for key in keys}
+            number_of = results.detectors.index(item.detector)
+            rows.append({"detector": number_of, **columns, "until": short(item.end), "n": count})
+        found.append({"group": shown(group), "rows": rows, "height": PLOT_HEIGHT})
     return found
 
 
 def _amoc(results: Results, groups: Sequence[str]) -> list[dict[str, Any]]:
-    parts: dict[str, dict[str, list[SweepResult]]] = {}
-    for item in (row for row in results.sweep if row.group in groups):
-        parts.setdefault(item.group, {}).setdefault(item.detector, []).append(item)
-    found = []
-    for group, detectors in parts.items():
-        rows = []
-        for i, name in enumerate(results.detectors):
-            points = detectors.get(name, [])
-            if points and points[0].hours and points[0].operations:
-                rows.append({"detector": i, **_curve(points)})
-        if rows:
-            found.append({"group": shown(group), "rows": rows, "height": PLOT_HEIGHT + 20})
-    return found
+    curves = [item for item in amoc_curves(results) if item.group in groups and item.detector in results.detectors]
+    return [
+        {
+            "group": shown(group),
+            "rows": [{"detector": results.detectors.index(item.detector), **_curve(item)} for item in items],
+            "height": PLOT_HEIGHT + 20,
+        }
+        for group, items in grouped(curves, "group").items()
+    ]
 
 
-def _curve(points: Sequence[SweepResult]) -> dict[str, Any]:
+def _curve(item: AmocCurve) -> dict[str, Any]:
     """Return a detector's points by factor; `chosen` is the position of the factor in use."""
-    first = points[0]
-    factors = np.array([item.safety_factor for item in points])
     return {
-        "factor": _numbers(factors),
-        "alarms": [item.false_alarms for item in points],
-        "median": [short(item.median_ms) for item in points],
-        "detected": [item.detected for item in points],
-        "missed": [item.missed for item in points],
-        "not_assessable": first.not_assessable,
-        "chosen": next((i for i, item in enumerate(points) if item.in_use), -1),
-        "operations": first.operations,
-        "hours": short(first.hours),
+        "factor": [short(point.safety_factor) for point in item.points],
+        "alarms": [point.false_alarms for point in item.points],
+        "median": [short(point.median_ms) for point in item.points],
+        "detected": [point.detected for point in item.points],
+        "missed": [point.missed for point in item.points],
+        "not_assessable": item.not_assessable,
+        "chosen": item.in_use,
+        "operations": item.operations,
+        "hours": short(item.hours),
         "none": {
-            "operation": number(poisson_at_most(0, float(first.operations))),
-            "hour": number(poisson_at_most(0, first.hours)),
+            "operation": number(poisson_at_most(0, float(item.operations))),
+            "hour": number(poisson_at_most(0, item.hours)),
         },
     }
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from cdtool.base.errors import CdtoolError
 from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.self_contained import content_policy, page_part, page_template
-from cdtool.report.plots.figures import png
+from cdtool.report.plots.figures import encoded
 from cdtool.report.table import Cell, Heading, Table, name_cell
 from cdtool.results.results import RecordingFinding, Skipped
 
@@ -72,7 +72,8 @@ def images_of(figures: Sequence[tuple[Callable[[], Figure], str]]) -> tuple[Page
             figure = draw()
         except CdtoolError:  # a figure that cannot be drawn does not cost the page
             continue
-        source = f"data:image/png;base64,{base64.b64encode(png(figure)).decode()}"
+        picture = encoded(figure, ".png")
+        source = f"data:image/png;base64,{base64.b64encode(picture).decode()}"
         images.append(PageImage(source, caption, round(figure.get_figwidth() * _PIXELS)))
     return tuple(images)
 

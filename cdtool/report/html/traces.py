@@ -1,59 +1,71 @@
 """Traces as compact JSON for the HTML report's trigger plots: a curve is a short text of differences.
 
-Conventions: whole numbers of a stated step, as in the file of traces; each is written as its difference from the one
+Conventions: whole numbers of a stated step; each is written as its difference from the one
 before in base 32, lowest digit first, zigzag signed, all digits but the last marked; "!" is missing, "^" and "_" are
 without a limit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import groupby
 from typing import Any
 
 import numpy as np
 
+from cdtool.base.arrays import FloatArray
+from cdtool.base.files.strict_json import finite
+from cdtool.base.files.typed_json import plain as values_of
 from cdtool.base.plain_text import plain
-from cdtool.results.traces.file import NO_LIMIT, trace_values
-from cdtool.results.traces.trace import Trace
+from cdtool.results.traces.trace import Panel, Trace
 
 ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
 MISSING, ABOVE_ALL, BELOW_ALL = "!", "^", "_"
 
 _BYTES = np.frombuffer(ALPHABET.encode(), dtype=np.uint8)
+# Steps over the range of a panel, the step of a time [s] and the most of them.
+_LEVELS, _TIME_STEP, _TIMES = 8000, 1e-5, 1e9
 # Heights [px] of the parts of a trigger plot: load cell, a detector's row, and the time axis.
 HEIGHTS = {"force": 138, "row": 120, "axis": 44}
 
 
 def trace_data(trace: Trace, detectors: Mapping[str, int]) -> dict[str, Any]:
     """One trace as JSON values; `detectors` are numbered."""
-    values = trace_values(trace)
-    panels = [
-        {
-            **{key: plain(panel[key]) for key in ("unit", "joint", "verdict", "reason")},
-            "detector": detectors[panel["detector"]],
-            "seen": [{**seen, "reason": plain(seen["reason"])} for seen in panel["seen"]],
-            "alarms": panel["alarms"],
-            "false_alarms": panel["false_alarms"],
-            "rearmed": panel["rearmed"],
-            "why": [plain(line) for line in panel["why"]],
-            **{name: _curve(panel[name]) for name in ("time", "value", "lower", "upper")},
-            "status": [[code, len(list(same))] for code, same in groupby(panel["status"])],
-        }
-        for panel in values["panels"]
-        if panel["detector"] in detectors
-    ]
-    return {
-        **{key: plain(values[key]) for key in ("recording", "group", "chosen")},
-        **{key: values[key] for key in ("start", "end", "contact", "view", "joints")},
+    # Neighbouring times are at most so many steps apart that the page's 32-bit numbers hold them.
+    time_step = max(_TIME_STEP, (trace.end - trace.start) / _TIMES)
+    made: dict[str, Any] = {
+        **{key: plain(getattr(trace, key)) for key in ("recording", "group", "chosen")},
+        **{key: getattr(trace, key) for key in ("start", "end", "contact", "view", "joints")},
         "contacts": [
-            {**contact, "found_by": plain(contact["found_by"]), "kind": plain(contact["kind"])}
-            for contact in values["contacts"]
+            {**values_of(contact), "found_by": plain(contact.found_by), "kind": plain(contact.kind)}
+            for contact in trace.contacts
         ],
-        "force_time": _curve(values["force_time"]),
-        "force": _curve(values["force"]),
-        "panels": panels,
+        "force_time": _curve(trace.force_time, trace.start, time_step),
+        "force": _curve(trace.force, *_scale(trace.force)),
+        "panels": [
+            _panel(panel, detectors[panel.detector], _curve(panel.course.time, trace.start, time_step))
+            for panel in trace.panels
+            if panel.detector in detectors
+        ],
         "height": plot_height(trace),
+    }
+    return {key: finite(value) for key, value in made.items()}
+
+
+def _panel(panel: Panel, detector: int, time: Mapping[str, Any]) -> dict[str, Any]:
+    course = panel.course
+    scale = _scale(course.value, course.lower, course.upper)
+    return {
+        **{key: plain(getattr(panel, key)) for key in ("unit", "joint", "verdict", "reason")},
+        "detector": detector,
+        "seen": [{**values_of(seen), "reason": plain(seen.reason)} for seen in panel.seen],
+        "alarms": panel.alarms,
+        "false_alarms": panel.false_alarms,
+        "rearmed": panel.rearmed,
+        "why": [plain(line) for line in panel.why],
+        "time": time,
+        **{name: _curve(getattr(course, name), *scale) for name in ("value", "lower", "upper")},
+        "status": [[code, len(list(same))] for code, same in groupby(course.status.tolist())],
     }
 
 
@@ -62,13 +74,10 @@ def plot_height(trace: Trace) -> int:
     return HEIGHTS["force"] * bool(len(trace.force)) + HEIGHTS["row"] * len(trace.panels) + HEIGHTS["axis"]
 
 
-def packed(numbers: Sequence[int | None]) -> str:
-    """Whole numbers as a short text (see above)."""
-    marks = np.array([0 if n is None else n for n in numbers], dtype=np.int64)
-    absent = np.array([n is None for n in numbers], dtype=bool)
-    special = absent | (np.abs(marks) == NO_LIMIT)
-    kept = marks[~special]
-    steps = np.diff(kept, prepend=0)
+def packed(numbers: FloatArray) -> str:
+    """Whole numbers (n,), NaN and infinity as a short text (see above)."""
+    known = np.isfinite(numbers)
+    steps = np.diff(numbers[known].astype(np.int64), prepend=0)
     rest = np.where(steps < 0, -2 * steps - 1, 2 * steps)
     digits, more = [], np.ones(len(rest), dtype=bool)
     while more.any():
@@ -76,15 +85,23 @@ def packed(numbers: Sequence[int | None]) -> str:
         # 0 marks a place without a digit: no letter of the alphabet has that code.
         digits.append(np.where(more, _BYTES[(rest & 31) + 32 * (later > 0)], 0))
         more, rest = more & (later > 0), later
-    columns = np.zeros((len(marks), max(len(digits), 1)), dtype=np.uint8)
-    columns[special, 0] = ord(ABOVE_ALL)
-    columns[marks == -NO_LIMIT, 0] = ord(BELOW_ALL)
-    columns[absent, 0] = ord(MISSING)
+    columns = np.zeros((len(numbers), max(len(digits), 1)), dtype=np.uint8)
     for place, digit in enumerate(digits):
-        columns[~special, place] = digit
+        columns[known, place] = digit
+    columns[np.isnan(numbers), 0] = ord(MISSING)
+    columns[numbers == np.inf, 0] = ord(ABOVE_ALL)
+    columns[numbers == -np.inf, 0] = ord(BELOW_ALL)
     text = columns.ravel()
     return text[text > 0].tobytes().decode()
 
 
-def _curve(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {"from": values["from"], "step": values["step"], "at": packed(values["at"])}
+def _scale(*curves: FloatArray) -> tuple[float, float]:
+    """Return the least value of curves, and the step in which they are written."""
+    present = np.concatenate(curves)
+    present = present[np.isfinite(present)]
+    step = float(f"{np.ptp(present) / _LEVELS:.6g}") if len(present) else 0.0
+    return (float(present.min()) if len(present) else 0.0), step or 1.0
+
+
+def _curve(values: FloatArray, low: float, step: float) -> dict[str, Any]:
+    return {"from": low, "step": step, "at": packed(np.round((values - low) / step))}

@@ -17,22 +17,19 @@ from cdtool.base.arrays import FloatArray
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import (
-    Margins,
     between,
     drawing,
     label,
-    new_figure,
+    message_figure,
     save,
-    stacked_panels,
-    text_width,
     write,
 )
 from cdtool.report.plots.labels import Labelled, write_labels
 from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
-from cdtool.report.plots.side_table import SideColumn, SideTable, key_height
+from cdtool.report.plots.side_table import NAME_LENGTH, SideColumn, SideTable, keyed_panels, rank
 from cdtool.report.plots.style import BAND, look_of
 from cdtool.report.writers.base import Image, Report
-from cdtool.results.curves.amoc import AmocCurve, AmocPoint, amoc_curves
+from cdtool.results.curves.amoc import AmocCurve, amoc_curves
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.summary import Summary
 
@@ -47,41 +44,21 @@ _FIGURES = (
     SideColumn("not\nassessable", 50),
     SideColumn("false alarms\nin hold-out", 66),
 )
-_NAME = 24
-_PANEL = 2.5
 _ARROW = 15.0
 # Share of a panel's width for the points without a false alarm.
 _ZONE = 0.27
 
 
-def plot_amoc(evaluated: Evaluated, path: Path) -> None:
-    """Draw a panel per group and a curve per detector; raises UsageError, CdtoolError (see `save`).
-
-    A lower curve is better. Left of the lowest observable rate only an upper bound is known, which is written.
-    """
-    save(amoc_figure(evaluated), path)
-
-
+@drawing()
 def amoc_figure(evaluated: Evaluated) -> Figure:
-    """Return the figure of `plot_amoc`, which a notebook shows."""
-    with drawing():
-        return _figure(evaluated)
-
-
-def _figure(evaluated: Evaluated) -> Figure:
+    """Return a panel per group with a curve per detector."""
     curves = amoc_curves(evaluated.results)
     groups = list(dict.fromkeys(item.group for item in curves))
     if not groups:
-        figure = new_figure(9.0, 1.2)
         text = "no impact-free hold-out, or none that is assessable: no false alarms to compare with latencies"
-        figure.text(0.5, 0.5, text, ha="center", va="center")
-        return figure
+        return message_figure(text)
     rows = {group: [item for item in evaluated.summaries if item.group == group] for group in groups}
-    name = 72.0 * text_width([label(item.detector, _NAME) for items in rows.values() for item in items], 8) + 20.0
-    table = SideTable((SideColumn("", name, left=True), *_FIGURES))
-    heights = [max(_PANEL, key_height(len(items)) + 0.1) for items in rows.values()]
-    margins = Margins(0.75, table.width + 0.1, 0.5, 0.9)
-    figure, panels = stacked_panels(margins.left + 5.2 + margins.right, heights, margins, gap=0.36)
+    figure, panels, table = keyed_panels(rows, _FIGURES, (5.2, 2.5), bottom=0.9)
     frame = _rate_frame(curves)
     _set_rates(panels[-1], frame)
     low, high, logarithmic = latency_range(np.array([point.median for item in curves for point in item.points]))
@@ -92,11 +69,11 @@ def _figure(evaluated: Evaluated) -> Figure:
         for item in shown:
             _draw_curve(axes, item, frame)
         _name_curves(axes, shown, frame)
-        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
         by_name = {item.detector: item for item in shown}
-        for i, row in enumerate(_by_median(rows[group], by_name)):
+        medians = {name: item.set_point.median for name, item in by_name.items()}
+        ordered = sorted(rows[group], key=lambda row: rank(medians.get(row.detector, math.nan)))
+        for i, row in enumerate(ordered):
             _write_row(table, axes, i, row, by_name.get(row.detector))
-    table.write_headings(panels[0])
     _explain(panels[-1], curves, floored=logarithmic)
     return figure
 
@@ -108,7 +85,7 @@ def _heights(axes: Axes, item: AmocCurve) -> FloatArray:
 
 
 def _draw_curve(axes: Axes, item: AmocCurve, frame: _RateFrame) -> None:
-    look, x = look_of(item.detector), frame.x(item.detector, item.points)
+    look, x = look_of(item.detector), frame.x(item)
     y = _heights(axes, item)
     inside = np.array([point.false_alarms == 0 for point in item.points])
     drawn = np.where(np.isfinite(y), y, np.nan)
@@ -176,39 +153,27 @@ def _name_curves(axes: Axes, curves: Sequence[AmocCurve], frame: _RateFrame) -> 
     for item in curves:
         y = _heights(axes, item)
         seen = np.isfinite(y)
-        x, y = frame.x(item.detector, item.points)[seen], y[seen]
+        x, y = frame.x(item)[seen], y[seen]
         if len(x):
             places = np.flatnonzero(x > frame.least)[::-1]
-            named.append(Labelled(label(item.detector, _NAME), look_of(item.detector).colour, x, y, places))
+            named.append(Labelled(label(item.detector, NAME_LENGTH), look_of(item.detector).colour, x, y, places))
     write_labels(axes, named)
 
 
-def _by_median(rows: Sequence[Summary], curves: dict[str, AmocCurve]) -> list[Summary]:
-    """Return the rows ordered by median latency with the factor in use; rows without a median are last."""
-
-    def median(row: Summary) -> float:
-        found = curves[row.detector].set_point.median if row.detector in curves else math.nan
-        return math.inf if math.isnan(found) else min(found, 1e12)
-
-    return sorted(rows, key=median)
-
-
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: AmocCurve | None) -> None:
-    name = label(row.detector, _NAME)
     if curve is None:
-        cells = (name, NOTHING, NOTHING, NOTHING, str(row.not_assessable), NOTHING)
-        table.write_key(axes, place, row.detector, cells, (*((False,) * 4), row.not_assessable > 0, False))
+        cells = (NOTHING, NOTHING, NOTHING, str(row.not_assessable), NOTHING)
+        table.write_key(axes, place, row.detector, cells, (False, False, False, row.not_assessable > 0, False))
         return
     point = curve.set_point
     cells = (
-        name,
         number(point.safety_factor),
         number(point.median),
         f"{point.missed} of {point.detected + point.missed}",
         str(curve.not_assessable),
         f"{point.false_alarms} in {curve.operations} op.",
     )
-    loud = (False, False, False, point.missed > 0, curve.not_assessable > 0, point.false_alarms > 0)
+    loud = (False, False, point.missed > 0, curve.not_assessable > 0, point.false_alarms > 0)
     table.write_key(axes, place, row.detector, cells, loud)
 
 
@@ -224,11 +189,11 @@ class _RateFrame:
     most: float
     columns: tuple[str, ...]
 
-    def x(self, detector: str, points: Sequence[AmocPoint]) -> FloatArray:
+    def x(self, item: AmocCurve) -> FloatArray:
         """Return the horizontal positions of a detector's points."""
-        share = (self.columns.index(detector) + 0.5) / len(self.columns)
+        share = (self.columns.index(item.detector) + 0.5) / len(self.columns)
         column = self.left * (self.least / self.left) ** share
-        return np.array([point.rate if point.false_alarms else column for point in points])
+        return np.array([item.rate(point) if point.false_alarms else column for point in item.points])
 
     def shade(self, axes: Axes) -> None:
         """Colour the zone."""
@@ -237,9 +202,8 @@ class _RateFrame:
 
 def _rate_frame(curves: Sequence[AmocCurve]) -> _RateFrame:
     """Return the axis; its rates begin slightly below that of a single false alarm."""
-    exposures = [item.hours if item.per == "hour" else float(item.operations) for item in curves]
-    least = 1.0 / max(exposures) / 1.6
-    most = max([10.0 * least, *(1.6 * point.rate for item in curves for point in item.points)])
+    least = 1.0 / max(item.exposure for item in curves) / 1.6
+    most = max([10.0 * least, *(1.6 * item.rate(point) for item in curves for point in item.points)])
     columns = tuple(dict.fromkeys(item.detector for item in curves))
     return _RateFrame(least / (most / least) ** (_ZONE / (1.0 - _ZONE)), least, most, columns)
 
@@ -310,5 +274,5 @@ def write_amoc(report: Report, folder: Path) -> list[Image]:
     if not report.evaluated.results.sweep:
         return []
     image = Image("amoc.png", "median latency against false alarms, with the limits of each detector moved")
-    plot_amoc(report.evaluated, folder / image.name)
+    save(amoc_figure(report.evaluated), folder / image.name)
     return [image]

@@ -94,6 +94,13 @@ def new_figure(width: float, height: float) -> Figure:
     return ShownFigure(encoded, figsize=(width, height), dpi=_DPI, layout="constrained")
 
 
+def message_figure(text: str) -> Figure:
+    """Return a figure that says why there is nothing to show; for use within `drawing()`."""
+    figure = new_figure(9.0, 1.2)
+    figure.text(0.5, 0.5, text, ha="center", va="center")
+    return figure
+
+
 class Margins(NamedTuple):
     """Margins around the panels of a figure [inch]."""
 
@@ -220,17 +227,6 @@ def slug(name: str, taken: set[str]) -> str:
         found = f"{base}-{number}"
     taken.add(found)
     return found
-
-
-def png(figure: Figure) -> bytes:
-    """Return a figure as PNG; the same bytes for the same content."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    drawn = BytesIO()
-    canvas: Any = FigureCanvasAgg(figure)
-    with drawing():
-        canvas.print_png(drawn, metadata={"Software": "cdtool"})
-    return drawn.getvalue()
 
 
 def described(figure: Figure, description: str) -> Figure:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from textwrap import fill
@@ -12,19 +11,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.detectors.detection import Status
 from cdtool.report.model import AXES
-from cdtool.report.plots.figures import drawing, label, new_figure, save, slug, write
+from cdtool.report.plots.figures import drawing, label, message_figure, new_figure, save, slug, write
 from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.style import BAND, HATCHES, LIMIT, NOT_ASSESSED, look_of
 from cdtool.report.writers.base import Image, Report
-from cdtool.results.results import Results
+from cdtool.results.results import Results, grouped
 from cdtool.results.traced_force import TracedForce, force_profiles, traced_forces
 from cdtool.results.traces.decimation import kept_samples
 from cdtool.truth.force.limits import ForceProfile
-from cdtool.truth.force.verdict import ForceVerdict, StepVerdict
+from cdtool.truth.force.verdict import StepVerdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -48,52 +46,27 @@ _TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 _MOST_TICKS = 8.01
 
 
-@dataclass(frozen=True)
-class ForceCurve:
-    """One contact: force (n,) [N] at times (n,) and the detectors' alarms [s after the onset], and its verdict."""
-
-    label: str
-    time: FloatArray
-    force: FloatArray
-    verdict: ForceVerdict
-    alarms: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class ForcePanel:
-    """The contacts of one group."""
-
-    group: str
-    curves: tuple[ForceCurve, ...]
-
-
-def plot_forces(panels: Sequence[ForcePanel], profile: ForceProfile, path: Path) -> None:
-    """Draw a panel per group: its worst contact coloured, the others grey; raises UsageError, CdtoolError (see `save`).
+@drawing()
+def force_figure(groups: Mapping[str, Sequence[TracedForce]], profile: ForceProfile) -> Figure:
+    """Return a panel for each group of contacts: its worst contact coloured, the others grey.
 
     The worst contact fails with the largest share of a limit. Right of the first grey line time is compressed: each
     of the later limits has an equal width.
     """
-    with drawing():
-        save(_figure(panels, profile), path)
-
-
-def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
-    shown = [panel for panel in panels if panel.curves]
+    shown = [group for group, curves in groups.items() if curves]
     if not shown:
-        figure = new_figure(9.0, 1.2)
-        figure.text(0.5, 0.5, "no contact with a load-cell force", ha="center", va="center")
-        return figure
-    ranked = [sorted(panel.curves, key=_badness) for panel in shown]
+        return message_figure("no contact with a load-cell force")
+    ranked = [sorted(groups[group], key=_badness) for group in shown]
     nodes = _time_nodes(ranked, profile)
     figure = new_figure(9.5, 1.5 + 2.3 * len(shown))
     rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, panel, curves in zip(rows, shown, ranked, strict=True):
+    for axes, group, curves in zip(rows, shown, ranked, strict=True):
         _set_time(axes, nodes)
         _draw_limits(axes, profile, nodes)
         axes.set_ylim(0.0, 1.12 * max(_highest(curves), 1.1 * profile.steps[0].at_most_n))
         _draw_curves(axes, curves)
         axes.set_ylabel(AXES["force"])
-        axes.set_title(label(panel.group, 60), loc="left", fontweight="bold")
+        axes.set_title(label(group, 60), loc="left", fontweight="bold")
         _write_outcomes(axes, curves)
     rows[-1].set_xlabel(AXES["time"] + ("; compressed right of the first grey line" if len(nodes) > 2 else ""))
     figure.suptitle(f"{label(profile.title, 70)}", fontsize=10, x=0.01, ha="left")
@@ -112,11 +85,11 @@ def _figure(panels: Sequence[ForcePanel], profile: ForceProfile) -> Figure:
     return figure
 
 
-def _badness(curve: ForceCurve) -> tuple[int, float]:
+def _badness(curve: TracedForce) -> tuple[int, float]:
     return _ORDER.index(curve.verdict.outcome), -curve.verdict.utilisation
 
 
-def _highest(curves: Sequence[ForceCurve]) -> float:
+def _highest(curves: Sequence[TracedForce]) -> float:
     return max(float(np.max(curve.force)) for curve in curves)
 
 
@@ -129,7 +102,7 @@ def _draw_limits(axes: Axes, profile: ForceProfile, nodes: Sequence[float]) -> N
     axes.step(times, heights, where="post", color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=2)
 
 
-def _name_limits(axes: Axes, curves: Sequence[ForceCurve], profile: ForceProfile, nodes: Sequence[float]) -> None:
+def _name_limits(axes: Axes, curves: Sequence[TracedForce], profile: ForceProfile, nodes: Sequence[float]) -> None:
     """Write the limit of each step, in the first part of the time axis with the name of the step."""
     ends = [*(step.from_s for step in profile.steps[1:]), nodes[-1]]
     names = [label(step.name, 22) if step.from_s < nodes[1] else "" for step in profile.steps]
@@ -140,7 +113,7 @@ def _name_limits(axes: Axes, curves: Sequence[ForceCurve], profile: ForceProfile
     place_labels(axes, labels, [(curve.time, curve.force) for curve in curves[:_MOST_CURVES]])
 
 
-def _draw_curves(axes: Axes, curves: Sequence[ForceCurve]) -> None:
+def _draw_curves(axes: Axes, curves: Sequence[TracedForce]) -> None:
     """Draw the worst contact on top, the next ones grey, the rest paler."""
     for rank, curve in reversed(list(enumerate(curves[:_MOST_CURVES]))):
         colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < _EMPHASISED else (_PALE, 0.5)
@@ -184,7 +157,7 @@ def _point(axes: Axes, place: tuple[float, float], text: str, lift: float) -> No
     )
 
 
-def _write_outcomes(axes: Axes, curves: Sequence[ForceCurve]) -> None:
+def _write_outcomes(axes: Axes, curves: Sequence[TracedForce]) -> None:
     """Write right of a panel how many contacts meet the limits, and each step of the worst contact."""
     worst = curves[0]
     outcomes = [curve.verdict.outcome for curve in curves]
@@ -192,7 +165,7 @@ def _write_outcomes(axes: Axes, curves: Sequence[ForceCurve]) -> None:
         f"{outcomes.count(outcome)} {outcome.replace('_', ' ')}" for outcome in _ORDER if outcome in outcomes
     )
     lines = [f"{counted(len(curves), 'contact')}:", *fill(counts, 30).splitlines()]
-    lines.append(f"worst: {label(worst.label, 26)}")
+    lines.append(f"worst: {label(worst.name, 26)}")
     lines += [_step_text(step) for step in worst.verdict.steps]
     if math.isfinite(worst.verdict.time_budget):
         lines.append(f"first exceeded after {1e3 * worst.verdict.time_budget:.1f} ms")
@@ -212,7 +185,7 @@ def _step_text(step: StepVerdict) -> str:
     return f"{name}: {step.peak:.0f} of {step.step.at_most_n:g} N"
 
 
-def _handles(ranked: Sequence[Sequence[ForceCurve]], end: float) -> list[Artist]:
+def _handles(ranked: Sequence[Sequence[TracedForce]], end: float) -> list[Artist]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -233,7 +206,7 @@ def _handles(ranked: Sequence[Sequence[ForceCurve]], end: float) -> list[Artist]
     return handles
 
 
-def _time_nodes(ranked: Sequence[Sequence[ForceCurve]], profile: ForceProfile) -> list[float]:
+def _time_nodes(ranked: Sequence[Sequence[TracedForce]], profile: ForceProfile) -> list[float]:
     """Return where the scale of the time axis changes [s]: 0, the end of its first part, later limits, the end."""
     moments = [0.0]
     for curves in ranked:
@@ -285,7 +258,7 @@ def write_forces(report: Report, folder: Path) -> list[Image]:
         file = "forces.png" if len(shown) == 1 else f"forces_{slug(name, taken)}.png"
         judged = sum(row.profile == name for row in results.forces)
         images.append(Image(file, _force_caption(results, name, len(items), judged)))
-        plot_forces(_panels(items), force_profiles(results)[name], folder / file)
+        save(force_figure(grouped(items, "group"), force_profiles(results)[name]), folder / file)
     return images
 
 
@@ -296,11 +269,3 @@ def _force_caption(results: Results, profile: str, drawn: int, judged: int) -> s
     if results.provenance.get("mass_before_cell_kg"):
         caption += "; curves as the load cell measured them, verdicts corrected for the mass before it"
     return caption
-
-
-def _panels(items: Sequence[TracedForce]) -> list[ForcePanel]:
-    groups: dict[str, list[ForceCurve]] = {}
-    for item in items:
-        name = item.recording if item.contact == 1 else f"{item.recording}, contact {item.contact}"
-        groups.setdefault(item.group, []).append(ForceCurve(name, item.time, item.force, item.verdict, item.alarms))
-    return [ForcePanel(group, tuple(curves)) for group, curves in groups.items()]

@@ -18,7 +18,7 @@ from cdtool.report.plots.figures import (
     between,
     drawing,
     label,
-    new_figure,
+    message_figure,
     save,
     stacked_panels,
     text_width,
@@ -90,27 +90,13 @@ class _Axis:
         return self.end + (self.high - self.end) * share
 
 
-def plot_latencies(evaluated: Evaluated, path: Path) -> None:
-    """Draw a panel per group and a row per detector; raises UsageError, CdtoolError (see `save`).
-
-    The median counts missed contacts as later than all others. Read it together with the counts at the right.
-    """
-    save(latency_figure(evaluated), path)
-
-
+@drawing()
 def latency_figure(evaluated: Evaluated) -> Figure:
-    """Return the figure of `plot_latencies`, which a notebook shows."""
-    with drawing():
-        return _figure(evaluated)
-
-
-def _figure(evaluated: Evaluated) -> Figure:
+    """Return a panel per group with a row per detector."""
     summaries = [item for item in evaluated.summaries if item.contacts]
     groups = list(dict.fromkeys(item.group for item in summaries))
     if not groups:
-        figure = new_figure(9.0, 1.2)
-        figure.text(0.5, 0.5, "no contact in any group: no latency to show", ha="center", va="center")
-        return figure
+        return message_figure("no contact in any group: no latency to show")
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
     impact_free = list(dict.fromkeys(item.group for item in evaluated.summaries if not item.contacts))
@@ -268,5 +254,5 @@ def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axi
 def write_latencies(report: Report, folder: Path) -> list[Image]:
     """Draw latency.png for a report folder; raises CdtoolError (see `save`)."""
     image = Image("latency.png", "latency of every detector in every group")
-    plot_latencies(report.evaluated, folder / image.name)
+    save(latency_figure(report.evaluated), folder / image.name)
     return [image]

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cdtool.report.number_text import NOTHING
-from cdtool.report.plots.figures import write
+from cdtool.report.plots.figures import Margins, label, stacked_panels, text_width, write
 from cdtool.report.plots.style import look_of
 from cdtool.results.summary import Summary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _ROW = 12.5
 _SIZE, _HEADING_SIZE = 8, 7.5
 _INDENT = 12.0
+# A detector's name is cut to this length.
+NAME_LENGTH = 24
+# In the order of medians [ms], one that is not reached is before none.
+_NOT_REACHED = 1e12
 
 
 @dataclass(frozen=True)
@@ -62,7 +68,7 @@ class SideTable:
             self._write(axes, i, cell, _CellLine(axes.get_yaxis_transform(), y), bold)
 
     def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
-        """Write a row counted from the panel's upper edge, after the detector's mark."""
+        """Write a row counted from the panel's upper edge: the detector's mark and name, then the cells."""
         from matplotlib.lines import Line2D
         from matplotlib.transforms import ScaledTranslation
 
@@ -80,8 +86,9 @@ class SideTable:
             clip_on=False,
         )
         axes.add_line(mark)
-        for i, (cell, bold) in enumerate(zip(cells, loud, strict=True)):
-            self._write(axes, i, cell, _CellLine("axes fraction", 1.0, lift), bold, _INDENT if i == 0 else 0.0)
+        self._write(axes, 0, label(detector, NAME_LENGTH), _CellLine("axes fraction", 1.0, lift), indent=_INDENT)
+        for i, (cell, bold) in enumerate(zip(cells, loud, strict=True), 1):
+            self._write(axes, i, cell, _CellLine("axes fraction", 1.0, lift), bold)
 
     def _write(
         self, axes: Axes, number: int, text: str, line: _CellLine, bold: bool = False, indent: float = 0.0
@@ -101,6 +108,24 @@ def count_cells(row: Summary) -> tuple[tuple[str, ...], tuple[bool, ...]]:
     return cells, (False, row.missed > 0, row.not_assessable > 0, row.false_alarms > 0)
 
 
-def key_height(rows: int) -> float:
-    """Return the height of a number of rows of a key [inch]."""
-    return _ROW * rows / 72.0
+def keyed_panels(
+    rows: Mapping[str, Sequence[Summary]], columns: Sequence[SideColumn], size: tuple[float, float], bottom: float
+) -> tuple[Figure, list[Axes], SideTable]:
+    """Return a panel of at least `size` [inch] for each group, and the table whose rows are the key of its detectors.
+
+    `bottom` is the margin below the panels [inch]. For use within `drawing()`.
+    """
+    names = [label(item.detector, NAME_LENGTH) for items in rows.values() for item in items]
+    table = SideTable((SideColumn("", 72.0 * text_width(names, 8) + 20.0, left=True), *columns))
+    heights = [max(size[1], _ROW * len(items) / 72.0 + 0.1) for items in rows.values()]
+    margins = Margins(0.75, table.width + 0.1, 0.5, bottom)
+    figure, panels = stacked_panels(margins.left + size[0] + margins.right, heights, margins, gap=0.36)
+    for axes, group in zip(panels, rows, strict=True):
+        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+    table.write_headings(panels[0])
+    return figure, panels, table
+
+
+def rank(median: float) -> float:
+    """Return by what rows are ordered: the median, those without any last."""
+    return math.inf if math.isnan(median) else min(median, _NOT_REACHED)

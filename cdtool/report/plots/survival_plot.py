@@ -10,14 +10,14 @@ import numpy as np
 
 from cdtool.report.model import AXES
 from cdtool.report.number_text import number
-from cdtool.report.plots.figures import Margins, drawing, label, new_figure, save, stacked_panels, text_width
+from cdtool.report.plots.figures import drawing, message_figure, save
 from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
-from cdtool.report.plots.side_table import SideColumn, SideTable, count_cells, key_height
+from cdtool.report.plots.side_table import SideColumn, count_cells, keyed_panels, rank
 from cdtool.report.plots.style import look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.curves.survival_curves import SurvivalCurve, survival_curves
 from cdtool.results.evaluated import Evaluated
-from cdtool.results.summary import Summary
+from cdtool.results.results import grouped
 from cdtool.statistics.small_sample import FEWEST
 
 if TYPE_CHECKING:
@@ -31,51 +31,30 @@ _FIGURES = (
     SideColumn("not\nassessable", 50),
     SideColumn("false\nalarms", 34),
 )
-_NAME = 24
-_PANEL = 1.75
 # With more curves than this, bands would hide each other.
 _MOST_BANDS = 3
 _MARKS = 6
 _MOST_CENSORED = 200
 
 
-def plot_survival(evaluated: Evaluated, path: Path) -> None:
-    """Draw a panel per group; raises UsageError, CdtoolError (see `save`).
-
-    A missed contact leaves its curve at the end of its monitoring: a curve that ends above 0 never detects that share.
-    """
-    save(survival_figure(evaluated), path)
-
-
+@drawing()
 def survival_figure(evaluated: Evaluated) -> Figure:
-    """Return the figure of `plot_survival`, which a notebook shows."""
-    with drawing():
-        return _figure(evaluated)
-
-
-def _figure(evaluated: Evaluated) -> Figure:
+    """Return a panel per group with a step curve per detector."""
     curves = survival_curves(evaluated.results)
     groups = list(dict.fromkeys(item.group for item in curves))
     if not groups:
-        figure = new_figure(9.0, 1.2)
-        figure.text(0.5, 0.5, "no contact in any group: no share to show", ha="center", va="center")
-        return figure
-    summaries = {(item.detector, item.group): item for item in evaluated.summaries}
-    name = 72.0 * text_width([label(item.detector, _NAME) for item in curves], 8) + 20.0
-    table = SideTable((SideColumn("", name, left=True), *_FIGURES))
+        return message_figure("no contact in any group: no share to show")
     panels_of = {group: [item for item in curves if item.group == group] for group in groups}
-    heights = [max(_PANEL, key_height(len(items)) + 0.1) for items in panels_of.values()]
-    margins = Margins(0.75, table.width + 0.1, 0.5, 0.7)
-    figure, panels = stacked_panels(margins.left + 4.6 + margins.right, heights, margins, gap=0.36)
+    of_contacts = grouped([item for item in evaluated.summaries if item.contacts], "group")
+    figure, panels, table = keyed_panels(of_contacts, _FIGURES, (4.6, 1.75), bottom=0.7)
     low, high, logarithmic = latency_range(_times(curves))
     high = max([high, *(item.end for item in curves)])
     set_latency_scale(panels[-1], low, high, logarithmic)
     for axes, (group, items) in zip(panels, panels_of.items(), strict=True):
         _draw_group(axes, items, low, high)
-        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
-        for row, item in enumerate(_by_median(items, summaries)):
-            _write_row(table, axes, row, item)
-    table.write_headings(panels[0])
+        for place, row in enumerate(sorted(of_contacts[group], key=lambda row: rank(row.median.value))):
+            cells, loud = count_cells(row)
+            table.write_key(axes, place, row.detector, (number(row.median.value), *cells), (False, *loud))
     panels[-1].set_xlabel(_explained(panels_of.values()), linespacing=1.4)
     return figure
 
@@ -140,18 +119,6 @@ def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) ->
     )
 
 
-def _by_median(curves: Sequence[SurvivalCurve], summaries: dict[tuple[str, str], Summary]) -> list[Summary]:
-    """Return the rows ordered by median latency; rows without a median are last."""
-    rows = [summaries[item.detector, item.group] for item in curves]
-    return sorted(rows, key=lambda row: np.nan_to_num(row.median.value, nan=np.inf, posinf=1e12))
-
-
-def _write_row(table: SideTable, axes: Axes, place: int, row: Summary) -> None:
-    cells, loud = count_cells(row)
-    first = (label(row.detector, _NAME), number(row.median.value))
-    table.write_key(axes, place, row.detector, (*first, *cells), (False, False, *loud))
-
-
 def _explained(panels: Collection[Sequence[SurvivalCurve]]) -> str:
     words = []
     if any(len(item.missed) for items in panels for item in items):
@@ -169,5 +136,5 @@ def write_survival(report: Report, folder: Path) -> list[Image]:
     if not report.evaluated.results.contacts:
         return []
     image = Image("survival.png", "share of the contacts that are still undetected over time")
-    plot_survival(report.evaluated, folder / image.name)
+    save(survival_figure(report.evaluated), folder / image.name)
     return [image]

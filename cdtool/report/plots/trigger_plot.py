@@ -47,21 +47,9 @@ _TICKS, _AWAY = 44.0, 8.0
 _LEGEND_COLUMNS, _LEGEND_ROW = 4, 0.18
 
 
-def plot_triggers(trace: Trace, path: Path) -> None:
-    """Draw the load cell with the contact's onset, below it a row per detector, the fastest first.
-
-    Raises UsageError, CdtoolError (see `save`).
-    """
-    save(trigger_figure(trace), path)
-
-
+@drawing()
 def trigger_figure(trace: Trace) -> Figure:
-    """Return the figure of `plot_triggers`, which a notebook shows."""
-    with drawing():
-        return _figure(trace)
-
-
-def _figure(trace: Trace) -> Figure:
+    """Return the load cell with the contact's onset, below it a row per detector, the fastest first."""
     contact = trace.shown
     rows = sorted(trace.panels, key=lambda row: (_late(trace, row), contact is not None and _blind(trace, row)))
     forced = len(trace.force) > 0
@@ -192,7 +180,7 @@ def write_triggers(report: Report, folder: Path) -> list[Image]:
             trace = most_informative(of_group)
             name = f"triggers_{slug(group, taken)}.png"
             images.append(Image(name, f"{trace.recording}: all detectors", group))
-            plot_triggers(trace, folder / name)
+            save(trigger_figure(trace), folder / name)
     return images
 
 

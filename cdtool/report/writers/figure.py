@@ -19,6 +19,7 @@ class Figure(Writer[Report]):
 
     def write(self, report: Report, target: Path) -> None:
         """Draw it; raises CdtoolError."""
-        from cdtool.report.plots.latency_plot import plot_latencies
+        from cdtool.report.plots.figures import save
+        from cdtool.report.plots.latency_plot import latency_figure
 
-        plot_latencies(report.evaluated, target)
+        save(latency_figure(report.evaluated), target)

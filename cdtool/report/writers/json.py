@@ -40,4 +40,4 @@ class Json(Writer[Report]):
                     content = piece.encode("utf-8", "replace")
                     digest.update(content)
                     file.write(content)
-            traces.write_bytes(encode_traces(report.traces, results_sha256=digest.hexdigest()))
+            traces.write_bytes(encode_traces(report.traces, digest.hexdigest()))

@@ -34,7 +34,7 @@ class ParquetFolder(Writer[Report]):
             content = write_tables(report.evaluated.results, folder).encode("utf-8", "replace")
             (folder / PROVENANCE).write_bytes(content)
             digest = hashlib.sha256(content).hexdigest()
-            (folder / TRACES_IN_FOLDER).write_bytes(encode_traces(report.traces, results_sha256=digest))
+            (folder / TRACES_IN_FOLDER).write_bytes(encode_traces(report.traces, digest))
 
 
 def _may_replace(target: Path) -> bool:

@@ -6,7 +6,6 @@ No false alarm does not mean a rate of zero: the upper bound is given as well.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -17,21 +16,6 @@ from cdtool.results.results import Results, SweepResult
 from cdtool.statistics.rates import poisson_at_most
 
 Per = Literal["hour", "operation"]
-
-
-@dataclass(frozen=True)
-class AmocPoint:
-    """One safety factor: `rate` of false alarms, `median` latency [ms], infinite if it is not reached.
-
-    The median counts missed contacts as later than all others; NaN if no contact could be assessed.
-    """
-
-    safety_factor: float
-    false_alarms: int
-    rate: float
-    median: float
-    detected: int
-    missed: int
 
 
 @dataclass(frozen=True)
@@ -49,13 +33,22 @@ class AmocCurve:
     hours: float
     at_most: float
     not_assessable: int
-    points: tuple[AmocPoint, ...]
+    points: tuple[SweepResult, ...]
     in_use: int
 
     @property
-    def set_point(self) -> AmocPoint:
+    def set_point(self) -> SweepResult:
         """The point of the safety factor that is set."""
         return self.points[self.in_use]
+
+    @property
+    def exposure(self) -> float:
+        """The hours or operations to which rates refer."""
+        return self.hours if self.per == "hour" else float(self.operations)
+
+    def rate(self, point: SweepResult) -> float:
+        """Return the rate of false alarms at a point."""
+        return point.false_alarms / self.exposure
 
 
 def amoc_curves(results: Results) -> tuple[AmocCurve, ...]:
@@ -107,18 +100,6 @@ def _curve(rows: Sequence[SweepResult], per: Per) -> AmocCurve | None:
         hours=first.hours,
         at_most=poisson_at_most(0, exposure),
         not_assessable=first.not_assessable,
-        points=tuple(_point(row, exposure) for row in rows),
+        points=tuple(rows),
         in_use=next((i for i, row in enumerate(rows) if row.in_use), 0),
-    )
-
-
-def _point(row: SweepResult, exposure: float) -> AmocPoint:
-    median = math.inf if row.median_ms is None else row.median_ms
-    return AmocPoint(
-        safety_factor=row.safety_factor,
-        false_alarms=row.false_alarms,
-        rate=row.false_alarms / exposure,
-        median=median if row.detected or row.missed else math.nan,
-        detected=row.detected,
-        missed=row.missed,
     )

@@ -74,16 +74,16 @@ def json_pieces(results: Results) -> Iterator[str]:
         before = ","
         value = getattr(results, item.name)
         if item.name in tables():
-            yield from _rows_in_json(value, tables()[item.name])
+            yield from _rows_in_json(value)
         else:
             yield strict_json(plain(value) if is_dataclass(value) else value).replace("\n", "\n ")
     yield "\n}\n"
 
 
-def _rows_in_json(rows: Sequence[Any], kind: Any) -> Iterator[str]:
+def _rows_in_json(rows: Sequence[Any]) -> Iterator[str]:
     """Yield rows, a line each, many at a time."""
     for first in range(0, len(rows), _AT_ONCE):
-        lines = ",\n  ".join([_line(plain(row, kind)) for row in rows[first : first + _AT_ONCE]])
+        lines = ",\n  ".join([_line(plain(row)) for row in rows[first : first + _AT_ONCE]])
         yield f"{',' if first else '['}\n  {passive(lines)}"
     yield "\n ]" if rows else "[]"
 

@@ -241,7 +241,7 @@ def _stored(hint: Any, values: list[Any]) -> list[Any]:
     """Return the values of a field as Arrow takes them."""
     if scalar_of(hint):
         return values
-    made = [plain(value, hint) for value in values]
+    made = [plain(value) for value in values]
     return [list(value.items()) for value in made] if get_origin(hint) is Mapping else made
 
 

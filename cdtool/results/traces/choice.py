@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass, field, replace
+from copy import deepcopy
+from dataclasses import dataclass, field
 
 # Operations with a miss or a false alarm, the slowest ones, and those taken evenly from all.
 MOST_STRIKING, MOST_SLOW, MOST_SAMPLED = 70, 20, 20
@@ -16,17 +17,17 @@ class TraceChoice:
 
     `work` is the number of logs, without those of `examples`: groups of which only one operation each is kept. The
     choice becomes stricter with each operation: one that is not kept when it is offered is not kept later, and one that
-    a choice after only some of these operations does not keep is not kept either.
+    a choice after only some of these operations does not keep is not kept either. `left_out`: striking ones too many.
     """
 
     work: int
     examples: frozenset[str] = frozenset()
     left_out: int = 0
+    offered: int = 0
     _striking: dict[int, str] = field(default_factory=dict)
     _sampled: set[int] = field(default_factory=set)
     _slow: list[tuple[float, int]] = field(default_factory=list)
     _first: dict[str, tuple[int, int]] = field(default_factory=dict)
-    _taken: int = 0
 
     def offer(self, log: int, group: str, panels: int, striking: str, slowest: float) -> int | None:
         """Return the operation's number if it is kept at this moment, otherwise None.
@@ -34,8 +35,8 @@ class TraceChoice:
         `log` is the number of its log, `panels` that of the detectors that judged it, `striking` states what is
         striking in it, `slowest` is its longest latency [s].
         """
-        number = self._taken
-        self._taken += 1
+        number = self.offered
+        self.offered += 1
         is_first = group not in self._first or panels > self._first[group][0]
         if is_first:
             self._first[group] = panels, number
@@ -68,17 +69,6 @@ class TraceChoice:
         why |= dict.fromkeys(self._sampled, "evenly sampled from all") | self._striking
         return dict(sorted(why.items()))
 
-    @property
-    def offered(self) -> int:
-        """Return how many operations were offered."""
-        return self._taken
-
     def copy(self) -> TraceChoice:
         """Return a choice that continues alone."""
-        return replace(
-            self,
-            _striking=dict(self._striking),
-            _sampled=set(self._sampled),
-            _slow=list(self._slow),
-            _first=dict(self._first),
-        )
+        return deepcopy(self)

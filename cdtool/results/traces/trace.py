@@ -19,6 +19,10 @@ from cdtool.truth.matching import Match, Matching
 
 Span = tuple[float, float]
 
+# Decimals of a time [s], and steps over the range of a panel: a plot has fewer pixels.
+_TIME_DECIMALS, _LEVELS = 5, 8000
+# Significant digits of a float64.
+_DIGITS = 15
 # Columns of pixels kept of the whole operation, and again of the view on the contact.
 _WHOLE, _VIEW = 200, 250
 _SHORTEST_VIEW, _LONGEST_VIEW = 0.3, 1.2
@@ -56,14 +60,29 @@ class StatisticCurve:
         return self.at(slice(int(first), int(last)))
 
     def decimated(self, view: Span | None) -> StatisticCurve:
-        """Return the samples that draw the same picture: coarse for the whole, fine in the view."""
+        """Return the samples, rounded, that draw the same picture: coarse for the whole, fine in the view."""
         kept = np.zeros(len(self.time), dtype=np.bool_)
         mark_kept(self.time, self.value, _WHOLE, kept)
         if view is not None:
             first, last = np.searchsorted(self.time, view[0]), np.searchsorted(self.time, view[1], side="right")
             if last > first:
                 mark_kept(self.time[first:last], self.value[first:last], _VIEW, kept[first:last])
-        return self.at(np.flatnonzero(kept))
+        found = self.at(np.flatnonzero(kept))
+        # One scale, so that a value above a limit is never below it.
+        value, lower, upper = rounded(found.value, found.lower, found.upper)
+        return StatisticCurve(np.round(found.time, _TIME_DECIMALS), value, lower, upper, found.status)
+
+
+def rounded(*curves: FloatArray) -> list[FloatArray]:
+    """Return curves of one scale with the decimals that a plot shows: few, so that they are short as text."""
+    known = np.concatenate(curves)
+    known = known[np.isfinite(known)]
+    span = float(np.ptp(known)) if len(known) else 0.0
+    if span == 0.0:
+        return list(curves)
+    exact = _DIGITS - math.ceil(math.log10(float(np.abs(known).max())))
+    decimals = min(math.ceil(math.log10(_LEVELS / span)), exact)
+    return [np.round(curve, decimals) for curve in curves]
 
 
 @dataclass(frozen=True)
@@ -187,11 +206,11 @@ def make_trace(
     return Trace(
         recording=operation.name,
         group=group,
-        start=recording.start,
-        end=recording.end,
+        start=round(recording.start, _TIME_DECIMALS),
+        end=round(recording.end, _TIME_DECIMALS),
         contacts=tuple(contacts),
         contact=contact,
-        view=view,
+        view=(round(view[0], _TIME_DECIMALS), round(view[1], _TIME_DECIMALS)),
         force_time=force_time,
         force=force,
         panels=tuple(panels),

@@ -96,17 +96,15 @@ def benchmark_text() -> str:
 # --- TOML: a machine file, a benchmark file, force limits, a study
 
 TOML_BOMBS = {
-    "an integer of 5000 digits": ("load_mass = " + "7" * 5000, ("machine.toml", "5000 characters")),
+    "an integer of 5000 digits": ("load_mass = " + "7" * 5000, ("machine.toml", "more than 4300 digits")),
     "an integer of 400 digits": ("[channels]\nscale = " + "7" * 400, ("channels.scale", "400 digits", "64 bits")),
-    "100000 brackets": ("a = " + "[" * 100_000, ("machine.toml", "nested more than 64 deep at line 1")),
-    "100000 braces": ("a = " + "{ b = " * 100_000, ("nested more than 64 deep",)),
-    "a key of 20000 parts": (".".join("a" * 20_000) + " = 1", ("a key of more than 32 parts",)),
-    "a table of 20000 parts": ("[" + ".".join("a" * 20_000) + "]", ("a key of more than 32 parts",)),
-    "300000 keys": ("\n".join(f"a{i}.b = 1" for i in range(300_000)), ("more than 50000 keys",)),
-    "400000 arrays": ("\n".join("[[a]]" for _ in range(400_000)), ("more than",)),
-    "a text that does not end": ('a = """' + '\\"""' * 900_000, ("a text that begins at line 1 is not terminated",)),
-    "half a million escapes": ('a = "' + '\\"' * 500_000 + '"', ("more than",)),
-    "5 MiB": ("#" * 5 * 2**20, ("has 5 MiB; at most 4 are read",)),
+    "100000 brackets": ("a = " + "[" * 100_000, ("machine.toml", "nested too deeply")),
+    "100000 braces": ("a = " + "{ b = " * 100_000, ("nested too deeply",)),
+    "a key of 20000 parts": ("\n" + ".".join("a" * 20_000) + " = 1", ("a key of more than 16 parts at line 2",)),
+    "a table of 20000 quoted parts": ("[" + " . ".join(["'a'"] * 20_000) + "]", ("a key of more than 16 parts",)),
+    "a word of a million letters": ("a" * 1_000_000, ("not valid TOML",)),
+    "a text that does not end": ('a = """' + '\\"""' * 200_000, ("not valid TOML",)),
+    "3 MiB": ("#" * 3 * 2**20, ("has 3 MiB; at most 1 are read",)),
     "no UTF-8": (b"\xff\xfe\x00", ("not UTF-8 text",)),
 }
 
@@ -124,7 +122,7 @@ def test_a_toml_bomb_is_refused_in_one_line(refused, tmp_path, name):
 )
 def test_every_toml_file_is_loaded_within_the_same_bounds(refused, tmp_path, arguments):
     path = written(tmp_path / "given.toml", "a = " + "[" * 100_000)
-    refused(*(path if item == "{}" else item for item in arguments), words=("given.toml", "nested more than 64 deep"))
+    refused(*(path if item == "{}" else item for item in arguments), words=("given.toml", "nested too deeply"))
 
 
 @pytest.mark.parametrize("scale", ["7" * 400, "1e400", "nan", "-inf"], ids=["400 digits", "1e400", "nan", "-inf"])
@@ -208,7 +206,7 @@ def test_a_repeatedly_packed_text_is_a_valid_file():
 
 @pytest.mark.parametrize("unit", [b"0,", b"[],", b"999,", b" "], ids=["zeros", "lists", "numbers", "blanks"])
 def test_traces_that_unpack_to_gigabytes_are_refused(refused, bench, tmp_path, unit):
-    begin = b'{"schema_version": 3, "traces": ['
+    begin = b'{"schema_version": 4, "traces": ['
     content = packed_repeatedly(begin, unit * (2**20 // len(unit)), 600)  # 0.6 GB of text, of 0.6 MB
     assert len(content) < 3 * 2**20
     results = with_traces(bench, tmp_path, content)
@@ -223,9 +221,11 @@ def test_damaged_traces_are_one_line_wherever_they_are_damaged(bench, tmp_path):
     random = np.random.default_rng(4)
     trace = good["traces"][0]
     parts = ("panels", "force", "contacts", "view", "start", "joints", "contact", "recording")
-    of_a_panel = ("time", "value", "status", "seen", "alarms", "why")
+    of_a_panel = ("course", "seen", "alarms", "why")
+    of_a_course = ("time", "value", "status")
     for wrong in (None, "x", -1, [], {}, [[]], 1e300, 2**62):
-        for holder, key in (*((trace, key) for key in parts), *((trace["panels"][0], key) for key in of_a_panel)):
+        holders = ((trace, parts), (trace["panels"][0], of_a_panel), (trace["panels"][0]["course"], of_a_course))
+        for holder, key in ((holder, key) for holder, keys in holders for key in keys):
             kept = dict(holder)
             holder[key] = wrong
             check_damaged(bench, tmp_path, gzip.compress(json.dumps(good).encode(), 1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from cdtool.commands.scoring.scoring import LeftOut
+from cdtool.commands.scoring.scoring import left_out_by
 from cdtool.results.results import Skipped
 from tests.command import cdtool
 from tests.commands.console.damaged_copies import damaged
@@ -75,10 +75,8 @@ def test_too_few_runs_say_why_the_first_was_left_out_in_full(gate_folder, tmp_pa
 
 
 def test_a_reason_of_some_detectors_names_them():
-    left_out = LeftOut()
-    left_out.add("pure_inertia", [Skipped("a.csv", "no acceleration"), Skipped("b.csv", "another class")])
-    left_out.add("momentum", [Skipped("b.csv", "another class")])
-    assert left_out.combined() == [
+    both = Skipped("b.csv", "another class")
+    assert left_out_by({"pure_inertia": [Skipped("a.csv", "no acceleration"), both], "momentum": [both]}) == [
         Skipped("a.csv", "pure_inertia: no acceleration"),
         Skipped("b.csv", "another class"),
     ]

@@ -12,7 +12,7 @@ from cdtool.commands.identify.axis.speed_controller import ControllerComparison
 from cdtool.commands.identify.axis.start_ensemble import StartEnsemble
 from cdtool.commands.identify.axis.two_mass import StartComparison
 from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
-from cdtool.report.plots.figures import png
+from cdtool.report.plots.figures import encoded
 from tests.synthetic.gate_runs import GATE, free_runs
 
 UNITS = ("N", "m/s", "m")
@@ -74,7 +74,7 @@ def test_the_controllers_difference_is_stated() -> None:
 
 
 def test_the_same_content_has_the_same_bytes() -> None:
-    first, second = (png(draw_unseen_run(validation(25.0), "N")) for _ in range(2))
+    first, second = (encoded(draw_unseen_run(validation(25.0), "N"), ".png") for _ in range(2))
     assert first == second
     assert first.startswith(b"\x89PNG")
-    assert first != png(draw_unseen_run(validation(20.0), "N"))
+    assert first != encoded(draw_unseen_run(validation(20.0), "N"), ".png")

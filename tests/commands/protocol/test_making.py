@@ -47,7 +47,7 @@ def made(rig) -> Protocol:
 
 
 def kinds_of(verdict: ProtocolVerdict) -> list[str]:
-    return [reason.kind.value for reason in verdict.reasons]
+    return [reason.kind for reason in verdict.reasons]
 
 
 def kinds(protocol: Protocol) -> list[str]:
@@ -241,7 +241,7 @@ def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
     write_rig(tmp_path, (touch_then_impact, half_sine(404.0), half_sine(403.0)), seconds=9.0)
     protocol = cdtool.protocol(write_protocol(tmp_path))
     assert "too_many_repetitions" in kinds(protocol) and protocol.verdict.outcome == "incomplete"
-    many = next(reason for reason in protocol.verdict.reasons if reason.kind.value == "too_many_repetitions")
+    many = next(reason for reason in protocol.verdict.reasons if reason.kind == "too_many_repetitions")
     assert many.values == {"point": "edge", "present": 4, "planned": 3}
 
 
@@ -330,7 +330,7 @@ def test_a_draft_knows_what_the_recordings_show_and_lists_the_rest(rig, tmp_path
     assert plan.points[0].speed_m_per_s == pytest.approx(0.2)
     assert plan.force_instrument is not None and plan.force_instrument.sample_rate_hz == pytest.approx(1000.0)
     checked = check_protocol(draft.path)
-    empty = [reason for reason in checked.verdict.reasons if reason.kind.value == "no_value"]
+    empty = [reason for reason in checked.verdict.reasons if reason.kind == "no_value"]
     # The profile is one of the values to fill in, and a reason of its own.
     assert len(empty) + 1 == draft.to_fill_in and checked.recordings == {"edge": 3}
     with pytest.raises(UsageError, match="already exists"):
@@ -371,7 +371,7 @@ def test_every_entry_is_on_the_page():
 def test_before_anything_is_recorded_a_plan_can_be_drafted_and_checked(tmp_path):
     write_rig(tmp_path, [])
     path = write_protocol(tmp_path)
-    reasons = {reason.kind.value: reason.due for reason in check_protocol(path).verdict.reasons}
+    reasons = {reason.kind: reason.due for reason in check_protocol(path).verdict.reasons}
     assert reasons == {"not_measured": "test_day", "benchmark_unreadable": "test_day"}
     draft = draft_protocol(None, tmp_path / "empty.toml")
     assert [point.logs for point in read_protocol_file(draft.path).plan.points] == [("point_1/*.csv",)]

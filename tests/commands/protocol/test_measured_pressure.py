@@ -25,7 +25,7 @@ def made(folder: Path, *runs: Run, **changes: object) -> Protocol:
 
 
 def result(protocol: Protocol) -> tuple[str, list[str]]:
-    return protocol.verdict.outcome, [reason.kind.value for reason in protocol.verdict.reasons]
+    return protocol.verdict.outcome, [reason.kind for reason in protocol.verdict.reasons]
 
 
 def page_of(protocol: Protocol) -> str:
@@ -223,4 +223,4 @@ def test_a_check_before_the_test_says_that_a_pressure_will_be_missing(tmp_path):
     lines = [line for line in machine.read_text(encoding="utf-8").splitlines() if "contact_pressure" not in line]
     machine.write_text("\n".join(lines), encoding="utf-8")
     reasons = check_protocol(path).verdict.reasons
-    assert [(reason.kind.value, reason.due) for reason in reasons] == [("pressure_not_measured", "test_day")]
+    assert [(reason.kind, reason.due) for reason in reasons] == [("pressure_not_measured", "test_day")]

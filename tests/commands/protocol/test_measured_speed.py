@@ -21,7 +21,7 @@ def made(folder: Path, *speeds, **changes: object) -> Protocol:
 
 
 def result(protocol: Protocol) -> tuple[str, list[str]]:
-    return protocol.verdict.outcome, [reason.kind.value for reason in protocol.verdict.reasons]
+    return protocol.verdict.outcome, [reason.kind for reason in protocol.verdict.reasons]
 
 
 def test_a_test_at_half_the_speed_is_incomplete_and_names_both_speeds(tmp_path):

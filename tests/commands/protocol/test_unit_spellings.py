@@ -120,7 +120,7 @@ def check(folder: Path, spelling: Spelling, peaks: list[float], by_init: bool) -
     is_clear = spelling.drafted if by_init else spelling.clear
     for peak, point in zip(peaks, points, strict=True):
         if not is_clear:
-            (reason,) = [item for item in point.reasons if item.kind.value in ("no_force", "unreadable")]
+            (reason,) = [item for item in point.reasons if item.kind in ("no_force", "unreadable")]
             header = f"'{spelling.header}"
             assert point.outcome == "incomplete" and all(
                 part in str(reason.values["message"]) for part in (header, "machine file N", "unit_confirmed = true")

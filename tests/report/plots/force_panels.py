@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
-from cdtool.report.plots.force_plot import ForceCurve, ForcePanel
+from cdtool.results.traced_force import TracedForce
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.truth.force.verdict import assess_force
@@ -25,12 +25,12 @@ def half_sine(peak: float, rate: float = 28.4, until: float = 6.5) -> tuple[Floa
 
 def curve(
     name: str, peak: float, *, until: float = 6.5, alarms: Mapping[str, float] = ALARMS, profile: ForceProfile = GAP
-) -> ForceCurve:
+) -> TracedForce:
     time, force = half_sine(peak, until=until)
     curve = ForceTimeCurve(time, force, np.zeros(len(time), dtype=bool), float(time[-1]))
-    return ForceCurve(name, time, force, assess_force(curve, profile), alarms)
+    return TracedForce(name, "g", 1, time, force, assess_force(curve, profile), alarms)
 
 
-def panel_of(name: str, profile: ForceProfile) -> ForcePanel:
-    """One curve with one alarm, all with that name."""
-    return ForcePanel(name, (curve(name, 900.0, alarms={name: 0.02}, profile=profile),))
+def group_of(name: str, profile: ForceProfile) -> dict[str, tuple[TracedForce, ...]]:
+    """A group of one curve with one alarm, all with that name."""
+    return {name: (curve(name, 900.0, alarms={name: 0.02}, profile=profile),)}

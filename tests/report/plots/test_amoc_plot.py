@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cdtool.report.plots import amoc_plot
-from cdtool.report.plots.amoc_plot import plot_amoc
-from cdtool.report.plots.figures import drawing
+from cdtool.report.plots.amoc_plot import amoc_figure
+from cdtool.report.plots.figures import drawing, save
 from cdtool.report.plots.style import look_of
 from cdtool.results.curves.sweep import MULTIPLES
 from cdtool.results.evaluated import Evaluated, evaluate
@@ -39,7 +39,7 @@ def of(
 
 def drawn(evaluated: Evaluated):
     with drawing():
-        return amoc_plot._figure(evaluated)
+        return amoc_plot.amoc_figure(evaluated)
 
 
 def small_marks(figure, open_marks: bool) -> np.ndarray:
@@ -72,7 +72,7 @@ def test_points_without_a_false_alarm_are_left_of_all_rates_in_a_zone_with_its_b
     loud = MULTIPLES < QUIET_FROM
     assert len(set(marks[~loud, 0])) == 1
     assert marks[~loud, 0].max() < 1.0 / 0.1 < marks[loud, 0].min()
-    plot_amoc(evaluated, tmp_path / "a.svg")
+    save(amoc_figure(evaluated), tmp_path / "a.svg")
     shown = joined(tmp_path / "a.svg")
     for expected in ("none in 40 operations", "0.100 h", "(at most 30.0 per hour)", "false alarms per hour"):
         assert expected in shown
@@ -81,7 +81,7 @@ def test_points_without_a_false_alarm_are_left_of_all_rates_in_a_zone_with_its_b
 def test_detectors_with_different_exposure_have_a_range_of_bounds(tmp_path):
     rows = swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)
     rows += swept("direct", "stiff", lambda m: 70.0 * m, none, operations=30, hours=0.05)
-    plot_amoc(of(rows, ("momentum", "direct")), tmp_path / "a.svg")
+    save(amoc_figure(of(rows, ("momentum", "direct"))), tmp_path / "a.svg")
     shown = joined(tmp_path / "a.svg")
     assert "none in 30 to 40 operations" in shown
     assert "(at most 30.0 to 59.9 per hour)" in shown
@@ -91,7 +91,7 @@ def test_the_factor_in_use_is_marked_on_each_curve_and_its_results_are_listed(tm
     evaluated = of(swept("momentum", "stiff", lambda m: 62.0 * m, alarms, lambda _: 1, not_assessable=2))
     (mark,) = in_use(drawn(evaluated))
     assert mark.get_ydata() == pytest.approx([62.0])
-    plot_amoc(evaluated, tmp_path / "a.svg")
+    save(amoc_figure(evaluated), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     for expected in ("momentum", "5.50", "62.0", "1 of 20", "2", "0 in 40 op."):
         assert expected in shown
@@ -103,7 +103,7 @@ def test_marks_are_open_where_contacts_were_missed(tmp_path):
     assert len(small_marks(figure, True)) == np.count_nonzero(MULTIPLES > 1.5)
     assert len(small_marks(figure, False)) == np.count_nonzero(MULTIPLES <= 1.5)
     assert in_use(figure)[0].get_markerfacecolor() == look_of("momentum").colour
-    plot_amoc(evaluated, tmp_path / "a.svg")
+    save(amoc_figure(evaluated), tmp_path / "a.svg")
     assert "open: contacts were missed" in joined(tmp_path / "a.svg")
 
 
@@ -116,7 +116,7 @@ def test_a_curve_whose_median_is_not_reached_ends_with_an_arrow_up(tmp_path):
     last = MULTIPLES[MULTIPLES <= 2.0].max()
     assert arrow.xy[1] == pytest.approx(60.0 * last)
     assert arrow.xyann[1] > 0.0
-    plot_amoc(evaluated, tmp_path / "a.svg")
+    save(amoc_figure(evaluated), tmp_path / "a.svg")
     assert "arrow: the median is not reached" in joined(tmp_path / "a.svg")
 
 
@@ -129,7 +129,7 @@ def test_a_factor_in_use_whose_median_is_not_reached_is_drawn_at_the_top_and_exp
     assert mark.get_markerfacecolor() == "white"
     assert mark.get_transform() == figure.axes[0].get_xaxis_transform()
     assert len(arrows(figure)) == 2
-    plot_amoc(evaluated, tmp_path / "a.svg")
+    save(amoc_figure(evaluated), tmp_path / "a.svg")
     assert "not reached" in texts(tmp_path / "a.svg") and "15 of 20" in texts(tmp_path / "a.svg")
 
 
@@ -137,7 +137,7 @@ def test_a_detector_without_a_curve_is_in_the_key_with_its_contacts_not_assessab
     contacts = [*contacts_of("momentum", "stiff", [30.0]), *contacts_of("direct", "stiff", ["blind"] * 3)]
     rows = tuple(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
     evaluated = evaluate(Results({}, ("momentum", "direct"), ("stiff",), tuple(contacts), (), (), sweep=rows))
-    plot_amoc(evaluated, tmp_path / "a.svg")
+    save(amoc_figure(evaluated), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert shown[shown.index("direct") + 1 :][:5] == ["–", "–", "–", "3", "–"]
 
@@ -145,18 +145,18 @@ def test_a_detector_without_a_curve_is_in_the_key_with_its_contacts_not_assessab
 def test_rates_are_per_operation_where_the_budget_is(tmp_path):
     rows = tuple(swept("momentum", "stiff", lambda m: 60.0 * m, alarms))
     results = Results({"false_alarm_budget": "1/1000op"}, ("momentum",), ("stiff",), (), (), (), sweep=rows)
-    plot_amoc(evaluate(results), tmp_path / "a.svg")
+    save(amoc_figure(evaluate(results)), tmp_path / "a.svg")
     assert "false alarms per operation" in joined(tmp_path / "a.svg")
     assert "per operation)" in joined(tmp_path / "a.svg")
 
 
 def test_no_sweep_no_false_alarm_everything_missed_and_nothing_assessable_are_drawn_too(tmp_path):
-    plot_amoc(of([]), tmp_path / "none.svg")
+    save(amoc_figure(of([])), tmp_path / "none.svg")
     assert "no impact-free hold-out" in joined(tmp_path / "none.svg")
     assert len(small_marks(drawn(of(swept("momentum", "stiff", lambda m: 60.0 * m, none))), False)) == len(MULTIPLES)
     missed = of(swept("momentum", "stiff", lambda _: None, none, lambda _: CONTACTS))
     assert len(small_marks(drawn(missed), True)) == 0
-    plot_amoc(missed, tmp_path / "missed.svg")
+    save(amoc_figure(missed), tmp_path / "missed.svg")
     assert "20 of 20" in texts(tmp_path / "missed.svg")
     blind = swept("momentum", "stiff", lambda _: None, none, lambda _: CONTACTS, not_assessable=CONTACTS)
     figure = drawn(of([replace(row, missed=0) for row in blind]))
@@ -178,7 +178,7 @@ def test_a_median_of_zero_is_drawn_at_the_lower_end_of_a_logarithmic_axis_and_ex
     assert ((marks[:, 1] > low) & (marks[:, 1] < high)).all()
     assert np.count_nonzero(marks[:, 1] == 1.0) == len(MULTIPLES)
     assert sorted(float(line.get_ydata()[0]) for line in in_use(figure)) == pytest.approx([1.0, 60.0])
-    plot_amoc(evaluated, tmp_path / "a.svg")
+    save(amoc_figure(evaluated), tmp_path / "a.svg")
     assert "medians below 1 ms are drawn there" in joined(tmp_path / "a.svg")
-    plot_amoc(of(rows[len(MULTIPLES) :], ("slow",)), tmp_path / "b.svg")
+    save(amoc_figure(of(rows[len(MULTIPLES) :], ("slow",))), tmp_path / "b.svg")
     assert "drawn there" not in joined(tmp_path / "b.svg")

@@ -12,19 +12,18 @@ from matplotlib.text import Text
 
 from cdtool.commands.detect import plot as detection_plot
 from cdtool.commands.detect.plot import plot_detected
-from cdtool.report.plots import amoc_plot, force_plot, latency_plot, survival_plot, trigger_plot
-from cdtool.report.plots.amoc_plot import plot_amoc
-from cdtool.report.plots.figures import SUFFIXES, drawing
-from cdtool.report.plots.force_plot import plot_forces
-from cdtool.report.plots.latency_plot import plot_latencies
-from cdtool.report.plots.survival_plot import plot_survival
-from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.report.plots.amoc_plot import amoc_figure
+from cdtool.report.plots.figures import SUFFIXES, drawing, save
+from cdtool.report.plots.force_plot import force_figure
+from cdtool.report.plots.latency_plot import latency_figure
+from cdtool.report.plots.survival_plot import survival_figure
+from cdtool.report.plots.trigger_plot import trigger_figure
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.results import ExposureResult, Results
 from cdtool.results.traces.trace import ContactOutcome
 from tests.report.bench import contacts_of
 from tests.report.hostile import HOSTILE
-from tests.report.plots.force_panels import GAP, panel_of
+from tests.report.plots.force_panels import GAP, group_of
 from tests.report.plots.svg import assert_harmless, assert_within
 from tests.results.sweeps import swept
 
@@ -39,8 +38,8 @@ class Drawing:
     figure: Callable[[], Any]
 
     @classmethod
-    def of(cls, write: Callable[..., None], figure: Callable[..., Any], *content: Any) -> Drawing:
-        return cls(lambda path: write(*content, path), lambda: figure(*content))
+    def of(cls, figure: Callable[..., Any], *content: Any) -> Drawing:
+        return cls(lambda path: save(figure(*content), path), lambda: figure(*content))
 
 
 def evaluated(name: str) -> Evaluated:
@@ -57,22 +56,19 @@ def drawing_of(bench, simulated) -> Callable[[str, str], Drawing]:
         if kind == "forces":
             steps = tuple(replace(step, name=f"{name}{i}") for i, step in enumerate(GAP.steps))
             profile = replace(GAP, title=name, source=name, steps=steps)
-            return Drawing.of(plot_forces, force_plot._figure, [panel_of(name, profile)], profile)
+            return Drawing.of(force_figure, group_of(name, profile), profile)
         if kind in ("detected", "triggers"):
             recording = replace(simulated("stiff", 1), name=name, joints=(name,))
             if kind == "detected":
-                return Drawing.of(plot_detected, detection_plot._figure, bench.detected(recording, "momentum"))
+                found = bench.detected(recording, "momentum")
+                return Drawing(lambda path: plot_detected(found, path), lambda: detection_plot._figure(found))
             trace = bench.trace(recording, name, ("momentum", "pure_torque"))
             blind = (ContactOutcome("not_assessable", float("nan"), float("nan"), name),)
             panel = replace(trace.panels[0], detector=name, joint=name, unit=name, reason=name, seen=blind)
             named = replace(trace, recording=name, joints=2, panels=(panel, *trace.panels[1:]))
-            return Drawing.of(plot_triggers, trigger_plot._figure, named)
-        plots = {
-            "latency": (plot_latencies, latency_plot._figure),
-            "survival": (plot_survival, survival_plot._figure),
-            "amoc": (plot_amoc, amoc_plot._figure),
-        }
-        return Drawing.of(*plots[kind], evaluated(name))
+            return Drawing.of(trigger_figure, named)
+        figures = {"latency": latency_figure, "survival": survival_figure, "amoc": amoc_figure}
+        return Drawing.of(figures[kind], evaluated(name))
 
     return make
 

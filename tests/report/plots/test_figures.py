@@ -25,12 +25,10 @@ from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.report.html.plots import plot_data
 from cdtool.report.plots import trigger_plot
 from cdtool.report.plots.figures import drawing, new_figure, save
-from cdtool.report.plots.latency_plot import plot_latencies
+from cdtool.report.plots.latency_plot import latency_figure
 from cdtool.report.plots.style import HATCHES, look_of
-from cdtool.report.plots.trigger_plot import plot_triggers
+from cdtool.report.plots.trigger_plot import trigger_figure
 from cdtool.report.writers.base import Report
-from cdtool.results.traces.file import _trace as trace_from
-from cdtool.results.traces.file import as_read, trace_values
 from cdtool.results.traces.trace import ContactOutcome, Trace, make_trace
 from cdtool.thresholds.limit import Limit
 from cdtool.truth.matching import Matching, match
@@ -144,7 +142,7 @@ def missed_by(trace: Trace, name: str) -> Trace:
 
 def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(bench: Bench, simulated, tmp_path):
     trace = missed_by(bench.trace(simulated("stiff", 2), "stiff"), "pure_inertia")
-    plot_triggers(trace, tmp_path / "a.svg")
+    save(trigger_figure(trace), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     order = [next(i for i, text in enumerate(shown) if text.startswith(name)) for name in NAMES]
     by_name = dict(zip(NAMES, order, strict=True))
@@ -158,7 +156,7 @@ def test_triggers_are_ordered_by_latency_with_missed_and_not_assessable_last(ben
 def test_the_row_of_a_detector_that_could_not_assess_the_contact_states_this(bench: Bench, simulated, tmp_path):
     trace = bench.trace(simulated("stiff", 2), "stiff", ("momentum",))
     blind = replace(trace.panels[0], seen=(ContactOutcome("not_assessable", nan, nan, "the axis stands still"),))
-    plot_triggers(replace(trace, panels=(blind,)), tmp_path / "a.svg")
+    save(trigger_figure(replace(trace, panels=(blind,))), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert "not assessable" in shown and "the axis stands still" in shown
     assert not any(text.endswith(" ms") for text in shown)
@@ -167,23 +165,23 @@ def test_the_row_of_a_detector_that_could_not_assess_the_contact_states_this(ben
 def test_a_trace_without_a_load_cell_has_only_rows_of_detectors(bench: Bench, simulated):
     trace = bench.trace(simulated("stiff", 2), "stiff")
     with drawing():
-        assert len(trigger_plot._figure(trace).axes) == len(NAMES) + 1
-        figure = trigger_plot._figure(replace(trace, force_time=np.empty(0), force=np.empty(0)))
+        assert len(trigger_plot.trigger_figure(trace).axes) == len(NAMES) + 1
+        figure = trigger_plot.trigger_figure(replace(trace, force_time=np.empty(0), force=np.empty(0)))
     assert len(figure.axes) == len(NAMES)
 
 
 def test_triggers_of_a_run_without_contact_state_this(bench: Bench, simulated, tmp_path):
-    plot_triggers(bench.trace(simulated("none", 77), "holdout"), tmp_path / "a.svg")
+    save(trigger_figure(bench.trace(simulated("none", 77), "holdout")), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     assert shown.count("no alarm") == len(NAMES)
     assert any("no contact" in text for text in shown)
 
 
 def test_neither_the_users_settings_nor_ours_leak(evaluated, tmp_path):
-    plot_latencies(evaluated, tmp_path / "a.png")
+    save(latency_figure(evaluated), tmp_path / "a.png")
     with matplotlib.rc_context({"text.usetex": True, "savefig.dpi": 30, "lines.linewidth": 9, "savefig.bbox": "tight"}):
         before = dict(matplotlib.rcParams)
-        plot_latencies(evaluated, tmp_path / "b.png")
+        save(latency_figure(evaluated), tmp_path / "b.png")
         assert dict(matplotlib.rcParams) == before
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
@@ -196,14 +194,14 @@ def test_nothing_is_clipped_where_panels_of_several_joints_are_drawn(six_joints)
 
 def test_a_figure_that_cannot_be_written_is_an_error_with_a_hint(evaluated, tmp_path):
     with pytest.raises(CdtoolError, match="no folder") as fault:
-        plot_latencies(evaluated, tmp_path / "no" / "a.png")
+        save(latency_figure(evaluated), tmp_path / "no" / "a.png")
     assert "create the folder first" in fault.value.hint
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(CdtoolError) as fault:
-        plot_latencies(evaluated, tmp_path / "folder.png")
+        save(latency_figure(evaluated), tmp_path / "folder.png")
     assert "is a folder" in fault.value.message
     with pytest.raises(UsageError, match=r"a\.gif") as fault:
-        plot_latencies(evaluated, tmp_path / "a.gif")
+        save(latency_figure(evaluated), tmp_path / "a.gif")
     assert ".svg" in fault.value.hint
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
@@ -272,21 +270,12 @@ def test_the_triggers_of_all_detectors_are_shaded_from_each_alarm_until_it_is_re
     (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
     trace = make_trace("free", detection.operation, (), (detection,), (matching,))
     assert trace.panels[0].rearmed == detection.verdict.rearmed
-    assert as_read([trace])[0].panels[0].rearmed == pytest.approx(detection.verdict.rearmed)
     with drawing():
-        axes = trigger_plot._figure(trace).axes[0]
+        axes = trigger_plot.trigger_figure(trace).axes[0]
     shaded = [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
     held = sorted((box.x0, box.x1) for box in shaded if 0.0 < box.width < 2.0)
     assert [start for start, _ in held] == pytest.approx([alarm.time for alarm in detection.verdict.alarms])
     assert [end for _, end in held] == pytest.approx(detection.verdict.rearmed)
-
-
-def test_traces_of_earlier_versions_have_no_times_of_rearming_and_are_still_read(five_alarms):
-    (detection,), (matching,) = five_alarms.detections, five_alarms.matchings
-    values = trace_values(make_trace("free", detection.operation, (), (detection,), (matching,)))
-    for panel in values["panels"]:
-        del panel["rearmed"]
-    assert trace_from(values).panels[0].rearmed == ()
 
 
 def test_every_reason_for_not_assessable_has_a_hatch_and_a_name_in_the_page():

@@ -9,18 +9,20 @@ import numpy as np
 import pytest
 
 from cdtool.report.plots import force_plot
-from cdtool.report.plots.figures import drawing
-from cdtool.report.plots.force_plot import ForcePanel, plot_forces
+from cdtool.report.plots.figures import drawing, save
+from cdtool.report.plots.force_plot import force_figure
+from cdtool.results.traced_force import TracedForce
 from cdtool.truth.force.limits import ForceProfile, ForceStep
 from tests.report.plots.force_panels import GAP, curve
 from tests.report.plots.svg import joined
 
-STIFF = ForcePanel("stiff", (curve("stiff/1", 900.0), curve("stiff/2", 3521.0), curve("stiff/3", 300.0)))
-SOFT = ForcePanel("soft", (curve("soft/1", 200.0, until=1.2), curve("soft/2", 390.0)))
+STIFF = {"stiff": (curve("stiff/1", 900.0), curve("stiff/2", 3521.0), curve("stiff/3", 300.0))}
+SOFT = {"soft": (curve("soft/1", 200.0, until=1.2), curve("soft/2", 390.0))}
 
 
-def drawn(tmp_path: Path, *panels: ForcePanel, profile: ForceProfile = GAP) -> str:
-    plot_forces(panels, profile, tmp_path / "a.svg")
+def drawn(tmp_path: Path, *groups: dict[str, tuple[TracedForce, ...]], profile: ForceProfile = GAP) -> str:
+    every = {name: curves for group in groups for name, curves in group.items()}
+    save(force_figure(every, profile), tmp_path / "a.svg")
     return joined(tmp_path / "a.svg")
 
 
@@ -63,14 +65,14 @@ def test_the_footer_names_the_source_and_states_that_this_is_not_a_certificate(t
 
 
 def test_each_group_has_a_panel_and_an_empty_one_has_none(tmp_path):
-    shown = drawn(tmp_path, STIFF, ForcePanel("empty", ()), SOFT)
+    shown = drawn(tmp_path, STIFF, {"empty": ()}, SOFT)
     assert "stiff" in shown and "soft" in shown and "empty" not in shown
-    assert "no contact with a load-cell force" in drawn(tmp_path, ForcePanel("empty", ()))
+    assert "no contact with a load-cell force" in drawn(tmp_path, {"empty": ()})
 
 
 def test_a_fast_impact_in_a_long_record_keeps_its_shape_on_the_wide_first_part():
     with drawing():
-        (axes,) = force_plot._figure([STIFF], GAP).axes
+        (axes,) = force_figure(STIFF, GAP).axes
     worst = next(line for line in axes.lines if line.get_color() == force_plot._WORST and len(line.get_xdata()) > 9)
     early = np.asarray(worst.get_xdata())
     assert np.count_nonzero(early <= 0.2) == 201  # every sample of the first 200 ms
@@ -78,18 +80,18 @@ def test_a_fast_impact_in_a_long_record_keeps_its_shape_on_the_wide_first_part()
 
 def test_a_short_record_with_its_limits_in_view_is_not_compressed(tmp_path):
     profile = ForceProfile("p", "p", "p", True, (ForceStep(0.0, 400.0, "a"), ForceStep(0.08, 100.0, "b")))
-    brief = ForcePanel("brief", (curve("x", 350.0, until=0.15, profile=profile),))
+    brief = {"brief": (curve("x", 350.0, until=0.15, profile=profile),)}
     with drawing():
-        (axes,) = force_plot._figure([brief], profile).axes
+        (axes,) = force_figure(brief, profile).axes
     assert axes.get_xlim() == (0.0, pytest.approx(0.15))
     assert "compressed" not in drawn(tmp_path, brief, profile=profile)
 
 
 @pytest.mark.parametrize("until", [0.3, 1.2, 6.5])
 def test_all_steps_of_the_limit_are_drawn_and_the_time_after_the_record_is_hatched(tmp_path, until):
-    cut = ForcePanel("cut", (curve("x", 900.0, until=until, alarms={"momentum": 0.4}),))
+    cut = {"cut": (curve("x", 900.0, until=until, alarms={"momentum": 0.4}),)}
     with drawing():
-        (axes,) = force_plot._figure([cut], GAP).axes
+        (axes,) = force_figure(cut, GAP).axes
     stairs = next(line for line in axes.lines if list(line.get_xdata())[:3] == [0.0, 0.75, 5.0])
     assert list(stairs.get_xdata()) == sorted(stairs.get_xdata())
     assert stairs.get_xdata()[-1] == axes.get_xlim()[1] == max(until, 6.0)
@@ -97,9 +99,9 @@ def test_all_steps_of_the_limit_are_drawn_and_the_time_after_the_record_is_hatch
 
 
 def test_an_alarm_is_marked_on_the_curve_and_an_alarm_after_the_record_is_only_listed(tmp_path):
-    late = ForcePanel("late", (curve("x", 900.0, until=0.9, alarms={"momentum": 0.02, "direct": 1.5}),))
+    late = {"late": (curve("x", 900.0, until=0.9, alarms={"momentum": 0.02, "direct": 1.5}),)}
     with drawing():
-        (axes,) = force_plot._figure([late], GAP).axes
+        (axes,) = force_figure(late, GAP).axes
     marks = {line.get_marker(): line for line in axes.lines if len(line.get_xdata()) == 1}
     assert set(marks) == {"o", "D"}  # the limit's crossing, and the momentum observer's alarm
     assert marks["D"].get_xdata()[0] == pytest.approx(0.02)
@@ -109,7 +111,7 @@ def test_an_alarm_is_marked_on_the_curve_and_an_alarm_after_the_record_is_only_l
 
 def test_many_alarms_are_counted_after_the_first_four(tmp_path):
     alarms = {f"detector_{i}": 0.01 * (9 - i) for i in range(9)}
-    shown = drawn(tmp_path, ForcePanel("g", (curve("x", 900.0, alarms=alarms),)))
+    shown = drawn(tmp_path, {"g": (curve("x", 900.0, alarms=alarms),)})
     assert "alarm detector_8 10 ms" in shown
     assert "alarm detector_5 40 ms" in shown
     assert "detector_4 50 ms" not in shown

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from cdtool.report.few_contacts import open_end
-from cdtool.report.plots.latency_plot import plot_latencies
+from cdtool.report.plots.figures import save
+from cdtool.report.plots.latency_plot import latency_figure
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.results import ExposureResult, Results
 from tests.report.bench import contacts_of
@@ -33,7 +34,7 @@ def test_an_open_interval_begins_at_its_lower_end_and_names_its_contacts(tmp_pat
     made = evaluated(latencies)
     found = open_end(made.summaries[0])
     assert (found[1] if found else "") == words
-    plot_latencies(made, tmp_path / "latency.svg")
+    save(latency_figure(made), tmp_path / "latency.svg")
     text = (tmp_path / "latency.svg").read_text(encoding="utf-8")
     assert words in text
     assert ("≥" in text) == bool(words)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from cdtool.report.plots import survival_plot
-from cdtool.report.plots.figures import drawing
-from cdtool.report.plots.survival_plot import plot_survival
+from cdtool.report.plots.figures import drawing, save
+from cdtool.report.plots.survival_plot import survival_figure
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.results import Results
 from tests.report.bench import contacts_of
@@ -26,7 +26,7 @@ def of(latencies: Mapping[str, Sequence[float | str | None]], group: str = "stif
 
 def drawn(evaluated: Evaluated):
     with drawing():
-        return survival_plot._figure(evaluated)
+        return survival_plot.survival_figure(evaluated)
 
 
 def steps(figure, panel: int = 0) -> list:
@@ -56,8 +56,8 @@ def test_few_curves_have_bands_and_many_have_none(tmp_path):
     few, many = ({name: [20.0 + i for i in range(10)] for name in FOUR[:count]} for count in (3, 4))
     assert len(drawn(of(few)).axes[0].collections) == 3
     assert len(drawn(of(many)).axes[0].collections) == 0
-    plot_survival(of(few), tmp_path / "few.svg")
-    plot_survival(of(many), tmp_path / "many.svg")
+    save(survival_figure(of(few)), tmp_path / "few.svg")
+    save(survival_figure(of(many)), tmp_path / "many.svg")
     assert "band: 95 % at each time" in joined(tmp_path / "few.svg")
     assert "band" not in joined(tmp_path / "many.svg")
 
@@ -65,12 +65,12 @@ def test_few_curves_have_bands_and_many_have_none(tmp_path):
 def test_below_ten_contacts_a_curve_has_no_band_and_the_figure_states_this(tmp_path):
     nine = {"momentum": [20.0 + i for i in range(9)], "direct": [20.0 + i for i in range(10)]}
     assert len(drawn(of(nine)).axes[0].collections) == 1
-    plot_survival(of(nine), tmp_path / "a.svg")
+    save(survival_figure(of(nine)), tmp_path / "a.svg")
     assert "band: 95 % at each time; no band with fewer than 10 contacts" in joined(tmp_path / "a.svg")
 
 
 def test_counts_are_listed_next_to_the_curves_the_fastest_first(evaluated, tmp_path):
-    plot_survival(evaluated, tmp_path / "a.svg")
+    save(survival_figure(evaluated), tmp_path / "a.svg")
     shown = texts(tmp_path / "a.svg")
     for expected in ("stiff", "soft", "3 of 4", "2 of 3", "30 of 30", "missed", "34.0", "still undetected"):
         assert expected in shown
@@ -89,9 +89,9 @@ def test_everything_missed_nothing_assessable_one_contact_and_none_are_drawn_too
     figure = drawn(of({"momentum": [None] * 20}))
     assert set(steps(figure)[0].get_ydata()) == {1.0}
     assert opened(figure) == [(1000.0, 1.0)]
-    plot_survival(of({"momentum": ["blind"] * 3}), tmp_path / "blind.svg")
+    save(survival_figure(of({"momentum": ["blind"] * 3})), tmp_path / "blind.svg")
     assert "not assessable" in texts(tmp_path / "blind.svg")
     assert steps(drawn(of({"momentum": ["blind"] * 3}))) == []
     assert steps(drawn(of({"momentum": [25.0]})))[0].get_ydata().tolist() == [1.0, 0.0, 0.0]
-    plot_survival(evaluate(replace(evaluated.results, contacts=())), tmp_path / "none.svg")
+    save(survival_figure(evaluate(replace(evaluated.results, contacts=()))), tmp_path / "none.svg")
     assert "no contact in any group" in joined(tmp_path / "none.svg")

@@ -24,8 +24,8 @@ def of(*rows, **provenance) -> Results:
 def test_rates_are_false_alarms_per_monitored_hour():
     (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)))
     assert curve.per == "hour"
-    assert curve.points[0].rate == pytest.approx(80.0)
-    assert curve.points[-1].rate == 0.0
+    assert curve.rate(curve.points[0]) == pytest.approx(80.0)
+    assert curve.rate(curve.points[-1]) == 0.0
     assert curve.at_most == pytest.approx(-math.log(0.05) / 0.1)
 
 
@@ -33,7 +33,7 @@ def test_rates_are_per_operation_where_the_budget_is():
     results = of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms), false_alarm_budget="1/1000op")
     (curve,) = amoc_curves(results)
     assert curve.per == "operation"
-    assert curve.points[0].rate == pytest.approx(8 / 40)
+    assert curve.rate(curve.points[0]) == pytest.approx(8 / 40)
     assert curve.at_most == pytest.approx(-math.log(0.05) / 40)
 
 

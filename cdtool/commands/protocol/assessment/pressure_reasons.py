@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 
 from cdtool.commands.protocol.assessment.plan import Instrument, MeasuringPoint
 from cdtool.commands.protocol.assessment.pressure import PressureAssessment, PressureRecord
-from cdtool.commands.protocol.assessment.reasons import Reason, ReasonKind, Value
+from cdtool.commands.protocol.assessment.reasons import Reason, Value
 from cdtool.commands.protocol.assessment.sampling import above_between_samples
 from cdtool.truth.force.limits import ForceProfile
+from cdtool.truth.force.verdict import StepVerdict
 
 # Beside a single high reading the pressure may have been higher by so many times as much: tissue and films are soft,
 # and have no spikes as a force has.
@@ -47,7 +49,7 @@ def pressure_reasons(
     >>> from cdtool.truth.force.limits import read_force_limits
     >>> profile = read_force_limits()["iso_ts_15066_chest"]
     >>> unknown = PressureAssessment.of(profile, "", None, None)
-    >>> [reason.kind.value for reason in pressure_reasons(MeasuringPoint(name="chest"), profile, ["a.csv"], [unknown])]
+    >>> [reason.kind for reason in pressure_reasons(MeasuringPoint(name="chest"), profile, ["a.csv"], [unknown])]
     ['pressure_not_measured']
     """
     if not profile.pressures:
@@ -57,16 +59,12 @@ def pressure_reasons(
         return
     missing = sum(not item.is_known for item in pressures)
     if missing:
-        counts: dict[str, Value] = {"missing": missing, "count": len(pressures), "profile": profile.name}
-        yield _reason(ReasonKind.PRESSURE_NOT_MEASURED, point, counts)
+        count, name = len(pressures), profile.name
+        yield Reason.of_point("pressure_not_measured", point, missing=missing, count=count, profile=name)
     for number, (recording, item) in enumerate(zip(recordings, pressures, strict=True), 1):
         about: dict[str, Value] = {"repetition": number, "recording": recording}
         yield from _open(point, item, about)
         yield from _beyond_range(point, item, instrument, about)
-
-
-def _reason(kind: ReasonKind, point: MeasuringPoint, values: dict[str, Value]) -> Reason:
-    return Reason(kind, {"point": point.name, **values}, due="test_day")
 
 
 def _exceeded(
@@ -77,18 +75,9 @@ def _exceeded(
         peaks = [peak for item in pressures if (peak := _above(item, number)) is not None]
         limit = pressures[0].limit
         if peaks and limit is not None:
-            yield _reason(
-                ReasonKind.PRESSURE_EXCEEDS,
-                point,
-                {
-                    "step": step.name,
-                    "above": len(peaks),
-                    "count": len(pressures),
-                    "pressure": max(peaks),
-                    "limit": limit.quasi_static if number else limit.first,
-                    "area": limit.area,
-                },
-            )
+            values = {"pressure": max(peaks), "limit": limit.quasi_static if number else limit.first}
+            counts = {"above": len(peaks), "count": len(pressures)}
+            yield Reason.of_point("pressure_exceeds", point, step=step.name, area=limit.area, **counts, **values)
 
 
 def _above(item: PressureAssessment, number: int) -> float | None:
@@ -103,48 +92,36 @@ def _above(item: PressureAssessment, number: int) -> float | None:
     return max(peaks, default=None)
 
 
-def _open(point: MeasuringPoint, item: PressureAssessment, about: dict[str, Value]) -> Iterator[Reason]:
+def _open(point: MeasuringPoint, item: PressureAssessment, about: Mapping[str, Value]) -> Iterator[Reason]:
     """Yield what is not known of the pressure of a repetition."""
     if item.time_is_unknown and item.entered is not None and item.limit is not None:
-        known: dict[str, Value] = {"entered": item.entered, "limit": item.limit.quasi_static}
-        yield _reason(ReasonKind.PRESSURE_TIME_UNKNOWN, point, {**about, **known})
+        known = {"entered": item.entered, "limit": item.limit.quasi_static}
+        yield Reason.of_point("pressure_time_unknown", point, **about, **known)
     if item.record is None or item.verdict is None:
         return
     if not item.record.rises:
-        yield _reason(ReasonKind.PRESSURE_DOES_NOT_RISE, point, {**about, "peak": item.record.peak})
-    for step in item.verdict.steps:
-        if step.outcome == "not_assessable" and step.cause:
-            reason = _reason(ReasonKind.PRESSURE_NOT_ASSESSABLE, point, {**about, "step": step.step.name})
-            yield Reason(reason.kind, reason.values, step.cause, reason.due)
-    yield from _rest_decides(point, item, item.record, about)
-    yield from _between_samples(point, item, item.record, about)
-
-
-def _rest_decides(
-    point: MeasuringPoint, item: PressureAssessment, record: PressureRecord, about: dict[str, Value]
-) -> Iterator[Reason]:
-    """Yield the steps that pass only because of the reading at rest, which may be wrong or held from before."""
-    assert item.verdict is not None
+        yield Reason.of_point("pressure_does_not_rise", point, **about, peak=item.record.peak)
     steps = item.verdict.steps
-    for number, step in enumerate(steps):
-        until = min(steps[number + 1].step.from_s if number + 1 < len(steps) else record.curve.end, record.curve.end)
-        may_be_more = max(record.rest, 0.0) + record.rest_error + abs(record.drift) * until
-        if step.outcome == "pass" and step.peak + may_be_more > step.step.at_most_n:
-            values: dict[str, Value] = {"peak": step.peak, "limit": step.step.at_most_n, "error": may_be_more}
-            yield _reason(ReasonKind.PRESSURE_REST_DECIDES, point, {**about, "step": step.step.name, **values})
+    for step, end in zip(steps, [*(later.step.from_s for later in steps[1:]), math.inf], strict=True):
+        if step.outcome == "not_assessable" and step.cause:
+            yield Reason.of_point("pressure_not_assessable", point, step.cause, **about, step=step.step.name)
+        elif step.outcome == "pass":
+            yield from _may_exceed(point, item.record, step, end, about)
 
 
-def _between_samples(
-    point: MeasuringPoint, item: PressureAssessment, record: PressureRecord, about: dict[str, Value]
+def _may_exceed(
+    point: MeasuringPoint, record: PressureRecord, step: StepVerdict, end: float, about: Mapping[str, Value]
 ) -> Iterator[Reason]:
-    """Yield the steps whose limit the pressure may have exceeded between two samples: no profile states a rate."""
-    assert item.verdict is not None
-    for step in item.verdict.steps:
-        most = step.peak + above_between_samples(record.curve, step, _ALONE)
-        limit = step.step.at_most_n
-        if step.outcome == "pass" and most > limit:
-            values: dict[str, Value] = {"peak": step.peak, "limit": limit, "rate": record.sample_rate, "most": most}
-            yield _reason(ReasonKind.PRESSURE_BETWEEN_SAMPLES, point, {**about, "step": step.step.name, **values})
+    """Yield that a step passes only because of the reading at rest, or between samples: no profile states a rate."""
+    values = {"peak": step.peak, "limit": step.step.at_most_n}
+    # The reading at rest may be wrong, or held from before.
+    error = max(record.rest, 0.0) + record.rest_error + abs(record.drift) * min(end, record.curve.end)
+    if step.peak + error > step.step.at_most_n:
+        yield Reason.of_point("pressure_rest_decides", point, **about, step=step.step.name, **values, error=error)
+    most = step.peak + above_between_samples(record.curve, step, _ALONE)
+    if most > step.step.at_most_n:
+        values |= {"rate": record.sample_rate, "most": most}
+        yield Reason.of_point("pressure_between_samples", point, **about, step=step.step.name, **values)
 
 
 def _beyond_range(
@@ -153,4 +130,4 @@ def _beyond_range(
     most = instrument.range_n_per_cm2 if instrument else None
     reading = max(item.record.largest_reading if item.record else 0.0, item.entered or 0.0)
     if most and reading > most:
-        yield _reason(ReasonKind.PRESSURE_BEYOND_RANGE, point, {**about, "reading": reading, "range": most})
+        yield Reason.of_point("pressure_beyond_range", point, **about, reading=reading, range=most)

@@ -11,6 +11,7 @@ from itertools import accumulate
 from cdtool.base.plain_text import plain
 from cdtool.commands.protocol.assessment.assessment import LAST_STEP_S, PointAssessment, Repetition, required_record
 from cdtool.commands.protocol.assessment.plan import Instrument
+from cdtool.commands.protocol.assessment.pressure import PressureRecord
 from cdtool.commands.protocol.assessment.protocol import Protocol
 from cdtool.commands.protocol.document.blocks import (
     Block,
@@ -27,7 +28,6 @@ from cdtool.commands.protocol.document.blocks import (
 )
 from cdtool.commands.protocol.document.curve_drawing import curve_drawings
 from cdtool.commands.protocol.document.pressure_parts import (
-    pressure_checks,
     pressure_columns,
     pressure_curves,
     pressure_deviations,
@@ -234,7 +234,6 @@ def _machine(protocol: Protocol, words: Words) -> Iterator[Block]:
 def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield SectionHeading(words("section.instruments"))
     names = ("quantity", "model", "serial_number", "range", "accuracy_class", "sample_rate", "filter")
-    columns = tuple(words(f"column.{name}") for name in (*names, "calibrated_on", "calibration_valid_until"))
     rows = []
     for item in protocol.plan.instruments:
         reach = f"{words.number(item.range_n)} N" if item.range_n else item.range
@@ -247,20 +246,20 @@ def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
             item.accuracy_class,
             item.sample_rate_hz,
         )
-        rows.append(_row(words, *values, item.filter, item.calibrated_on, item.calibration_valid_until))
-    yield _grid(columns, rows, widths=(5, 8, 6, 5, 5, 5, 6, 6, 6), numeric=(5,))
+        rows.append((*values, item.filter, item.calibrated_on, item.calibration_valid_until))
+    columns = (*names, "calibrated_on", "calibration_valid_until")
+    yield _grid(words, columns, rows, widths=(5, 8, 6, 5, 5, 5, 6, 6, 6), numeric=(5,))
 
 
 def _plan(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield SectionHeading(words("section.plan"))
     names = ("point", "position", "region", "obstacle", "stiffness", "area", "speed", "repetitions")
-    columns = tuple(words(f"column.{name}") for name in names)
     rows = []
     for item in protocol.plan.points:
         numbers = (item.obstacle_stiffness_n_per_mm, item.contact_area_mm2, item.speed_m_per_s, item.repetitions)
-        rows.append(_row(words, item.name, item.position, item.region, item.obstacle, *numbers))
+        rows.append((item.name, item.position, item.region, item.obstacle, *numbers))
     if rows:
-        yield _grid(columns, rows, widths=(8, 12, 9, 9, 6, 5, 5, 6), numeric=(4, 5, 6, 7))
+        yield _grid(words, names, rows, widths=(8, 12, 9, 9, 6, 5, 5, 6), numeric=(4, 5, 6, 7))
     else:
         yield Paragraph(words("text.no_point"))
 
@@ -314,11 +313,11 @@ def _forces(
         columns += [(words(f"column.{name}"), cells) for name, cells in pressure_columns(point, words)]
     outcomes = [*map(worst_outcome, items, point.pressures), f"outcome.{point.outcome}"]
     columns.append((words("column.result"), [*map(words, outcomes), ""]))
-    rows = [tuple(map(plain, row)) for row in zip(*(cells for _, cells in columns), strict=True)]
+    rows = zip(*(cells for _, cells in columns), strict=True)
     numeric = tuple(range(2, len(columns) - 1))
     widths = (6, 12, *(6 for _ in numeric), 9)
     strong = (len(items), len(items) + 1)
-    return _grid([plain(name) for name, _ in columns], rows, widths=widths, numeric=numeric, strong=strong)
+    return _table([name for name, _ in columns], rows, widths=widths, numeric=numeric, strong=strong)
 
 
 def _time(seconds: float, words: Words) -> str:
@@ -353,42 +352,45 @@ def _latencies(protocol: Protocol, words: Words) -> Iterator[Block]:
     detectors = [name for name in protocol.detectors if any(name in item.latencies_ms for item in known)]
     columns = [words("column.point"), words("column.repetition"), *(name.replace("_", " ") for name in detectors)]
     rows = [
-        _row(words, point.point.name, number, *(item.latencies_ms.get(name) for name in detectors))
+        map(words.value, (point.point.name, number, *(item.latencies_ms.get(name) for name in detectors)))
         for point in protocol.points
         for number, item in enumerate(point.repetitions, 1)
     ]
     numeric = tuple(range(1, len(columns)))
-    yield _grid(columns, rows, widths=(5, 2, *(3 for _ in detectors)), numeric=numeric)
+    yield _table(columns, rows, widths=(5, 2, *(3 for _ in detectors)), numeric=numeric)
 
 
 def _checks(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield SectionHeading(words("section.checks"))
-    if protocol.plan.instruments:
-        columns = [words(f"column.{name}") for name in ("model", "calibration_valid_until", "valid_on_test_day")]
+    plan, points = protocol.plan, protocol.points
+    if plan.instruments:
+        columns: tuple[str, ...] = ("model", "calibration_valid_until", "valid_on_test_day")
         rows = [
-            _row(words, item.model or item.quantity, item.calibration_valid_until, _validity(protocol, item, words))
-            for item in protocol.plan.instruments
+            (item.model or item.quantity, item.calibration_valid_until, _validity(protocol, item, words))
+            for item in plan.instruments
         ]
-        yield _grid(columns, rows, widths=(5, 3, 4))
-    names = ("point", "repetition", "sample_rate", "record", "missing", "saturated", "largest_reading", "rest", "drift")
-    columns = [words(f"column.{name}") for name in names]
-    rows = [
-        _check_row(point, number, item, protocol.plan.force_instrument, words)
-        for point in protocol.points
+        yield _grid(words, columns, rows, widths=(5, 3, 4))
+    names = ("point", "repetition", "sample_rate", "record", "missing", "saturated")
+    most = plan.force_instrument.range_n if plan.force_instrument else None
+    forces = [
+        _check_row(point, number, item, most, words)
+        for point in points
         for number, item in enumerate(point.repetitions, 1)
     ]
-    if rows:
-        yield _grid(columns, rows, widths=(5, 2, 5, 5, 3, 3, 5, 3, 2), numeric=(1, 2, 3, 6, 7, 8))
-    if pressures := pressure_checks(protocol.points, protocol.plan.pressure_instrument, words):
+    if forces:
+        columns, widths = (*names, "largest_reading", "rest", "drift"), (5, 2, 5, 5, 3, 3, 5, 3, 2)
+        yield _grid(words, columns, forces, widths=widths, numeric=(1, 2, 3, 6, 7, 8))
+    most = plan.pressure_instrument.range_n_per_cm2 if plan.pressure_instrument else None
+    pressures = [
+        _check_row(point, number, item.record, most, words)
+        for point in points
+        for number, item in enumerate(point.pressures, 1)
+        if item.record
+    ]
+    if pressures:
         yield SectionHeading(words("section.pressure_checks"), level=2)
-        names = (*names[:6], "largest_pressure", "pressure_rest", "pressure_drift")
-        rows = [_row(words, *row) for row in pressures]
-        yield _grid(
-            [words(f"column.{name}") for name in names],
-            rows,
-            widths=(4, 2, 4, 4, 4, 5, 5, 5, 5),
-            numeric=(1, 2, 3, 6, 7, 8),
-        )
+        columns, widths = (*names, "largest_pressure", "pressure_rest", "pressure_drift"), (4, 2, 4, 4, 4, 5, 5, 5, 5)
+        yield _grid(words, columns, pressures, widths=widths, numeric=(1, 2, 3, 6, 7, 8))
 
 
 def _validity(protocol: Protocol, item: Instrument, words: Words) -> str:
@@ -400,21 +402,22 @@ def _validity(protocol: Protocol, item: Instrument, words: Words) -> str:
 
 
 def _check_row(
-    point: PointAssessment, number: int, item: Repetition, instrument: Instrument | None, words: Words
-) -> tuple[str, ...]:
-    profile = point.profile
-    assert profile is not None, "a repetition has a profile"
-    rate = _needed(item.sample_rate, profile.sample_rate_at_least_hz, words)
-    record = _needed(item.curve.end, required_record(profile), words)
+    point: PointAssessment, number: int, item: Repetition | PressureRecord, most: float | None, words: Words
+) -> tuple[object, ...]:
+    """Return what the data of a force or pressure are like; `most` is the range of the instrument."""
+    profile, rate, record = point.profile, words.number(item.sample_rate), words.number(item.curve.end)
+    if isinstance(item, Repetition):
+        assert profile is not None, "a repetition has a profile"
+        rate = _needed(item.sample_rate, profile.sample_rate_at_least_hz, words)
+        record = _needed(item.curve.end, required_record(profile), words)
     missing, saturated = (
         words("document.yes" if is_so else "document.no")
         for is_so in (item.curve.has_missing_samples, item.curve.saturated)
     )
     reading = words.number(item.largest_reading)
-    if instrument and instrument.range_n:
-        most = instrument.range_n
+    if most:
         reading = f"{words.beside(item.largest_reading, most)} / {words.limit(most)}"
-    return _row(words, point.point.name, number, rate, record, missing, saturated, reading, item.rest, item.drift)
+    return point.point.name, number, rate, record, missing, saturated, reading, item.rest, item.drift
 
 
 def _needed(measured: float, needed: float, words: Words) -> str:
@@ -427,14 +430,13 @@ def _needed(measured: float, needed: float, words: Words) -> str:
 def _deviations(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield SectionHeading(words("section.deviations"))
     rows = [
-        _row(words, f"{item.point}: {item.text}" if item.point else item.text, item.reason)
-        for item in protocol.plan.deviations
+        (f"{item.point}: {item.text}" if item.point else item.text, item.reason) for item in protocol.plan.deviations
     ]
     excluded = words("role.excluded")
-    rows += [_row(words, f"{item.recording} ({excluded})", item.reason) for item in protocol.excluded]
-    rows += [_row(words, *row) for row in pressure_deviations(protocol.points, words)]
+    rows += [(f"{item.recording} ({excluded})", item.reason) for item in protocol.excluded]
+    rows += pressure_deviations(protocol.points, words)
     if rows:
-        yield _grid([words("column.what"), words("column.reason")], rows, widths=(1, 1))
+        yield _grid(words, ("what", "reason"), rows, widths=(1, 1))
     else:
         yield Paragraph(words("text.no_deviations"))
 
@@ -454,17 +456,15 @@ def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
                 (words("column.checked"), checked),
             )
         )
-        columns = [words(f"column.{name}") for name in ("step", "from", "at_most")]
         rows = [
-            _row(words, words.name("step", step.name), words.limit(step.from_s), words.limit(step.at_most_n))
+            (words.name("step", step.name), words.limit(step.from_s), words.limit(step.at_most_n))
             for step in profile.steps
         ]
-        yield _grid(columns, rows, widths=(4, 2, 2), numeric=(1, 2))
+        yield _grid(words, ("step", "from", "at_most"), rows, widths=(4, 2, 2), numeric=(1, 2))
         if profile.pressures:
             yield Facts(((words("column.pressure_source"), plain(profile.pressure_source)),))
-            columns = [words(f"column.{name}") for name in ("body_area", "transient", "quasi_static", "applies_to")]
-            rows = [_row(words, *row) for row in pressure_limit_rows(profile, protocol.points, words)]
-            yield _grid(columns, rows, widths=(5, 3, 3, 4), numeric=(1, 2))
+            columns, limits = ("body_area", "transient", "quasi_static", "applies_to"), pressure_limit_rows
+            yield _grid(words, columns, limits(profile, protocol.points, words), widths=(5, 3, 3, 4), numeric=(1, 2))
         yield Facts(tuple(_measuring(profile, words)))
 
 
@@ -484,9 +484,8 @@ def _provenance(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield SectionHeading(words("section.provenance"))
     yield Paragraph(words("text.provenance", version=protocol.tool_version))
     yield Paragraph(plain(protocol.command), "code")
-    columns = [words(f"column.{name}") for name in ("file", "role", "sha256")]
-    rows = [_row(words, item.name, words(f"role.{item.role}"), item.sha256) for item in protocol.files]
-    yield _grid(columns, rows, widths=(5, 4, 12), typed=(2,))
+    rows = [(item.name, words(f"role.{item.role}"), item.sha256) for item in protocol.files]
+    yield _grid(words, ("file", "role", "sha256"), rows, widths=(5, 4, 12), typed=(2,))
     yield Paragraph(words("text.hash"), "note")
     yield Facts(((words("document.data_hash_label"), protocol.data_sha256),))
 
@@ -498,18 +497,29 @@ def _signatures(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield Signatures(people, words("sign.place_date"), words("sign.signature"))
 
 
-def _row(words: Words, *values: object) -> tuple[str, ...]:
-    return tuple(plain(words.value(value)) for value in values)
-
-
 def _grid(
+    words: Words,
     columns: Sequence[str],
-    rows: Sequence[tuple[str, ...]],
+    rows: Iterable[Sequence[object]],
+    *,
+    widths: Sequence[int],
+    numeric: Sequence[int] = (),
+    typed: Sequence[int] = (),
+) -> HeadedTable:
+    """Return a table of values; `columns` are names in the texts."""
+    headings = tuple(words(f"column.{name}") for name in columns)
+    return _table(headings, [map(words.value, row) for row in rows], widths=widths, numeric=numeric, typed=typed)
+
+
+def _table(
+    headings: Sequence[str],
+    rows: Iterable[Iterable[str]],
     *,
     widths: Sequence[int],
     numeric: Sequence[int] = (),
     strong: Sequence[int] = (),
     typed: Sequence[int] = (),
 ) -> HeadedTable:
-    is_numeric = tuple(number in numeric for number in range(len(columns)))
-    return HeadedTable(tuple(columns), tuple(rows), is_numeric, tuple(widths), tuple(strong), tuple(typed))
+    is_numeric = tuple(number in numeric for number in range(len(headings)))
+    shown = tuple(tuple(map(plain, row)) for row in rows)
+    return HeadedTable(tuple(map(plain, headings)), shown, is_numeric, tuple(widths), tuple(strong), tuple(typed))

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, Repetition
-from cdtool.commands.protocol.assessment.plan import Instrument
 from cdtool.commands.protocol.assessment.pressure import PressureAssessment, as_profile, highest
 from cdtool.commands.protocol.document.words import Words
 from cdtool.truth.force.limits import ForceProfile
@@ -49,27 +48,6 @@ def pressure_deviations(points: tuple[PointAssessment, ...], words: Words) -> It
                 values = {"entered": item.entered, "recorded": item.record.peak}
                 what = words("deviation.peaks_differ", point=point.point.name, repetition=number, **values)
                 yield what, words("deviation.both_compared")
-
-
-def pressure_checks(
-    points: tuple[PointAssessment, ...], instrument: Instrument | None, words: Words
-) -> list[tuple[object, ...]]:
-    """Return a row for each recorded pressure: what its data are like."""
-    rows: list[tuple[object, ...]] = []
-    for point in points:
-        for number, item in enumerate(point.pressures, 1):
-            if record := item.record:
-                reading: object = record.largest_reading
-                if instrument and instrument.range_n_per_cm2:
-                    most = words.number(instrument.range_n_per_cm2)
-                    reading = f"{words.number(record.largest_reading)} / {most}"
-                missing, saturated = (
-                    words("document.yes" if is_so else "document.no")
-                    for is_so in (record.curve.has_missing_samples, record.curve.saturated)
-                )
-                state = (record.sample_rate, record.curve.end, missing, saturated, reading, record.rest, record.drift)
-                rows.append((point.point.name, number, *state))
-    return rows
 
 
 def pressure_curves(point: PointAssessment) -> PointAssessment | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.base.plain_text import digits_beside
-from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason
 
 LANGUAGES = ("en", "de")
 _FOLDER = Path(__file__).with_name("texts")
@@ -91,23 +91,23 @@ class Words:
         """Return a reason as a sentence."""
         values: dict[str, object] = dict(reason.values)
         if reason.cause is not None:
-            table = "pressure_cause" if reason.kind is ReasonKind.PRESSURE_NOT_ASSESSABLE else "cause"
+            table = "pressure_cause" if reason.kind == "pressure_not_assessable" else "cause"
             values["cause"] = self(f"{table}.{reason.cause.kind}", **reason.cause.numbers)
         if "step" in values:
             values["step"] = self.name("step", str(values["step"]))
         if "averaged" in values:
             values["averaged"] = self(f"averaged.{values['averaged']}")
-        if reason.kind is ReasonKind.PRESSURE_EXCEEDS:
+        if reason.kind == "pressure_exceeds":
             values["area"] = self.name("area", str(values["area"]))
-        if reason.kind is ReasonKind.NO_VALUE:
+        if reason.kind == "no_value":
             values["keys"] = values.pop("key")
-        return self(f"reason.{reason.kind.value}", **values)
+        return self(f"reason.{reason.kind}", **values)
 
     def reasons(self, verdict: ProtocolVerdict, outcome: str) -> list[str]:
         """Return the reasons for an outcome as sentences; values that are not filled in are listed in one."""
-        found = [reason for reason in verdict.reasons if reason.kind.outcome == outcome]
-        empty = [reason for reason in found if reason.kind is ReasonKind.NO_VALUE]
-        sentences = [self.reason(reason) for reason in found if reason.kind is not ReasonKind.NO_VALUE]
+        found = [reason for reason in verdict.reasons if reason.outcome == outcome]
+        empty = [reason for reason in found if reason.kind == "no_value"]
+        sentences = [self.reason(reason) for reason in found if reason.kind != "no_value"]
         for file in dict.fromkeys(str(reason.values["file"]) for reason in empty):
             keys = ", ".join(str(reason.values["key"]) for reason in empty if reason.values["file"] == file)
             sentences.append(self("reason.no_value", file=file, keys=keys))

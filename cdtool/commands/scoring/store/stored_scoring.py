@@ -36,7 +36,7 @@ class KnownLog:
 
     def to_text(self) -> str:
         """Return it as lines."""
-        head = encoded((self.size, self.seconds, self.unread), tuple[int, float, bool])
+        head = encoded((self.size, self.seconds, self.unread))
         return "\n".join([head, self.rows, *(f"{key}{_BETWEEN}{text}" for key, text in self.detectors.items())])
 
     @classmethod
@@ -150,18 +150,18 @@ class StoredScoring:
         keys = self._keys(piece.group, piece.path, sources)
         rows = tuple(item.rows for item in made.outcomes)
         new = {name: tuple(_of_detector(item, name) for item in made.outcomes) for name in missing}
-        texts = {keys[name]: encoded(item, _OfDetector) for name, item in new.items()}
+        texts = {keys[name]: encoded(item) for name, item in new.items()}
         others = known.detectors if known is not None else {}
         if known is None or len(missing) == len(self._names):
             unread, size = any(item.unread for item in rows), sum(item.size for item in sources)
-            known = KnownLog(size, made.seconds, unread, encoded(rows, _Rows))
+            known = KnownLog(size, made.seconds, unread, encoded(rows))
         both = replace(known, detectors={**others, **texts})
         self.store.keep("logs", self.determinants.log_key(piece.group, piece.path, sources), both.to_text())
         self.store.keep_sources(self.determinants.name(piece.path), sources)
         traces = [trace for outcome in made.outcomes for trace in outcome.traces]
         for number, trace in enumerate(traces):
             if trace is not None:
-                self.store.keep("traces", self._trace_key(piece, sources, number), encoded(trace, Trace))
+                self.store.keep("traces", self._trace_key(piece, sources, number), encoded(trace))
         if len(missing) == len(self._names):
             return made
         detectors = [new[name] if name in new else decoded(others[keys[name]], _OfDetector) for name in self._names]

@@ -15,7 +15,7 @@ from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, Frict
 from cdtool.commands.identify.robot.plots import draw_joint_frictions, draw_unseen_torques
 from cdtool.commands.identify.robot.robot_evidence import JointFrictionCurve, RobotJointEvidence, UnseenTorque
 from cdtool.commands.identify.robot.robot_excitation import JointMotion
-from cdtool.report.plots.figures import png
+from cdtool.report.plots.figures import encoded
 
 Panel = tuple[JointIdentification, JointFriction, float]
 
@@ -66,4 +66,4 @@ def test_the_floor_is_a_band_of_its_joint() -> None:
     assert len(shown) == 4
     (band,) = [band for axes in shown for band in axes.collections if str(band.get_label()).startswith("between")]
     assert np.ptp(band.get_paths()[0].vertices[:, 1]) == pytest.approx(1.0)
-    assert png(figure).startswith(b"\x89PNG")
+    assert encoded(figure, ".png").startswith(b"\x89PNG")

@@ -19,7 +19,7 @@ from cdtool.commands.protocol.assessment.plan import (
     TestPlan,
     empty_entries,
 )
-from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason, ReasonKind
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.limits import read_force_limits
 from cdtool.truth.force.verdict import averaged
@@ -47,7 +47,7 @@ METER = Instrument(
     sample_rate_hz=1000.0,
     filter="none",
 )
-FAILING = {ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS, ReasonKind.NOT_PERMISSIBLE}
+FAILING = {"point_exceeds", "pressure_exceeds", "not_permissible"}
 PLAN = TestPlan(
     machine=MachineParticulars("door", "A", "1", "hall", "1.0"),
     test=TestParticulars(tester="B", date=dt.date(2026, 3, 31), place="C", temperature_c=0.0),
@@ -82,7 +82,7 @@ def three(force: ForceTimeCurve, rest: tuple[float, float] = (0.0, 0.0)) -> list
 
 def outcome(repetitions: list[Repetition], **more: object) -> tuple[str, list[str]]:
     found = assess_point(POINT, PROFILE, repetitions, instrument=METER, **more)
-    return found.outcome, [reason.kind.value for reason in found.reasons]
+    return found.outcome, [reason.kind for reason in found.reasons]
 
 
 def test_three_good_repetitions_pass():
@@ -151,7 +151,7 @@ def test_more_repetitions_than_planned_all_count_and_are_incomplete_where_they_a
     alone = replace(PROFILE, average_of=1)
     assert assess_point(POINT, alone, four, instrument=METER).outcome == "pass"
     found = assess_point(POINT, PROFILE, four, instrument=METER)
-    assert [reason.kind.value for reason in found.reasons] == ["too_many_repetitions"]
+    assert [reason.kind for reason in found.reasons] == ["too_many_repetitions"]
     assert found.outcome == "incomplete" and found.verdict is not None and found.verdict.tests == 4
     assert found.verdict.steps[0].force == pytest.approx(250.0, abs=0.1)
 
@@ -176,12 +176,12 @@ def test_one_measurement_in_two_files_is_not_two_measurements_nor_one_at_two_poi
     assert [dict(reason.values) for reason in found.reasons] == [
         {"point": "edge", "recording": "2.csv", "other": "1.csv", "contact": 1, "other_contact": 1}
     ]
-    assert (found.outcome, found.reasons[0].kind.value) == ("incomplete", "same_measurement")
+    assert (found.outcome, found.reasons[0].kind) == ("incomplete", "same_measurement")
     # The same contact, appended to its recording.
     appended = replace(again, sha256=one.sha256, recording=one.recording, contact=2)
     assert outcome([one, appended, three_]) == ("incomplete", ["same_measurement"])
     points = [assess_point(POINT, PROFILE, items, instrument=METER) for items in ([one], [again])]
-    kinds = [reason.kind.value for reason in judge(PLAN, points, "p.toml").reasons]
+    kinds = [reason.kind for reason in judge(PLAN, points, "p.toml").reasons]
     assert kinds == ["too_few_repetitions", "too_few_repetitions", "same_measurement"]
 
 
@@ -192,7 +192,7 @@ def of_chest(force: np.ndarray, time: np.ndarray = TIME, number: int = 1) -> tup
     point = replace(POINT, repetitions=1, obstacle_stiffness_n_per_mm=25.0)
     item = Repetition.of((f"{number}.csv", f"sha{number}"), 1, curve(force, time), CHEST)
     found = assess_point(point, CHEST, [item])
-    return found.outcome, [reason.kind.value for reason in found.reasons]
+    return found.outcome, [reason.kind for reason in found.reasons]
 
 
 @pytest.mark.parametrize("seconds", [0.2, 0.49, 0.5, 0.501, 0.6, 0.99])
@@ -206,7 +206,7 @@ def test_a_step_that_the_stated_record_does_not_reach_is_no_pass():
     early = replace(CHEST, record_at_least_s=0.3)
     item = Repetition.of(("1.csv", "sha"), 1, curve(sine(200.0)[:400], TIME[:400]), early)
     found = assess_point(replace(POINT, repetitions=1, obstacle_stiffness_n_per_mm=25.0), early, [item])
-    assert {reason.kind.value for reason in found.reasons} == {"not_assessable"}
+    assert {reason.kind for reason in found.reasons} == {"not_assessable"}
     assert found.outcome == "incomplete" and found.reasons[-1].values["step"] == "quasi-static"
 
 
@@ -236,7 +236,7 @@ def test_a_reading_at_the_range_of_the_instrument_is_none():
         meter = replace(METER, range_n=reach)
         found = assess_point(POINT, PROFILE, [*three(curve(sine()))[:2], item], instrument=meter)
         of_third = [reason for reason in found.reasons if reason.values["recording"] == "3.csv"]
-        assert [reason.kind.value for reason in of_third] == wanted
+        assert [reason.kind for reason in of_third] == wanted
 
 
 @pytest.mark.parametrize(("equal", "reach", "wanted"), [(2, 310.0, ["near_range"]), (1, 310.0, []), (2, 500.0, [])])
@@ -245,7 +245,7 @@ def test_two_equal_readings_close_to_the_range_may_be_a_stop(equal, reach, wante
     force[150 : 150 + equal] = 302.0
     items = [*three(curve(sine(200.0)))[:2], without_noise(curve(force), 3)]
     found = assess_point(POINT, PROFILE, items, instrument=replace(METER, range_n=reach))
-    assert [reason.kind.value for reason in found.reasons] == wanted
+    assert [reason.kind for reason in found.reasons] == wanted
 
 
 @pytest.mark.parametrize(
@@ -260,7 +260,7 @@ def test_a_mean_within_half_a_coarse_cell_of_its_limit_is_no_pass(cell, peak, wa
         PROFILE, steps=(PROFILE.steps[0], *(replace(step, at_most_n=300.0) for step in PROFILE.steps[1:]))
     )
     items = [Repetition.of((f"{n}.csv", f"{n}"), 1, curve(force), profile) for n, force in enumerate(forces)]
-    assert [reason.kind.value for reason in assess_point(POINT, profile, items).reasons] == wanted
+    assert [reason.kind for reason in assess_point(POINT, profile, items).reasons] == wanted
 
 
 def test_an_error_of_a_repetition_above_the_limit_counts_for_the_mean_that_meets_it():
@@ -275,13 +275,13 @@ def test_a_contact_in_progress_is_named_and_not_counted():
     assert (found, reasons) == ("incomplete", ["too_few_repetitions", "in_progress"])
 
 
-def test_a_contact_that_never_ends_has_an_infinite_dynamic_and_total_time():
+def test_a_contact_that_never_ends_has_an_infinite_dynamic_time():
     item = repetition(curve(np.full(6000, 200.0)))
-    assert item.dynamic_time == np.inf and item.total_time == np.inf
+    assert item.dynamic_time == np.inf
 
 
 def test_fail_beats_incomplete_and_incomplete_beats_pass_and_all_reasons_stay():
-    fail, open_item = Reason(ReasonKind.POINT_EXCEEDS), Reason(ReasonKind.NO_VALUE)
+    fail, open_item = Reason("point_exceeds"), Reason("no_value")
     assert [ProtocolVerdict(reasons).outcome for reasons in ((), (open_item,), (open_item, fail))] == [
         "pass",
         "incomplete",
@@ -293,10 +293,10 @@ def test_fail_beats_incomplete_and_incomplete_beats_pass_and_all_reasons_stay():
     point = assess_point(POINT, PROFILE, [*three(curve(sine(900.0)))], [Unmeasured("4.csv", "unreadable", "x")])
     verdict = judge(PLAN, [point], "p.toml")
     assert verdict.outcome == "fail"
-    assert [reason.kind.value for reason in verdict.reasons] == ["point_exceeds", "unreadable"]
+    assert [reason.kind for reason in verdict.reasons] == ["point_exceeds", "unreadable"]
 
 
-@given(st.lists(st.sampled_from(list(ReasonKind)), max_size=6))
+@given(st.lists(st.sampled_from([*sorted(FAILING), "no_value", "saturated", "not_measured"]), max_size=6))
 def test_no_reason_is_ever_outvoted(kinds):
     verdict = ProtocolVerdict(tuple(Reason(kind) for kind in kinds))
     assert (verdict.outcome == "pass") == (not kinds)
@@ -325,7 +325,7 @@ def test_a_complete_plan_with_good_points_passes():
 )
 def test_an_instrument_that_does_not_do_makes_it_incomplete(changes, kind):
     verdict = judge(replace(PLAN, instruments=(replace(METER, **changes),)), good(), "p.toml")
-    assert verdict.outcome == "incomplete" and kind in [reason.kind.value for reason in verdict.reasons]
+    assert verdict.outcome == "incomplete" and kind in [reason.kind for reason in verdict.reasons]
 
 
 def test_a_calibration_is_valid_on_its_first_and_last_day():
@@ -357,7 +357,7 @@ def test_zero_degrees_are_a_temperature_and_zero_is_no_speed():
 
 def test_the_plan_is_checked_before_anything_is_measured():
     wrong = replace(POINT, repetitions=2, obstacle_stiffness_n_per_mm=100.0, peak_pressures_n_per_cm2=(1.0,))
-    kinds = [reason.kind.value for reason in check_point(wrong, PROFILE, recordings=0).reasons]
+    kinds = [reason.kind for reason in check_point(wrong, PROFILE, recordings=0).reasons]
     assert kinds == ["too_few_planned", "wrong_stiffness", "not_measured", "pressures_missing"]
     assert check_point(POINT, PROFILE, recordings=3).reasons == ()
 
@@ -379,7 +379,7 @@ def test_a_log_that_repeats_each_reading_has_the_sample_rate_of_the_cell(held, f
     assert items[0].sample_rate == pytest.approx(1000.0 / held, rel=1e-3)
     meter = replace(METER, sample_rate_hz=1000.0 / held)
     reasons = assess_point(POINT, PROFILE, items, instrument=meter).reasons
-    assert [reason.kind.value for reason in reasons] == found * 3
+    assert [reason.kind for reason in reasons] == found * 3
 
 
 def test_a_coarse_cell_under_a_steady_force_is_no_slow_cell():
@@ -398,7 +398,7 @@ def test_contact_with_the_head_never_passes_whatever_its_force(region, peak):
         check_point(point, profile, 1),
         assess_point(point, profile, []),
     ):
-        assert made.outcome == "fail" and made.reasons[0].kind is ReasonKind.NOT_PERMISSIBLE
+        assert made.outcome == "fail" and made.reasons[0].kind == "not_permissible"
     assert item.verdict.outcome == "fail" and averaged([item.verdict], profile).outcome == "fail"
     words = "not permissible" if peak < 65.0 else "where"
     assert words in item.verdict.reason

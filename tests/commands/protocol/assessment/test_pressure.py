@@ -14,7 +14,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.commands.protocol.assessment.plan import Instrument, MeasuringPoint
 from cdtool.commands.protocol.assessment.pressure import PressureAssessment, PressureRecord, pressure_record
 from cdtool.commands.protocol.assessment.pressure_reasons import pressure_reasons
-from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, ReasonKind
+from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict
 from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.truth.force.limits import ForceProfile, PressureLimit, read_force_limits
 
@@ -40,11 +40,9 @@ def outcome(found: PressureRecord | None, entered: float | None = None, profile:
     item = PressureAssessment.of(profile, "", found, entered)
     reasons = pressure_reasons(POINT, profile, ["1.csv"], [item], Instrument("pressure"))
     # A rectangular pulse has no shape: what may be between samples has tests of its own.
-    verdict = ProtocolVerdict(
-        tuple(reason for reason in reasons if reason.kind is not ReasonKind.PRESSURE_BETWEEN_SAMPLES)
-    )
+    verdict = ProtocolVerdict(tuple(reason for reason in reasons if reason.kind != "pressure_between_samples"))
     # What a repetition shows in its line is what its reasons lead to, but for a rest that decides.
-    if not any(reason.kind.value == "pressure_rest_decides" for reason in verdict.reasons):
+    if not any(reason.kind == "pressure_rest_decides" for reason in verdict.reasons):
         assert {"not_assessable": "incomplete"}.get(item.outcome, item.outcome) == verdict.outcome
     return verdict.outcome
 
@@ -145,7 +143,7 @@ def between_samples(pulse: FloatArray, time: FloatArray) -> list[float]:
     """Return, of the steps that pass with what was read, how much the pressure may have been between samples."""
     item = PressureAssessment.of(CHEST, "", record(pulse, time), None)
     found = pressure_reasons(POINT, CHEST, ["1.csv"], [item], Instrument("pressure"))
-    return [float(reason.values["most"]) for reason in found if reason.kind is ReasonKind.PRESSURE_BETWEEN_SAMPLES]
+    return [float(reason.values["most"]) for reason in found if reason.kind == "pressure_between_samples"]
 
 
 @given(rate=st.floats(15.0, 200.0), phase=st.floats(0.0, 1.0), peak=st.floats(245.0, 400.0))
