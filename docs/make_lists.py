@@ -22,7 +22,7 @@ from cdtool.alarms.activation import Activation
 from cdtool.base.settings import keys_of, kind_in_words
 from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
 from cdtool.commands.judging.named_logs import OnsetTable
-from cdtool.commands.judging.settings_table import ForceTable
+from cdtool.commands.judging.settings_table import ExecutionTable, ForceTable, TriggersTable
 from cdtool.detectors import DETECTORS
 from cdtool.formats import FORMATS
 from cdtool.machines.joint_machine import JointTable
@@ -50,6 +50,7 @@ _KEYS = "| key | type | default | meaning |\n|---|---|---|---|\n"
 _MODELS: Mapping[str, Any] = {
     "activation": Activation,
     "axis": LinearAxisTable,
+    "execution": ExecutionTable,
     "force": ForceTable,
     "inject": InjectTable,
     "machine": JointTable,
@@ -61,6 +62,7 @@ _MODELS: Mapping[str, Any] = {
     "rotary_axis": RotaryAxisTable,
     "signature": Signature,
     "step": ForceStep,
+    "triggers": TriggersTable,
     "urdf_robot": UrdfRobotTable,
 }
 _SHORT = (

@@ -11,12 +11,13 @@ import gc
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Annotated, Any, Protocol, TypeVar
 
 from cdtool.base.errors import UsageError, WorkerError
 from cdtool.base.remote.staging import copies_in_use
+from cdtool.base.settings import CountFromZero, Positive, setting
 from cdtool.execution.in_worker import Done, Failed, Outcome, Raised, keep_freed_memory
 
 Item = TypeVar("Item")
@@ -30,6 +31,19 @@ OfLost = Callable[[Any, str], Any]
 _AHEAD = 8
 # Python 3.12.1 itself leaves some hundred objects out of garbage collection; a caller that does so leaves out all.
 _LEFT_OUT_BY_PYTHON = 10_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execution:
+    """[execution]: how the work is done; it changes no result, and results do not state it."""
+
+    timeout_s: Annotated[
+        Positive | None, setting("leave out a log that takes longer than this; default: no limit", unit="s")
+    ] = None
+    retries: Annotated[
+        CountFromZero | None,
+        setting("how often a log that took too long or ended its worker is tried again; default: 1"),
+    ] = None
 
 
 @dataclass(frozen=True)
@@ -59,6 +73,11 @@ class Workers:
             checked_address(self.cluster)
             if self.cluster != LOCAL and self.jobs != 1:
                 raise UsageError("--jobs with the address of a cluster", "start that many workers there, or remove it")
+
+    def limited_by(self, execution: Execution) -> Workers:
+        """Return the workers with the time and the attempts of [execution] where it gives them."""
+        given = {"timeout": execution.timeout_s, "retries": execution.retries}
+        return replace(self, **{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
     @contextmanager
     def ready(self, inputs: Iterable[Path] = ()) -> Iterator[None]:

@@ -9,7 +9,7 @@ import typer
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import leave_with, plain, print_json, with_findings
 from cdtool.commands.console.late_progress import late_progress
-from cdtool.commands.console.options import FromOption, JsonOption, QuietOption, ToOption, section_of
+from cdtool.commands.console.options import JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
 
 
@@ -34,8 +34,11 @@ def convert(
             help="Machine file: write its channels in SI units. Default: all columns.",
         ),
     ] = None,
-    from_: FromOption = None,
-    to: ToOption = None,
+    from_: Annotated[
+        str | None,
+        typer.Option("--from", help="Only from here: a time as 1.5s, or a distance travelled as 0.2m."),
+    ] = None,
+    to: Annotated[str | None, typer.Option("--to", help="Only up to here.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
@@ -44,10 +47,12 @@ def convert(
 
     Example: cdtool convert sample_logs/gate/stiff/03.csv stiff-03.mcap -m sample_logs/gate/machine.toml
     """
+    from cdtool.base.settings import Place as PlaceOfKey
     from cdtool.commands.convert.converting import convert as write
+    from cdtool.commands.judging.named_logs import LogPart
 
     with late_progress("converting", quiet=quiet) as advance:
-        section = section_of(from_, to)
+        section = LogPart(begin=from_, end=to).section(PlaceOfKey("convert"))
         done = write(source, output, machine=machine, section=section, force=force, progress=advance)
     if as_json:
         print_json(with_findings(done))

@@ -14,8 +14,7 @@ from cdtool.commands.console.options import (
     JobsOption,
     JsonOption,
     QuietOption,
-    RetriesOption,
-    TimeoutOption,
+    SetOption,
 )
 from cdtool.commands.console.place import Place, location
 
@@ -38,10 +37,9 @@ def inject(
             autocompletion=completions.one_of(("csv", "mcap", "parquet", "feather", "h5", "mf4", "tdms")),
         ),
     ] = None,
+    settings: SetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
-    retries: RetriesOption = 1,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,6 +52,7 @@ def inject(
     from cdtool.base.errors import UsageError, nearest
     from cdtool.commands.inject.inject_section import FORMATS
     from cdtool.commands.inject.injecting import inject as run
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.execution.workers import Workers
 
     if file_format is not None and file_format not in FORMATS:
@@ -63,7 +62,8 @@ def inject(
             file,
             output,
             file_format=file_format,
-            workers=Workers(jobs, timeout, retries, cluster),
+            settings=given_settings(settings or ()),
+            workers=Workers(jobs, cluster=cluster),
             progress=advance,
         )
     print_skipped(done.skipped, ())

@@ -51,6 +51,7 @@ def inject(
     output: str | Path,
     *,
     file_format: str | None = None,
+    settings: Mapping[str, Any] | None = None,
     workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Injected:
@@ -65,6 +66,8 @@ def inject(
         with the origin of each, copies of the logs to learn from, and machine.toml and benchmark.toml for all of them.
     file_format : str, optional
         Suffix of the recordings, such as "csv" or "mcap"; that of the section by default.
+    settings : mapping, optional
+        Values in place of keys of the benchmark file, as for `cdtool.benchmark`.
     workers : Workers, optional
         How the work is done; in this process by default.
     progress : callable, optional
@@ -91,7 +94,8 @@ def inject(
     >>> len(done.logs.cases), done.logs.cases[0].group
     (32, 'injected_stiff')
     """
-    setup = read_benchmark_file(file)
+    setup = read_benchmark_file(file, settings=settings)
+    workers = (workers or Workers()).limited_by(setup.execution)
     section = section_of(setup)
     if file_format is not None:
         section = replace(section, file_format=file_format)

@@ -18,8 +18,7 @@ from cdtool.commands.console.options import (
     JobsOption,
     JsonOption,
     QuietOption,
-    RetriesOption,
-    TimeoutOption,
+    SetOption,
     listed,
 )
 from cdtool.commands.console.place import Place, location
@@ -56,10 +55,9 @@ def coverage(
             autocompletion=completions.detector_list,
         ),
     ] = None,
+    settings: SetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
-    retries: RetriesOption = 1,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -69,6 +67,7 @@ def coverage(
     """
     from cdtool.commands.inject.coverage.coverage import coverage as run
     from cdtool.commands.inject.coverage.files import PAGE, check_coverage_files, coverage_summary, write_coverage
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.execution.workers import Workers
 
     targets = output or []
@@ -78,7 +77,8 @@ def coverage(
             file,
             detectors=listed(detectors or ""),
             with_traces=any(target.suffix.lower() == PAGE for target in targets),
-            workers=Workers(jobs, timeout, retries, cluster),
+            settings=given_settings(settings or ()),
+            workers=Workers(jobs, cluster=cluster),
             progress=advance,
         )
     print_skipped(done.skipped, done.findings)

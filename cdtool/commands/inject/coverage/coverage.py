@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.inject.coverage.coverage_map import (
@@ -55,6 +56,7 @@ def coverage(
     *,
     detectors: Sequence[str] = (),
     with_traces: bool = False,
+    settings: Mapping[str, Any] | None = None,
     workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Coverage:
@@ -68,6 +70,8 @@ def coverage(
         Detectors in place of the file's.
     with_traces : bool, optional
         Also return the trigger plot of the worst contact of each cell: missed, otherwise the slowest. At most 200.
+    settings : mapping, optional
+        Values in place of keys of the benchmark file, as for `cdtool.benchmark`.
     workers : Workers, optional
         How the work is done; in this process by default.
     progress : callable, optional
@@ -95,8 +99,8 @@ def coverage(
     >>> done.map.positions, sorted(done.map.cells)
     ((0.99, 1.04), ['momentum'])
     """
-    workers = workers or Workers()
-    setup = read_benchmark_file(file)
+    setup = read_benchmark_file(file, settings=settings)
+    workers = (workers or Workers()).limited_by(setup.execution)
     setup = with_detectors(setup, detectors) if detectors else setup
     section = section_of(setup)
     units = {mark.unit for mark in section.positions}
