@@ -384,7 +384,10 @@ def _value(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
     if problem and of_tables:
         allowed = key.extra.get("hint") or f"write each as a table [[{place.prefix}{name}]]"
     elif problem and len(tables) == len(kinds):
-        allowed = key.extra.get("hint") or f"add a table [{place.prefix}{name}]"
+        table = f"add a table [{place.prefix}{name}]"
+        allowed = key.extra.get("hint") or (
+            f"give one of its keys: {name}.KEY=VALUE" if place.is_option(name) else table
+        )
     if not problem:
         problem, allowed = _size(found)
     if problem:
@@ -414,7 +417,7 @@ def _table(key: Key, kind: Any, values: Mapping[str, Any], place: Place) -> Any:
 def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
     """Return a list; a single value is a list with one. Its items are counted from 1; --set may have joints=a,b."""
     kinds = [part for part in get_args(hint) if part is not Ellipsis]
-    if isinstance(value, str) and "," in value and place.is_option(name):
+    if isinstance(value, str) and bare_type(kinds[0]) is str and place.is_option(name):
         value = [part.strip() for part in value.split(",")]
     single = not isinstance(value, list | tuple)
     items = [value] if single else value

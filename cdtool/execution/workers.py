@@ -17,7 +17,7 @@ from typing import Annotated, Any, Protocol, TypeVar
 
 from cdtool.base.errors import UsageError, WorkerError
 from cdtool.base.remote.staging import copies_in_use
-from cdtool.base.settings import CountFromZero, Positive, setting
+from cdtool.base.settings import Count, CountFromZero, Positive, check, setting
 from cdtool.execution.in_worker import Done, Failed, Outcome, Raised, keep_freed_memory
 
 Item = TypeVar("Item")
@@ -55,18 +55,13 @@ class Workers:
     for one that is started here with `jobs` worker processes.
     """
 
-    jobs: int = 1
-    timeout: float | None = None
-    retries: int = 1
+    jobs: Count = 1
+    timeout: Positive | None = None
+    retries: CountFromZero = 1
     cluster: str | None = None
 
     def __post_init__(self) -> None:
-        if self.jobs < 1:
-            raise UsageError(f"jobs is {self.jobs}", "give at least 1")
-        if self.timeout is not None and not 0.0 < self.timeout < 1e6:
-            raise UsageError(f"timeout is {self.timeout:g}", "give a time above 0 s, or none")
-        if self.retries < 0:
-            raise UsageError(f"retries is {self.retries}", "give 0 or more")
+        check(self)
         if self.cluster is not None:
             from cdtool.execution.cluster_session import LOCAL, checked_address
 

@@ -83,7 +83,7 @@ def benchmark(
 ) -> None:
     """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
 
-    Exits with status 1 if a limit or force profile in the file is violated, and with 4 if a protocol is incomplete.
+    Status 1: a limit or force profile is violated; 4: a protocol is incomplete.
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """

@@ -141,7 +141,5 @@ def test_labels_in_ms_have_kinds_in_every_output_and_some_are_no_contacts(plain,
         *("--set=threshold.limits=5", f"--set=onset.labels={tmp_path}/labels.csv", "--set=onset.labels_clock=source"),
     )
     assert shown.status in (0, 3) and "Traceback" not in shown.err
-    wrong = cdtool(
-        "detect", SAMPLES / "stiff/03.csv", "-b", SAMPLES / "benchmark.toml", "--set=onset.labels_clock=source"
-    )
-    assert wrong.status == 2 and "--set onset.labels_zone: is only for a label file" in wrong.err
+    wrong = cdtool("detect", tmp_path / "x.csv", "-b", SAMPLES / "benchmark.toml", "--set=onset.labels_clock=source")
+    assert wrong.status == 2 and "--set onset.labels_clock: is only for a label file" in wrong.err
