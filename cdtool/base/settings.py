@@ -14,7 +14,6 @@ from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from enum import Enum
 from functools import cache
-from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -22,7 +21,6 @@ import msgspec
 from msgspec import Meta
 
 from cdtool.base.errors import CdtoolError, ConfigurationError, MistakesError, UsageError, nearest
-from cdtool.base.remote.remote_path import is_remote
 from cdtool.base.value_words import value_in_words
 
 Model = TypeVar("Model")
@@ -280,12 +278,6 @@ class Place:
             return ConfigurationError(f"{self.where}: {fault.message}", fault.hint)
         above, dot, table = self.prefix.removesuffix(".").rpartition(".")
         return replace(self, prefix=f"{above}{dot}").fault(table, fault.message, fault.hint)
-
-    def file(self, name: str, path: Path) -> Path:
-        """Return the file that a key names; raises ConfigurationError if it is not there. A URL is asked when read."""
-        if not is_remote(path) and not path.exists():
-            raise self.fault(name, f"{path}: no such file", "check the path")
-        return path
 
     def note(self, name: str, problem: str, hint: str = "") -> None:
         """Remember a mistake, so that the rest of the file is checked as well."""

@@ -24,6 +24,7 @@ SHOWN_BY = {
     "exit_status": {"compare"},
     "planning": {"plan"},
     "detection": {"detect"},
+    "prepared": {"detect"},
     "prepared_benchmark": {"detect"},
     "recovering": {"recover"},
     "score_triggers": {"score"},

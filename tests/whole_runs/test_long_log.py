@@ -13,7 +13,7 @@ import pytest
 import cdtool
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import SignatureError, UsageError
-from cdtool.commands.detecting.detection import prepared
+from cdtool.commands.detecting.prepared import prepared
 from cdtool.formats.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
 from tests.command import cdtool as run

@@ -42,7 +42,8 @@ from cdtool.commands.detect.shown import as_rows, show_conclusion, show_detected
 if TYPE_CHECKING:
     from cdtool.alarms.pipeline import Detection
     from cdtool.commands.detect.contact_force import ForceSummary
-    from cdtool.commands.detecting.detection import Detected, PreparedDetector
+    from cdtool.commands.detecting.detection import Detected
+    from cdtool.commands.detecting.prepared import PreparedDetector
     from cdtool.commands.detecting.prepared_benchmark import PreparedBenchmark
     from cdtool.machines.dynamics import Machine
     from cdtool.results.results import RecordingFinding, Skipped
@@ -73,7 +74,7 @@ def detect(
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
     from cdtool.base.files.writing import made_folder
-    from cdtool.commands.detecting.detection import prepared
+    from cdtool.commands.detecting.prepared import prepared
     from cdtool.commands.judging.settings_table import given_settings
     from cdtool.results.results import Skipped
 

@@ -19,7 +19,8 @@ from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
-from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of, prepared
+from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of
+from cdtool.commands.detecting.prepared import prepared
 from cdtool.commands.judging.runs import several_logs
 from cdtool.detectors.detection import Status
 from cdtool.recordings.recording import Recording

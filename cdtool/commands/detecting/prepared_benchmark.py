@@ -11,9 +11,9 @@ from typing import Any
 from cdtool.base.errors import RecordingError, UsageError, nearest
 from cdtool.base.plain_text import counted
 from cdtool.base.settings import Place
-from cdtool.commands.detecting.detection import Detected, DetectedRuns, refuse_beside_signature
+from cdtool.commands.detecting.detection import Detected, DetectedRuns
 from cdtool.commands.judging.runs import load_runs
-from cdtool.commands.judging.settings_table import apply_settings, full_keys
+from cdtool.commands.judging.settings_table import apply_settings, full_keys, refuse_beside_signature
 from cdtool.commands.learning.learning import LearnedSignature, signature_of
 from cdtool.commands.learning.normal_runs import normals_for, normals_of, notes_on
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors

@@ -65,7 +65,7 @@ def explain(
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
-    from cdtool.commands.detecting.detection import prepared
+    from cdtool.commands.detecting.prepared import prepared
     from cdtool.commands.explain.explaining import explain_log
     from cdtool.commands.judging.runs import lost
     from cdtool.commands.judging.settings_table import given_settings

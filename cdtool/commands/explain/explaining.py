@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
-from cdtool.commands.detecting.detection import Detected, PreparedDetector, prepared
+from cdtool.commands.detecting.detection import Detected
+from cdtool.commands.detecting.prepared import PreparedDetector, prepared
 from cdtool.commands.scoring.detector_inputs import inputs_of
 from cdtool.formats.machine_file import MachineFile
 from cdtool.results.explanation.explanation import Explanation, explain_operation

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import first_of
-from cdtool.base.remote.remote_path import joined, location
+from cdtool.base.remote.remote_path import is_remote, joined, location
 from cdtool.base.settings import NotNegative, Place, setting
 from cdtool.commands.judging.runs import find_logs, resolve_all, shown_path
 from cdtool.formats.channels.run_reading import split_run
@@ -169,6 +169,13 @@ def named_logs(
     return found
 
 
+def named_file(place: Place, key: str, path: Path) -> Path:
+    """Return the file that a key names; raises ConfigurationError if it is not there. A URL is not looked up."""
+    if not is_remote(path) and not path.exists():
+        raise place.fault(key, f"{path}: no such file", "check the path")
+    return path
+
+
 def read_label_file(onset: OnsetTable, place: Place, base: Path) -> Labels | None:
     """Return the label file that [onset] names relative to `base`; None without one. Raises ConfigurationError."""
     if onset.labels is None:
@@ -176,7 +183,7 @@ def read_label_file(onset: OnsetTable, place: Place, base: Path) -> Labels | Non
             if getattr(onset, key):
                 raise place.fault(key, "is only for a label file", "name one: labels")
         return None
-    path = place.file("labels", joined(base, onset.labels))
+    path = named_file(place, "labels", joined(base, onset.labels))
     clock = onset.labels_clock or "recording"
     return read_labels(path, clock=clock, zone=onset.labels_zone, not_contacts=onset.not_contacts)
 

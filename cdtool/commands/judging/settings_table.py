@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -197,6 +197,13 @@ def read_settings(model: type[Model], settings: Mapping[str, Any]) -> tuple[Mode
         place.finish()
     assert table is not None
     return table, place
+
+
+def refuse_beside_signature(values: Mapping[str, Any], place: Place, names: Sequence[str]) -> None:
+    """Note each setting that a signature has of its own."""
+    for name in names:
+        if name in values:
+            place.note(name, "cannot be combined with a signature, which has its own", "omit one of the two")
 
 
 def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:

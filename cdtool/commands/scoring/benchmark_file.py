@@ -19,7 +19,7 @@ from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import Place, Positive, read, setting
 from cdtool.commands.judging.log_groups import Split
-from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_logs
+from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_file, named_logs
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, resolve_all, shown_path
 from cdtool.commands.judging.scoring_rules import ScoringRules
@@ -371,7 +371,7 @@ def read_benchmark_file(
         place.finish()
     assert table is not None
     machine_file = place.tried(
-        None, lambda: read_machine_file(place.file("machine", joined(file.parent, table.machine)))
+        None, lambda: read_machine_file(named_file(place, "machine", joined(file.parent, table.machine)))
     )
     if machine_file is None:
         place.finish()
@@ -630,7 +630,7 @@ def _force_limits(force: ForceTable, base: Path) -> Path | None:
 
 def _profiles(force: ForceTable, place: Place, base: Path) -> dict[str, ForceProfile]:
     path = _force_limits(force, base)
-    return read_force_limits(path and place.file("limits", path))
+    return read_force_limits(path and named_file(place, "limits", path))
 
 
 def _profile(

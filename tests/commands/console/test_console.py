@@ -15,7 +15,7 @@ from cdtool.truth.force.limits import read_force_limits
 from tests.command import cdtool
 
 
-@pytest.mark.parametrize("place", ["cdtool.commands.detecting.detection.prepared", "cdtool.commands.app.app"])
+@pytest.mark.parametrize("place", ["cdtool.commands.detecting.prepared.prepared", "cdtool.commands.app.app"])
 def test_ctrl_c_exits_with_130_and_one_line(gate_folder, place):
     log = gate_folder / "stiff" / "01.csv"
     with mock.patch(place, side_effect=KeyboardInterrupt):
