@@ -212,7 +212,7 @@ def again(recordings: int) -> bool:
             at_most=True,
         ),
         verdict(
-            "second run / first, --trust-mtime",
+            "second run / first, execution.trust_mtime",
             Spread.of([item["clock"] / first["clock"] for item in trusted]),
             AT_MOST_TRUSTED,
             at_most=True,

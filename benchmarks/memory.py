@@ -104,7 +104,7 @@ def _prepare(folder: Path) -> Recording:
     (folder / "machine.toml").write_text(text.partition("[channels]")[0] + MACHINE_CHANNELS, encoding="utf-8")
     free = sorted(map(str, (GATE / "free").iterdir()))
     for detector in DETECTORS:
-        learn = ["learn-signature", *free, "--machine", str(GATE / "machine.toml"), "--detector", detector]
+        learn = ["learn-signature", *free, "--machine", str(GATE / "machine.toml"), "--detectors", detector]
         _peak([*learn, "-o", str(folder / f"{detector}.json")])
     recording: Recording = read_as_logged(GATE / "free" / "01.mcap", known).recording
     return recording

@@ -75,12 +75,21 @@ def _commands(folder: Path, environment: dict[str, str]) -> bool:
     log, machine = str(SAMPLES / "stiff" / "03.csv"), ["--machine", str(SAMPLES / "machine.toml")]
     free = sorted(map(str, (SAMPLES / "free").iterdir()))
     signature = str(folder / "signature.json")
-    learn = ["learn-signature", *free, *machine, "--detector", "momentum", "-o", signature, "--force"]
+    learn = [
+        "learn-signature",
+        *free,
+        *machine,
+        "--detectors",
+        "momentum",
+        "-o",
+        signature,
+        "--set=signature.force=true",
+    ]
     arguments = {
         "--help": ["--help"],
         "learn-signature": learn,
         "info": ["info", log, *machine],
-        "detect --limit": ["detect", log, *machine, "--detector", "momentum", "--limit", "400"],
+        "detect": ["detect", log, *machine, "--detectors", "momentum", "--set=threshold.limits=400"],
         "detect --signature": ["detect", log, *machine, "--signature", signature],
         "benchmark": ["benchmark", str(SAMPLES / "benchmark.toml"), "--json"],
     }
@@ -89,8 +98,8 @@ def _commands(folder: Path, environment: dict[str, str]) -> bool:
     runs = {f"cdtool {name}": [command, *each] for name, each in arguments.items()}
     runs |= {"python -c 'import numba'": ["-c", "import numba"], "python -c pass": ["-c", "pass"]}
     clock, processor = measured({name: _task(each, environment) for name, each in runs.items()}, COMMAND_ROUNDS)
-    spread = Spread.of(processor["cdtool detect --limit"])
-    held = verdict("cdtool detect --limit, CPU s", spread, DETECT_AT_MOST_CPU_S, at_most=True)
+    spread = Spread.of(processor["cdtool detect"])
+    held = verdict("cdtool detect, CPU s", spread, DETECT_AT_MOST_CPU_S, at_most=True)
     table(
         ("task", "CPU s (low-high)", "s (low-high)"),
         [(name, Spread.of(processor[name]), Spread.of(clock[name])) for name in runs],
@@ -147,7 +156,7 @@ def _detect(folder: Path, environment: dict[str, str]) -> bool:
     machine = ["--machine", str(logs / "machine.toml")]
     signature, plot = logs / "feekf.json", folder / "plot.png"
     free = sorted(map(str, (logs / "free").glob("*.csv")))
-    _run([command, "learn-signature", *free, *machine, "--detector", "feekf", "-o", str(signature)], environment)
+    _run([command, "learn-signature", *free, *machine, "--detectors", "feekf", "-o", str(signature)], environment)
     impact = str(next((logs / "stiff").glob("*.csv")))
     arguments = [command, "detect", impact, *machine, "--signature", str(signature)]
     tasks = {

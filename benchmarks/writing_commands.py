@@ -51,9 +51,9 @@ def prepare(folder: Path, run: Run) -> None:
         encoding="utf-8",
     )
     free = [str(gate / "free" / f"0{number}.csv") for number in (1, 2, 3)]
-    machine = ("-m", str(gate / "machine.toml"))
+    machine, few = ("-m", str(gate / "machine.toml")), "--set=signature.force=true"
     for name, logs in (("a", free[:2]), ("b", free)):
-        run(["learn-signature", *logs, *machine, "-d", "gm", "--force", "-o", str(folder / f"{name}.json")])
+        run(["learn-signature", *logs, *machine, "-d", "gm", few, "-o", str(folder / f"{name}.json")])
         detectors = {"a": "pt", "b": "gm"}[name]
         run(
             ["benchmark", str(folder / "benchmark.toml"), "--detectors", detectors, "-o", str(folder / f"r{name}.json")]
@@ -97,7 +97,7 @@ def cases(inputs: Path) -> list[Case]:
         for suffix in ("json", "html", "md", "xml", "csv", "png", "svg", "pdf")
         for word in ("-o", "{out}/r." + suffix)
     ]
-    learn = ("-d", "gm", "--force", "-o", "{out}/s.json")
+    learn = ("-d", "gm", "--set=signature.force=true", "-o", "{out}/s.json")
     benchmark = ("benchmark", f"{inputs}/benchmark.toml", "--detectors")
     score = ("score", "-b", f"{inputs}/benchmark.toml", "-o", "{out}/r.json", "-o", "{out}/r.html")
     compare = ("-o", "{out}/c.md", "-o", "{out}/c.json")

@@ -110,8 +110,8 @@ def season(work: Path) -> None:
 def emps(work: Path) -> None:
     """The momentum observer on the recording with force pulses."""
     logs, machine, signature = DATA / "emps", EXAMPLES / "emps.toml", work / "emps.json"
-    cut = ("--operations", "motion")
-    learn = ("learn-signature", "DATA_EMPS.mat", "-m", machine, "-d", "gm", *cut, "--force", "-o", signature)
+    cut = ("--set=operations=motion", "--set=signature.force=true")
+    learn = ("learn-signature", "DATA_EMPS.mat", "-m", machine, "-d", "gm", *cut, "-o", signature)
     cdtool(*learn, folder=logs)
     image = IMAGES / "emps_pulses_gm.png"
     cdtool("detect", "DATA_EMPS_PULSES.mat", "-m", machine, "-s", signature, *cut, "--plot", image, folder=logs)
@@ -119,17 +119,18 @@ def emps(work: Path) -> None:
 
 def ur10e(_: Path) -> None:
     """Pure torque with a limit on the recording with three contacts."""
-    limits = ("-d", "pt", "--limit", UR10E_LIMITS, "--debounce", 2)
+    limits = ("-d", "pt", f"--set=threshold.limits={UR10E_LIMITS}", "--set=activation.debounce=2")
     image = IMAGES / "ur10e_link4.png"
     cdtool("detect", "link4.csv.gz", "-m", EXAMPLES / "ur10e.toml", *limits, "--plot", image, folder=UR10E)
 
 
 def ur10e_momentum(_: Path) -> None:
     """The momentum observer of the arm: all joints of the same recording, the elbow of the pushes; needs pinocchio."""
-    momentum = ("-m", "machine.toml", "-d", "gm", "--debounce", 3)
+    momentum = ("-m", "machine.toml", "-d", "gm", "--set=activation.debounce=3")
     moving, pushed = IMAGES / "ur10e_momentum.png", IMAGES / "ur10e_push.png"
-    cdtool("detect", "link4.csv.gz", *momentum, "--limit", UR10E_MOMENTUM_LIMITS, "--plot", moving, folder=UR10E)
-    elbow = ("--joints", "joint3", "--limit", UR10E_MOMENTUM_LIMITS.split(",")[2])
+    all_joints = f"--set=threshold.limits={UR10E_MOMENTUM_LIMITS}"
+    cdtool("detect", "link4.csv.gz", *momentum, all_joints, "--plot", moving, folder=UR10E)
+    elbow = ("--set=joints=joint3", f"--set=threshold.limits={UR10E_MOMENTUM_LIMITS.split(',')[2]}")
     cdtool("detect", "ur-static.csv.gz", *momentum, *elbow, "--plot", pushed, folder=UR10E)
 
 

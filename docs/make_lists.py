@@ -23,7 +23,7 @@ from cdtool.alarms.activation import Activation
 from cdtool.base.settings import keys_of, kind_in_words
 from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
 from cdtool.commands.judging.named_logs import OnsetTable
-from cdtool.commands.judging.settings_table import ForceTable
+from cdtool.commands.judging.settings_table import ExecutionTable, ForceTable, TriggersTable
 from cdtool.commands.simulate.simulation_table import SimulationTable
 from cdtool.commands.tune.options import TuneTable
 from cdtool.detectors import DETECTORS
@@ -55,6 +55,7 @@ _KEYS = "| key | type | default | meaning |\n|---|---|---|---|\n"
 _MODELS: Mapping[str, Any] = {
     "activation": Activation,
     "axis": LinearAxisTable,
+    "execution": ExecutionTable,
     "force": ForceTable,
     "inject": InjectTable,
     "machine": JointTable,
@@ -68,6 +69,7 @@ _MODELS: Mapping[str, Any] = {
     "simulation": SimulationTable,
     "step": ForceStep,
     "tune": TuneTable,
+    "triggers": TriggersTable,
     "urdf_robot": UrdfRobotTable,
 }
 _SHORT = (

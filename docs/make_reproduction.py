@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 import cdtool
-from cdtool.alarms.activation import ActivationSettings
 from cdtool.commands.detect.plot import plot_detected
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.simulate.arm_recordings import simulate_arm
@@ -124,13 +123,11 @@ def _alarmed(done: BenchmarkResult) -> dict[str, str]:
 def example(work: Path, name: str, detector: str, image: str) -> None:
     """Figures 5.6 and 6.7: one detector's signal, its signature and the trigger on a stiff impact."""
     rule = Signature() if name == "gate" else Signature(sides="one", position_window=22e-3)
-    joints = {"gate": (), "arm1": ("arm",), "arm2": ("forearm",)}[name]
-    activation: ActivationSettings = {} if name == "gate" else {"debounce": 7}
+    joints = {"gate": {}, "arm1": {"joints": "arm"}, "arm2": {"joints": "forearm"}}[name]
+    settings = joints if name == "gate" else {**joints, "activation.debounce": 7}
     with contextlib.chdir(work / name):  # so that the title shows a short name
         free = sorted(Path("free").iterdir())
-        learned = cdtool.learn_signature(
-            free, "machine.toml", detector, rule=rule, joints=joints, activation=activation
-        )
+        learned = cdtool.learn_signature(free, "machine.toml", detector, rule=rule, settings=settings)
         write_signature("signature.json", learned.signature)
         found = cdtool.detect("stiff/03.csv", "machine.toml", signature="signature.json")
         plot_detected(found.detected, IMAGES / image)

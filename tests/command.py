@@ -10,6 +10,9 @@ from unittest import mock
 
 from cdtool.commands.app import main
 
+# A signature of fewer runs than usual.
+FEW = "--set=signature.force=true"
+
 
 @dataclass(frozen=True)
 class Outcome:

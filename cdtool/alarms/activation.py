@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, TypedDict
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -24,15 +24,6 @@ _MOST_DEBOUNCE = 1_000_000_000
 
 Debounce = Annotated[int, Meta(ge=1, le=_MOST_DEBOUNCE)]
 ShareBelowOne = Annotated[float, Meta(ge=0.0, lt=1.0)]
-
-
-class ActivationSettings(TypedDict, total=False):
-    """Settings that differ from those of an Activation; None leaves a setting unchanged."""
-
-    debounce: int | None
-    rearm: float | None
-    hysteresis: float | None
-    latch: bool | None
 
 
 @dataclass(frozen=True)
@@ -86,11 +77,6 @@ class Activation:
             "hysteresis": self.hysteresis,
             "latch": self.latch,
         }
-
-    def changed(self, settings: ActivationSettings) -> Activation:
-        """Return the activation changed by `settings`."""
-        given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
-        return replace(self, **given)
 
     def samples(self, period: float) -> int:
         """Return the nominal debounce in samples for a signal of that period [s]; `needed` has the actual one."""

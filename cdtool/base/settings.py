@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
@@ -179,12 +179,15 @@ def _one_kind(hint: Any, plural: bool) -> str:
     return "tables" if plural else "a table"
 
 
+_BOUNDS = {"ge": "of at least", "gt": "above", "le": "of at most", "lt": "below"}
+
+
 def _bounds(hint: Any) -> str:
-    words = []
-    for item in getattr(hint, "__metadata__", ()):
-        for bound, text in ((item.ge, "of at least"), (item.gt, "above"), (item.le, "of at most"), (item.lt, "below")):
-            words += [] if bound is None else [f" {text} {bound:g}"]
-    return " and".join(words)
+    notes = getattr(hint, "__metadata__", ())
+    known = {name: value for item in notes for name in _BOUNDS if (value := getattr(item, name)) is not None}
+    if known.keys() >= {"ge", "le"}:
+        return f" from {known['ge']:g} to {known['le']:g}"
+    return " and".join(f" {_BOUNDS[name]} {value:g}" for name, value in known.items())
 
 
 def _scalar(key: Key, hint: Any, value: Any) -> tuple[Any, str, str]:
@@ -226,7 +229,7 @@ def _is_scalar(hint: Any) -> bool:
 class Place:
     """Where in a file values stand, and the mistakes that were found in the file so far.
 
-    `misspelt`: full keys that unknown ones are probably meant to be. `by_option`: the option that gave a full key.
+    `misspelt`: full keys that unknown ones are probably meant to be. `by_option`: full keys that --set gave.
     `root`: the model of the whole file, to say where a key belongs.
     """
 
@@ -234,16 +237,18 @@ class Place:
     prefix: str = ""
     mistakes: list[ConfigurationError] = field(default_factory=list)
     misspelt: list[str] = field(default_factory=list)
-    by_option: Mapping[str, str] = field(default_factory=dict)
+    by_option: Collection[str] = ()
     root: type[Any] | None = None
 
     def key(self, name: str) -> str:
-        """Return file and full key, for an error message; or the option that gave it."""
+        """Return file and full key, for an error message; or --set and the key, if that gave it or a part of it."""
         full = f"{self.prefix}{name}"
-        if full in self.by_option:
-            return self.by_option[full]
-        given = any(key.startswith(f"{full}.") for key in self.by_option)
+        given = self.is_option(name) or any(key.startswith(f"{full}.") for key in self.by_option)
         return f"--set {full}" if given else f"{self.where}: {full}"
+
+    def is_option(self, name: str) -> bool:
+        """Whether --set gave the key, or the list of which it is an item."""
+        return f"{self.prefix}{name}".partition("[")[0] in self.by_option
 
     def home_of(self, name: str) -> str:
         """Return the table of the file that has a key of that name, if only one has; else an empty text."""
@@ -336,7 +341,8 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
             home = place.home_of(name)
             meant = get_close_matches(name, keys.keys() - values.keys(), n=1)
             place.misspelt.extend(f"{place.prefix}{key}" for key in meant)
-            place.note(name, "unknown key", f"it belongs in [{home}]" if home else nearest(name, keys))
+            where = f"write {home}.{name}" if place.is_option(name) else f"it belongs in [{home}]"
+            place.note(name, "unknown key", where if home else nearest(name, keys))
         elif (found := _value(keys[name], keys[name].hint, name, value, place)) is not _WRONG:
             given[keys[name].attribute] = found
     for name, key in keys.items():
@@ -381,13 +387,16 @@ def _value(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
     lists = [kind for kind in kinds if get_origin(kind) in (tuple, list)]
     of_tables = bool(lists) and is_model(bare_type(get_args(lists[0])[0]))
     stands_alone = not of_tables and not any(map(_is_scalar, parts))
-    if lists and (isinstance(value, list) or stands_alone):
+    if lists and (isinstance(value, list | tuple) or stands_alone):
         return _list(key, lists[0], name, value, place)
     found, problem, allowed = _scalar(key, hint, value)
     if problem and of_tables:
         allowed = key.extra.get("hint") or f"write each as a table [[{place.prefix}{name}]]"
     elif problem and len(tables) == len(kinds):
-        allowed = key.extra.get("hint") or f"add a table [{place.prefix}{name}]"
+        table = f"add a table [{place.prefix}{name}]"
+        allowed = key.extra.get("hint") or (
+            f"give one of its keys: {name}.KEY=VALUE" if place.is_option(name) else table
+        )
     if not problem:
         problem, allowed = _size(found)
     if problem:
@@ -415,9 +424,11 @@ def _table(key: Key, kind: Any, values: Mapping[str, Any], place: Place) -> Any:
 
 
 def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
-    """Return a list; a single value is a list with one. Its items are counted from 1."""
+    """Return a list; a single value is a list with one. Its items are counted from 1; --set may have joints=a,b."""
     kinds = [part for part in get_args(hint) if part is not Ellipsis]
-    single = not isinstance(value, list)
+    if isinstance(value, str) and bare_type(kinds[0]) is str and place.is_option(name):
+        value = [part.strip() for part in value.split(",")]
+    single = not isinstance(value, list | tuple)
     items = [value] if single else value
     if not items and _is_scalar(kinds[0]) and not key.extra.get("empty"):
         place.note(name, "is empty", key.allowed)

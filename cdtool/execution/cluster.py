@@ -1,7 +1,7 @@
 """Work on a Dask cluster: each of its worker processes has one item at a time.
 
 So it is known which item a process had when it ended. Dask would repeat it on any other worker, as often as its
-scheduler is configured to; here every item is bound to a worker, and repeated as often as `--retries` states.
+scheduler is configured to; here every item is bound to a worker, and repeated as often as `execution.retries` states.
 """
 
 from __future__ import annotations

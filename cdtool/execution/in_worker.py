@@ -58,7 +58,7 @@ Outcome = Done | Failed | Raised | NotBegun
 
 def limit_words(seconds: float) -> str:
     """Return the reason of an item that took longer than the time limit."""
-    return f"took longer than {seconds:g} s (--timeout)"
+    return f"took longer than {seconds:g} s (execution.timeout_s)"
 
 
 def ended_words(code: int) -> str:

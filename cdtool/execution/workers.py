@@ -11,12 +11,13 @@ import gc
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Annotated, Any, Protocol, TypeVar
 
 from cdtool.base.errors import UsageError, WorkerError
 from cdtool.base.remote.staging import copies_in_use
+from cdtool.base.settings import Count, CountFromZero, Positive, check, setting
 from cdtool.execution.in_worker import Done, Failed, Outcome, Raised, keep_freed_memory
 
 Item = TypeVar("Item")
@@ -32,6 +33,19 @@ _AHEAD = 8
 _LEFT_OUT_BY_PYTHON = 10_000
 
 
+@dataclass(frozen=True, kw_only=True)
+class Execution:
+    """[execution]: how the work is done; it changes no result, and results do not state it."""
+
+    timeout_s: Annotated[
+        Positive | None, setting("leave out a log that takes longer than this; default: no limit", unit="s")
+    ] = None
+    retries: Annotated[
+        CountFromZero | None,
+        setting("how often a log that took too long or ended its worker is tried again; default: 1"),
+    ] = None
+
+
 @dataclass(frozen=True)
 class Workers:
     """How work is done: in `jobs` processes, or by the workers of a Dask `cluster`.
@@ -41,24 +55,24 @@ class Workers:
     for one that is started here with `jobs` worker processes.
     """
 
-    jobs: int = 1
-    timeout: float | None = None
-    retries: int = 1
+    jobs: Count = 1
+    timeout: Positive | None = None
+    retries: CountFromZero = 1
     cluster: str | None = None
 
     def __post_init__(self) -> None:
-        if self.jobs < 1:
-            raise UsageError(f"jobs is {self.jobs}", "give at least 1")
-        if self.timeout is not None and not 0.0 < self.timeout < 1e6:
-            raise UsageError(f"timeout is {self.timeout:g}", "give a time above 0 s, or none")
-        if self.retries < 0:
-            raise UsageError(f"retries is {self.retries}", "give 0 or more")
+        check(self)
         if self.cluster is not None:
             from cdtool.execution.cluster_session import LOCAL, checked_address
 
             checked_address(self.cluster)
             if self.cluster != LOCAL and self.jobs != 1:
                 raise UsageError("--jobs with the address of a cluster", "start that many workers there, or remove it")
+
+    def limited_by(self, execution: Execution) -> Workers:
+        """Return the workers with the time and the attempts of [execution] where it gives them."""
+        given = {"timeout": execution.timeout_s, "retries": execution.retries}
+        return replace(self, **{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
 
     @contextmanager
     def ready(self, inputs: Iterable[Path] = ()) -> Iterator[None]:

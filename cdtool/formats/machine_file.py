@@ -158,7 +158,7 @@ def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:
         raise place.fault("machine", problem, "add a table [machine]")
     for part, at in ((values, place), (table, place.below("machine"))):
         if "operations" in part:
-            hint = "set it there, or give detect --operations motion"
+            hint = "set it there, or give detect --set operations=motion"
             raise at.fault("operations", "is a key of the benchmark file", hint)
     kind = table.get("type")
     if kind is None and not place.is_whole:

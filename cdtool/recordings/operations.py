@@ -105,7 +105,7 @@ def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
     if not spans:
         raise RecordingError(
             f"{recording.name}: no operation found by {how}",
-            "see cdtool info, or use operations = 'whole' (detect --operations whole)",
+            "see cdtool info, or set operations to whole",
         )
     operations = []
     for number, (start, end) in enumerate(spans, 1):

@@ -45,7 +45,7 @@ def words(item: Explanation) -> list[str]:
     --------
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> ((_, alarm),) = cdtool.explain(log, machine, detector="momentum", limit=[400.0]).events
+    >>> ((_, alarm),) = cdtool.explain(log, machine, detector="momentum", settings={"threshold.limits": 400.0}).events
     >>> words(alarm)[0]
     'alarm at ... s, ... ms after the contact (onset at ... s, load cell)'
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
@@ -159,5 +160,7 @@ class Limit:
         values = tuple(limits)
         if not all(value > 0.0 for value in values):
             raise UsageError(f"limits are {list(values)}", "numbers above 0 are needed (inf: not monitored)")
+        if values and all(map(math.isinf, values)):
+            raise UsageError(f"limits are {list(values)}: no joint is monitored", "give a number for at least one")
         nothing = (0.0,) * len(values)
         return FittedLimit(nothing, nothing, values, values)

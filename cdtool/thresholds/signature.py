@@ -177,8 +177,7 @@ class Signature:
         if runs < enough:
             many = "run" if runs == 1 else "runs"
             more = f"{enough - runs} more {'is' if enough - runs == 1 else 'are'} needed to have {enough}"
-            how = "learn-signature --force, or force = true in [signature]"
-            fewer = f"to learn from fewer, but at least {LEAST_RUNS}: {how}"
+            fewer = f"to learn from fewer, but at least {LEAST_RUNS}: signature.force = true"
             raise SignatureError(
                 f"{runs} impact-free {many} of one class: {more}", "add runs" if self.force else f"add runs; {fewer}"
             )

@@ -150,7 +150,8 @@ def run(folder: Path, detectors: Sequence[str], factor: float, block: float) -> 
         detector = machine.detector(name)
         limit = learn_limit(recordings[LEARNED_FROM], machine, detector, factor, block)
         judged[name] = [judge(recording, log, machine, detector, limit) for log, recording in recordings.items()]
-        print(f"\n{name}: --limit {','.join(f'{value:g}' for value in limit)} {detector.unit(machine.machine)}")
+        limits = ",".join(f"{value:g}" for value in limit)
+        print(f"\n{name}: --set threshold.limits={limits} {detector.unit(machine.machine)}")
         for item in judged[name]:
             report(item)
     print(f"\n{CAVEATS}")

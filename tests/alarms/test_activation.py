@@ -113,12 +113,6 @@ def test_a_latched_alarm_is_the_only_one_and_hides_no_crossing():
     assert judged(DWELLING, Activation(3, latch=True)) == ([2], [2, 607, 1212])
 
 
-def test_settings_change_only_what_they_name():
-    stored = Activation(5, 0.3, 0.2, True)
-    assert stored.changed({"debounce": 7, "rearm": None, "latch": None}) == Activation(7, 0.3, 0.2, True)
-    assert stored.changed({"latch": False, "hysteresis": 0.0}) == Activation(5, 0.3)
-
-
 @given(
     st.lists(st.sampled_from([0.0, 0.4, 0.9, 2.0, -0.9, -2.0]), max_size=80),
     st.floats(0.0, 0.99),

@@ -151,7 +151,7 @@ def test_what_only_follows_from_a_mistake_is_not_a_second_one():
 
 
 def test_several_mistakes_are_one_error_and_a_single_one_is_itself():
-    place = Place("m.toml", by_option={"mass_kg": "--set mass_kg"})
+    place = Place("m.toml", by_option=["mass_kg"])
     read(Outer, {"mass_kg": -1, "latch": 2}, place)
     with pytest.raises(MistakesError, match=r"--set mass_kg: is -1[^\n]*\nm.toml: latch: is 2"):
         place.finish()

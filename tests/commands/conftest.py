@@ -23,7 +23,7 @@ def feekf_signature(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory)
     path = tmp_path_factory.mktemp("signature") / "gate.feekf.json"
     logs = sorted((gate_folder / "free").glob("*.csv"))
     done = cdtool(
-        "learn-signature", *logs, "--machine", gate_folder / "machine.toml", "--detector", "feekf", "-o", path
+        "learn-signature", *logs, "--machine", gate_folder / "machine.toml", "--detectors", "feekf", "-o", path
     )
     assert done.status == 0, done.err
     return path

@@ -81,8 +81,8 @@ def fate(number):
 
 REASONS = {
     3: "its worker process crashed (SIGSEGV)",
-    9: "took longer than 2 s (--timeout)",
-    14: "took longer than 2 s (--timeout)",
+    9: "took longer than 2 s (execution.timeout_s)",
+    14: "took longer than 2 s (execution.timeout_s)",
     20: "not enough memory",
     21: "its worker process ended with exit status 8",
 }
@@ -247,7 +247,7 @@ def command(site, folder, *arguments):
 @needs_dask
 def test_a_benchmark_on_a_cluster_is_that_of_local_processes(address, site, tmp_path):
     gate_with_fatal_logs(tmp_path / "gate")
-    common = ("benchmark", "gate/benchmark.toml", "--detectors", "gm", "--retries", 0)
+    common = ("benchmark", "gate/benchmark.toml", "--detectors", "gm", "--set=execution.retries=0")
     here = command(site, tmp_path, *common, "-j", 2, "-o", "here.json")
     there = command(site, tmp_path, *common, "--cluster", address, "-o", "there.json")
     assert here.returncode == there.returncode == 3

@@ -248,7 +248,7 @@ def test_work_that_is_given_up_after_a_result_was_cut_off_leaves_nothing(tmp_pat
 
 def test_a_process_that_is_stopped_is_ended_by_the_time_limit():
     made = run(stopped, 6, Workers(2, timeout=0.5, retries=0))
-    assert made == [0, 1, (2, "took longer than 0.5 s (--timeout)"), 3, 4, 5]
+    assert made == [0, 1, (2, "took longer than 0.5 s (execution.timeout_s)"), 3, 4, 5]
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -256,7 +256,7 @@ def test_a_process_that_is_stopped_is_ended_by_the_time_limit():
 def test_an_item_that_takes_too_long_is_ended(work, jobs):
     begin = time.monotonic()
     made = run(work, 6, Workers(jobs, timeout=0.5, retries=0))
-    assert made == [0, 1, (2, "took longer than 0.5 s (--timeout)"), 3, 4, 5]
+    assert made == [0, 1, (2, "took longer than 0.5 s (execution.timeout_s)"), 3, 4, 5]
     assert time.monotonic() - begin < 30.0
 
 

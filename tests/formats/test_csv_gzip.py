@@ -94,8 +94,12 @@ def test_every_command_reads_a_compressed_log(tmp_path):
     packed = tmp_path / "03.csv.gz"
     packed.write_bytes(gzip.compress(log.read_bytes()))
     machine = GATE / "machine.toml"
-    plain_alarms = json.loads(command("detect", log, "-m", machine, "-d", "gm", "--limit", 400, "--json").out)
-    alarms = json.loads(command("detect", packed, "-m", machine, "-d", "gm", "--limit", 400, "--json").out)
+    plain_alarms = json.loads(
+        command("detect", log, "-m", machine, "-d", "gm", "--set=threshold.limits=400", "--json").out
+    )
+    alarms = json.loads(
+        command("detect", packed, "-m", machine, "-d", "gm", "--set=threshold.limits=400", "--json").out
+    )
     assert alarms[0]["alarms"] == plain_alarms[0]["alarms"] and alarms[0]["alarms"]
     done = command("info", packed, "-m", machine)
     assert done.status == 0 and "csv" in done.out

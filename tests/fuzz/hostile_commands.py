@@ -122,14 +122,20 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("coverage inject.toml", "model.toml"),
     ("identify free/01.csv free/02.csv -m machine.toml -o out.toml --force", "free/01.csv"),
     ("identify free/01.csv free/02.csv -m model.toml -o out.toml --force", "model.toml"),
-    ("detect stiff/01.csv -m machine.toml -d gm --limit 40", "machine.toml"),
-    ("detect stiff/01.csv -m machine.toml -d feekf --limit 40", "stiff/01.csv"),
+    ("detect stiff/01.csv -m machine.toml -d gm --set threshold.limits=40", "machine.toml"),
+    ("detect stiff/01.csv -m machine.toml -d feekf --set threshold.limits=40", "stiff/01.csv"),
     ("detect stiff/01.csv -m machine.toml -s gate.json", "gate.json"),
     ("detect stiff/01.csv -m machine.toml -s gate.json", "stiff/01.csv"),
     ("explain stiff/01.csv -m machine.toml -s gate.json", "gate.json"),
     ("explain stiff/01.csv -m machine.toml -s gate.json", "stiff/01.csv"),
-    ("learn-signature free/01.csv free/02.csv free/03.csv -m machine.toml -d gm --force -o out.json", "free/01.csv"),
-    ("learn-signature free/01.csv free/02.csv free/03.csv -m machine.toml -d gm --force -o out.json", "machine.toml"),
+    (
+        "learn-signature free/01.csv free/02.csv free/03.csv -m machine.toml -d gm -o out.json",
+        "free/01.csv",
+    ),
+    (
+        "learn-signature free/01.csv free/02.csv free/03.csv -m machine.toml -d gm -o out.json",
+        "machine.toml",
+    ),
     ("benchmark benchmark.toml -o out.json", "benchmark.toml"),
     ("benchmark benchmark.toml -o out.json", "machine.toml"),
     ("benchmark full.toml -o out.json", "full.toml"),
@@ -157,33 +163,23 @@ _NUMBERS = ("0", "-1", "1", "99999999999999999999", "-99999999999999999999", "na
 _WORDS = ("", " ", "x", ",", "1,2,3", "9" * 5000, "\udcff\udcfe", "a\nb", "1e400", "0x10", "--", "\u202e", "/dev/zero")
 _OPTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
-        "detect stiff/01.csv -m machine.toml -d gm --limit 40",
+        "detect stiff/01.csv -m machine.toml -d gm --set threshold.limits=40",
         (
-            "--debounce",
-            "--rearm",
-            "--hysteresis",
-            "--onset-above",
-            "--onset-back-to",
-            "--limit",
-            "-d",
-            "--joints",
-            "--operations",
+            *("--set=activation.debounce", "--set=activation.rearm_s", "--set=activation.hysteresis", "-d"),
+            *("--set=onset.above_n", "--set=onset.back_to_n", "--set=threshold.limits", "--set=joints"),
+            *("--set=operations", "--set=threshold", "--set=from"),
         ),
     ),
-    ("detect stiff/01.csv -m machine.toml -s gate.json", ("--debounce", "--rearm", "--contact-at", "--plot", "-m")),
     (
-        "learn-signature free/01.csv free/02.csv free/03.csv -m machine.toml -d gm --force -o out.json",
+        "detect stiff/01.csv -m machine.toml -s gate.json",
+        ("--set=activation.debounce", "--set=activation.rearm_s", "--contact-at", "--plot", "-m"),
+    ),
+    (
+        "learn-signature free/01.csv free/02.csv free/03.csv -m machine.toml -d gm -o out.json",
         (
-            "-k",
-            "--debounce",
-            "--rearm",
-            "--threshold",
-            "--set",
+            *("--set=signature.safety_factor", "--set=activation.debounce", "--set=activation.rearm_s", "--set"),
+            *("--set=threshold.name", "--set=signature.rule", "--set=signature.alignment", "--set=joints", "-d"),
             "--false-alarm-budget",
-            "--rule",
-            "--align",
-            "--joints",
-            "-d",
         ),
     ),
     ("plan", ("--difference-ms", "--std-ms", "--power", "--missed-at-most", "--false-alarms-at-most", "--level")),
@@ -197,9 +193,12 @@ _OPTIONS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     ("simulate gate --set free=1 --set holdout=0 --set stiff=0 --set soft=0 -o sim", ("--seed", "--set")),
     ("benchmark benchmark.toml -o out.json", ("--detectors", "--jobs")),
-    ("score triggers.csv -b benchmark.toml", ("--clock", "--jobs")),
+    ("score triggers.csv -b benchmark.toml", ("--set=triggers.clock", "--jobs")),
     ("info stiff/01.csv", ("-m",)),
-    ("explain stiff/01.csv -m machine.toml -s gate.json", ("--debounce", "--onset-above", "--plot", "--joints")),
+    (
+        "explain stiff/01.csv -m machine.toml -s gate.json",
+        ("--set=activation.debounce", "--set=onset.above_n", "--plot", "--set=joints"),
+    ),
 )
 
 
@@ -247,7 +246,8 @@ def make_bench(folder: Path) -> None:
     (folder / "six.urdf").write_text(six_joint_urdf())
     (folder / "robot.toml").write_text(_ROBOT.format(joints=", ".join(f'"{name}"' for name in JOINTS[:5])))
     shutil.copy(Path(__file__).parents[2] / "docs" / "examples" / "gate_study.toml", folder / "study.toml")
-    signature = ("learn-signature", *sorted(folder.glob("free/*.csv")), "-m", folder / "machine.toml", "--force")
+    machine = ("-m", folder / "machine.toml", "--set=signature.force=true")
+    signature = ("learn-signature", *sorted(folder.glob("free/*.csv")), *machine)
     for arguments in (
         (*signature, "-d", "gm", "-o", folder / "gate.json"),
         ("benchmark", folder / "benchmark.toml", "-o", folder / "results.json"),
@@ -271,7 +271,9 @@ def attempts(folder: Path, seed: int, count: int) -> Iterator[Attempt]:
         if random.random() < 0.3:
             command, options = mutations.pick(_OPTIONS)
             value = mutations.pick(_NUMBERS if random.random() < 0.6 else _WORDS)
-            yield Attempt((*_placed(command, folder), mutations.pick(options), value))
+            option = mutations.pick(options)
+            given = (f"{option}={value}",) if option.startswith("--set=") else (option, value)
+            yield Attempt((*_placed(command, folder), *given))
         else:
             command, file = mutations.pick(_COMMANDS)
             content = (folder / file).read_bytes()

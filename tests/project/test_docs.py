@@ -219,7 +219,7 @@ def the_thesis_rule_alarms_in_every_impact_free_run() -> None:
     gate = Path("gate")
     machine, free, holdout = gate / "machine.toml", sorted(gate.glob("free/*")), sorted(gate.glob("holdout/*"))
     for detector in ("feekf", "gm", "igm", "pi", "pt"):
-        rule = ("-m", machine, "-d", detector, "--rule", "thesis", "-o", "rule.json")
+        rule = ("-m", machine, "-d", detector, "--set=signature.rule=thesis", "-o", "rule.json")
         assert cdtool("learn-signature", *free, *rule).status == 0
         found = json.loads(cdtool("detect", *holdout, "-m", machine, "-s", "rule.json", "--json").out)
         assert [item["verdict"] for item in found] == ["alarm"] * 40, detector
@@ -227,7 +227,7 @@ def the_thesis_rule_alarms_in_every_impact_free_run() -> None:
 
 def the_alarms_of_the_tutorial_are_as_stated() -> None:
     text = (DOCS / "ur10e-tutorial.md").read_text(encoding="utf-8")
-    limits = ("-d", "gm", "--limit", "31.8,29.2,11.3,3.2,2.6,2.9", "--debounce", "3", "--json")
+    limits = ("-d", "gm", "--set=threshold.limits=31.8,29.2,11.3,3.2,2.6,2.9", "--set=activation.debounce=3", "--json")
     log = UR10E_LOGS / "link4.csv.gz"
     (found,) = json.loads(cdtool("detect", log, "-m", UR10E_LOGS / "machine.toml", *limits).out)
     stated = re.findall(r"^\| ([\d.]+) s \| joint (\d) \| ([\d.]+) \|", text, re.MULTILINE)
@@ -256,7 +256,7 @@ def the_latencies_of_the_gate_with_a_force_meter_are_as_stated() -> None:
 def the_alarms_in_the_real_recordings_are_as_stated() -> None:
     assert DATA is not None
     text = (DOCS / "real-recordings.md").read_text(encoding="utf-8")
-    limits = ("-d", "pt", "--limit", "33,inf,53,inf,inf,inf", "--debounce", "2")
+    limits = ("-d", "pt", "--set=threshold.limits=33,inf,53,inf,inf,inf", "--set=activation.debounce=2")
     limits = ("-m", "docs/examples/ur10e.toml", *limits, "--json")
     link4 = json.loads(cdtool("detect", UR10E_LOGS / "link4.csv.gz", *limits).out)
     times = [f"{alarm['time_s'] - 3262.867:.3f}" for alarm in link4[0]["alarms"]]
@@ -265,9 +265,10 @@ def the_alarms_in_the_real_recordings_are_as_stated() -> None:
     free = json.loads(cdtool("detect", UR10E_LOGS / "no_torque.csv.gz", *limits).out)
     static = json.loads(cdtool("detect", UR10E_LOGS / "ur-static.csv.gz", *limits).out)
     assert (len(free[0]["alarms"]), len(static[0]["alarms"])) == (2, 0)
-    emps = ("-m", "docs/examples/emps.toml", "--operations", "motion", "--json")
+    emps = ("-m", "docs/examples/emps.toml", "--set=operations=motion", "--json")
     learned, limit = {1, 2}, {0}
-    tried = ((learned, "-s", "emps.gm.json"), (learned, "-s", "emps.pt.json"), (limit, "-d", "gm", "--limit", 15))
+    by_hand = (limit, "-d", "gm", "--set=threshold.limits=15")
+    tried = ((learned, "-s", "emps.gm.json"), (learned, "-s", "emps.pt.json"), by_hand)
     for alarms, *threshold in tried:
         strokes = json.loads(cdtool("detect", DATA / "emps" / "DATA_EMPS_PULSES.mat", *emps, *threshold).out)
         assert len(strokes) == 8 and {len(stroke["alarms"]) for stroke in strokes} == alarms, threshold

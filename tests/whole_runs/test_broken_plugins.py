@@ -66,7 +66,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
 
 
 def detect(name: str, *logs: Path) -> Outcome:
-    return cdtool("detect", *(logs or (LOG,)), "-m", GATE / "machine.toml", "-d", name, "--limit", 4)
+    return cdtool("detect", *(logs or (LOG,)), "-m", GATE / "machine.toml", "-d", name, "--set=threshold.limits=4")
 
 
 def test_the_template_detector_is_valid(install):
@@ -287,7 +287,7 @@ def test_a_threshold_whose_other_methods_fail_is_one_line_too(install, tmp_path,
     done = cdtool(*learn, "-d", "gm", "-t", "odd", "-o", tmp_path / "s.json")
     if method == "with_safety_factor":
         assert done.status == 0, done.err
-        for command in (("detect", LOG, "--hysteresis", 0.2), ("explain", LOG)):
+        for command in (("detect", LOG, "--set=activation.hysteresis=0.2"), ("explain", LOG)):
             done = cdtool(*command, "-m", GATE / "machine.toml", "-s", tmp_path / "s.json")
             assert done.status == 2 and "threshold Fitted fails: ZeroDivisionError" in done.err, done.err
     else:

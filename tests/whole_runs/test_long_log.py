@@ -13,7 +13,7 @@ import pytest
 import cdtool
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import SignatureError, UsageError
-from cdtool.commands.detecting.detection_options import DetectionOptions
+from cdtool.commands.detecting.prepared import prepared
 from cdtool.formats.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
 from tests.command import cdtool as run
@@ -98,17 +98,16 @@ def test_labels_are_the_ground_truth_without_a_load_cell(folder):
 def test_a_trigger_channel_cuts_too_and_a_wrong_way_to_cut_is_refused(folder):
     text = MACHINE + 'trigger = { column = "hit" }\n'
     (folder / "trigger.toml").write_text(text.replace('label = { column = "hit", scale = 1 }\n', ""))
-    found = cdtool.detect(
-        folder / "hits.csv", folder / "trigger.toml", detector="pt", limit=[70.0], operations="trigger"
-    )
+    cut = {"threshold.limits": 70, "operations": "trigger"}
+    found = cdtool.detect(folder / "hits.csv", folder / "trigger.toml", detector="pt", settings=cut)
     assert [detection.verdict.outcome for detection in found.detections] == ["alarm"] * 3
     with pytest.raises(UsageError, match="motion"):
-        cdtool.detect(folder / "hits.csv", folder / "machine.toml", detector="pt", limit=[70.0], operations="strokes")
+        cdtool.detect(folder / "hits.csv", folder / "machine.toml", settings=cut | {"operations": "strokes"})
 
 
 def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_path):
     path = tmp_path / "door.json"
-    machine = ("-m", folder / "machine.toml", "--operations", "motion")
+    machine = ("-m", folder / "machine.toml", "--set=operations=motion")
     assert run("learn-signature", folder / "free.csv", *machine, "-d", "gm", "-o", path).status == 0
     first = json.loads(path.read_text())
     done = run("signature", "update", path, folder / "quiet.csv", *machine, "--forget", 20)
@@ -121,12 +120,13 @@ def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_pat
 
 def test_the_signature_rule_is_stored_in_the_file(folder):
     rule = Signature(sides="two", safety_factor=7.0, alignment="position")
-    learned = cdtool.learn_signature(
-        [folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, operations="motion", activation={"debounce": 4}
-    )
+    settings = {"operations": "motion", "activation.debounce": 4}
+    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, settings=settings)
     fitted = learned.signature.current[0]
     assert (fitted.sides, fitted.safety_factor, fitted.alignment) == ("two", 7.0, "position")
     assert learned.signature.activation == Activation(4)
+    latched = prepared(folder / "machine.toml", signature=learned, settings={"activation.latch": True})
+    assert latched.activation == Activation(4, latch=True), "a key changes only what it names"
 
 
 def test_unassessable_sections_are_shown_with_their_share(folder):
@@ -142,10 +142,8 @@ def test_unassessable_sections_are_shown_with_their_share(folder):
         folder / "machine.toml",
         "-d",
         "gm",
-        "--limit",
-        40,
-        "--operations",
-        "motion",
+        "--set=threshold.limits=40",
+        "--set=operations=motion",
     )
     assert done.status == 0
     told = " ".join(done.out.split())  # lines wrap at the terminal's width
@@ -185,9 +183,9 @@ def test_an_unassessable_contact_has_a_reason(folder, tmp_path):
 
 
 @pytest.mark.parametrize(("call", "first"), [(cdtool.detect, "logs"), (cdtool.explain, "log")])
-def test_detect_and_explain_accept_only_the_option_fields_as_keywords(call, first):
+def test_detect_and_explain_accept_the_same_keywords(call, first):
     log, *given = inspect.signature(call).parameters
-    assert log == first and given == list(inspect.signature(DetectionOptions).parameters)
+    assert log == first and given == ["machine", "benchmark", "signature", "detector", "settings"]
     with pytest.raises(TypeError, match="'limits'"):
         call("a.csv", "machine.toml", limits=[1.0])
 

@@ -51,7 +51,7 @@ def server(site: Path) -> Iterator[CommandServer]:
     with command_server(environment=found) as running:
         log = (GATE / "free" / "03.csv", "-m", GATE / "machine.toml")
         running.warm_up("info", *log)
-        running.warm_up("detect", *log, "-d", "gm", "--limit", 1e6)
+        running.warm_up("detect", *log, "-d", "gm", "--set=threshold.limits=1e6")
         running.warm_up("benchmark", GATE / "benchmark.toml", "--detectors", "gm", "--json")
         yield running
 
@@ -82,7 +82,7 @@ def test_list_shows_the_plugins_with_gains_units_and_defaults(command):
 def test_its_signature_is_learned_used_explained_and_refused_for_other_gains(command, tmp_path):
     machine = ("--machine", GATE / "machine.toml")
     free = sorted(GATE.glob("free/*.csv"))
-    learned = command("learn-signature", *free, *machine, "-d", "tr", "-o", "tr.json", "--force")
+    learned = command("learn-signature", *free, *machine, "-d", "tr", "-o", "tr.json", "--set=signature.force=true")
     assert learned.status == 0, learned.err
     assert json.loads((tmp_path / "tr.json").read_text(encoding="utf-8"))["detector"]["name"] == "torque_rate"
     log = GATE / "stiff" / "03.csv"
@@ -104,17 +104,21 @@ def test_its_gains_can_be_set_in_the_machine_file_under_either_name(command, tmp
     for name in ("tr", "torque_rate"):
         machine = machine_with(tmp_path, f"\n[detectors.{name}]\ncutoff = 5.0\n")
         assert command("info", log, "-m", machine).status == 0
-        (found,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").out)
+        (found,) = json.loads(
+            command("detect", log, "-m", machine, "-d", "tr", "--set=threshold.limits=400", "--json").out
+        )
         alarms.append(found["alarms"])
     machine = GATE / "machine.toml"
-    (plain,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").out)
+    (plain,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--set=threshold.limits=400", "--json").out)
     assert alarms[0] == alarms[1] != plain["alarms"]
     for more, words in (
         ("[detectors.tr]\ncut = 5.0\n", "detectors.tr.cut: unknown key (did you mean cutoff?"),
         ("[detectors.tr]\ncutoff = -1\n", "detectors.tr: gain cutoff is -1"),
         ("[detectors.tr]\n[detectors.torque_rate]\n", "torque_rate: repeats torque_rate"),
     ):
-        wrong = command("detect", log, "-m", machine_with(tmp_path, "\n" + more), "-d", "tr", "--limit", 4)
+        wrong = command(
+            "detect", log, "-m", machine_with(tmp_path, "\n" + more), "-d", "tr", "--set=threshold.limits=4"
+        )
         assert wrong.status == 2 and words in wrong.err and wrong.err.count("\n") == 1, wrong.err
 
 
@@ -145,7 +149,9 @@ def test_all_detectors_include_those_of_plugins(command, tmp_path):
     assert done.status == 0, done.err
     results = json.loads(done.out)
     assert results["detectors"] == [*DETECTORS.names(), "torque_rate"]
-    (one,) = json.loads(command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--limit", 9e9, "--json").out)
+    (one,) = json.loads(
+        command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--set=threshold.limits=9e9", "--json").out
+    )
     assert one["detector"] == "torque_rate"
     only = command("benchmark", "benchmark.toml", "--detectors", "tr")
     assert only.status == 0 and "1 of 1 limits not checked" in only.err

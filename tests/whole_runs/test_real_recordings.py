@@ -17,6 +17,7 @@ from cdtool.commands.learning.fitting import fit_operations
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.signature import Signature
+from tests.command import FEW
 from tests.command import cdtool as run
 from tests.data_folder import DATA, UR10E_LOGS, needs_data
 
@@ -72,15 +73,16 @@ def test_an_added_force_on_an_emps_stroke_is_found(emps):
 @needs_data("emps/DATA_EMPS.mat")
 def test_four_strokes_per_direction_require_force(tmp_path):
     arguments = ("learn-signature", DATA / "emps" / "DATA_EMPS.mat", "-m", EXAMPLES / "emps.toml", "-d", "gm")
-    done = run(*arguments, "--operations", "motion", "-o", tmp_path / "s.json")
+    done = run(*arguments, "--set=operations=motion", "-o", tmp_path / "s.json")
     assert done.status == 2 and "6 more are needed" in done.err
-    done = run(*arguments, "--operations", "motion", "--force", "-o", tmp_path / "s.json")
+    done = run(*arguments, "--set=operations=motion", FEW, "-o", tmp_path / "s.json")
     assert done.status == 0 and done.err.count("fewer than 10") == 2
 
 
 def test_the_contacts_of_the_arm_are_found_in_the_torques_of_two_joints():
     log = UR10E_LOGS / "link4.csv.gz"
-    arguments = ("-m", EXAMPLES / "ur10e.toml", "-d", "pt", "--limit", "33,inf,53,inf,inf,inf", "--debounce", 2)
+    keys = ("--set=threshold.limits=33,inf,53,inf,inf,inf", "--set=activation.debounce=2")
+    arguments = ("-m", EXAMPLES / "ur10e.toml", "-d", "pt", *keys)
     (values,) = json.loads(run("detect", log, *arguments, "--json").out)
     first_row = float(gzip.decompress(log.read_bytes()).split(b",", 1)[0])
     alarms = [(alarm["time_s"] - first_row, alarm["joint"]) for alarm in values["alarms"]]
@@ -93,7 +95,7 @@ def test_the_contacts_of_the_arm_are_found_in_the_torques_of_two_joints():
 
 def test_a_missing_inertia_is_reported_by_the_detector_that_needs_it():
     log = UR10E_LOGS / "link4.csv.gz"
-    done = run("detect", log, "-m", EXAMPLES / "ur10e.toml", "-d", "gm", "--limit", "30")
+    done = run("detect", log, "-m", EXAMPLES / "ur10e.toml", "-d", "gm", "--set=threshold.limits=30")
     assert done.status == 2 and "load_inertia" in done.err
 
 

@@ -52,18 +52,18 @@ def test_a_detector_without_assessable_samples_does_not_stop_the_others(forearm)
 def test_learning_a_signature_without_assessable_samples_is_a_clear_error(forearm):
     free = sorted((forearm / "free").iterdir())
     with pytest.raises(NothingValidError, match="not applicable 100 %"):
-        api.learn_signature(free, forearm / "machine.toml", "feekf", joints=("forearm",))
+        api.learn_signature(free, forearm / "machine.toml", "feekf", settings={"joints": ("forearm",)})
 
 
 def test_a_signature_monitors_the_joints_it_was_learned_for(forearm, tmp_path):
     signature = tmp_path / "forearm.json"
-    learn(forearm, signature, "--joints", "forearm")
+    learn(forearm, signature, "--set=joints=forearm")
     log = forearm / "stiff" / "01.csv"
     done = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--json")
     alarms = json.loads(done.out)[0]["alarms"]
     assert alarms and {alarm["joint"] for alarm in alarms} == {"forearm"}
-    refused = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--joints", "arm")
-    assert refused.status == 2 and "joints require a limit" in refused.err
+    refused = cdtool("detect", log, "-m", forearm / "machine.toml", "-s", signature, "--set=joints=arm")
+    assert refused.status == 2 and "joints: cannot be combined with a signature" in refused.err
     more = forearm / "holdout" / "01.csv"
     added = cdtool("signature", "update", signature, more, "-m", forearm / "machine.toml", "--json")
     assert added.status == 0 and len(json.loads(added.out)["added"]) == 1
@@ -77,12 +77,12 @@ def test_a_robot_signature_monitors_every_joint_on_both_sides_by_default(forearm
 
 def test_limits_set_by_hand_monitor_the_chosen_joints(forearm):
     machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
-    found = api.detect(log, machine, detector="gm", limit=[0.6], joints=("forearm",))
+    found = api.detect(log, machine, detector="gm", settings={"threshold.limits": 0.6, "joints": "forearm"})
     assert found.joints == ("forearm",) and found.detections[0].statistic.values.shape[1] == 1
-    both = api.detect(log, machine, detector="gm", limit=[3.9, 0.6])
+    both = api.detect(log, machine, detector="gm", settings={"threshold.limits": [3.9, 0.6]})
     assert both.joints == ("arm", "forearm")
     with pytest.raises(UsageError, match="did you mean forearm"):
-        api.detect(log, machine, detector="gm", limit=[0.6], joints=("forarm",))
+        api.detect(log, machine, detector="gm", settings={"threshold.limits": 0.6, "joints": "forarm"})
 
 
 def test_a_joint_that_the_machine_does_not_have_is_refused_by_name(forearm, tmp_path):
@@ -92,23 +92,25 @@ def test_a_joint_that_the_machine_does_not_have_is_refused_by_name(forearm, tmp_
         api.benchmark(forearm / "wrong.toml")
     free = sorted((forearm / "free").iterdir())
     command = ("learn-signature", *free, "-m", forearm / "machine.toml", "-d", "gm", "-o", tmp_path / "s.json")
-    done = cdtool(*command, "--joints", "wrist")
-    assert done.status == 2 and "unknown joint 'wrist'" in done.err and not (tmp_path / "s.json").exists()
+    done = cdtool(*command, "--set=joints=wrist")
+    assert (
+        done.status == 2 and "contains 'wrist', which is not a joint" in done.err and not (tmp_path / "s.json").exists()
+    )
 
 
 def test_an_energy_signal_belongs_to_the_whole_machine(forearm):
     machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
-    found = api.detect(log, machine, detector="energy", limit=[0.01], joints=("arm",))
+    found = api.detect(log, machine, detector="energy", settings={"threshold.limits": 0.01, "joints": "arm"})
     assert found.joints == ("whole machine",)
-    done = cdtool("detect", log, "-m", machine, "-d", "energy", "--limit", "0.01")
+    done = cdtool("detect", log, "-m", machine, "-d", "energy", "--set=threshold.limits=0.01")
     assert done.status == 0 and "whole machine" in done.out
 
 
 def test_the_notes_of_a_detector_are_shown(forearm):
     machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
-    done = cdtool("detect", log, "-m", machine, "-d", "desired_dynamics", "--limit", "9")
+    done = cdtool("detect", log, "-m", machine, "-d", "desired_dynamics", "--set=threshold.limits=9")
     assert done.status == 0 and "tracking error of arm: rms" in done.out
-    values = json.loads(cdtool("detect", log, "-m", machine, "-d", "ddd", "--limit", "9", "--json").out)
+    values = json.loads(cdtool("detect", log, "-m", machine, "-d", "ddd", "--set=threshold.limits=9", "--json").out)
     assert values[0]["notes"][1].startswith("tracking error of forearm")
 
 

@@ -20,7 +20,7 @@ from cdtool.execution import processes
 from cdtool.execution.in_worker import Done
 from cdtool.formats.mcap import file_bytes
 from cdtool.report.plots.figures import slug
-from tests.command import cdtool
+from tests.command import FEW, cdtool
 from tests.fuzz.hostile_commands import make_bench
 from tests.windows_files import CAN_SIMULATE, windows_files
 
@@ -116,7 +116,7 @@ def test_commands_write_replace_and_reuse_their_files(on_windows, tmp_path):
     free = sorted(tmp_path.glob("free/*.csv"))
     for _ in range(2):
         for words in (
-            ("learn-signature", *free, "-m", machine, "-d", "feekf", "--force", "-o", tmp_path / "feekf.json"),
+            ("learn-signature", *free, "-m", machine, "-d", "feekf", FEW, "-o", tmp_path / "feekf.json"),
             ("detect", log, "-m", machine, "-s", tmp_path / "gate.json", "--plot", tmp_path / "a.png", "--force"),
             ("benchmark", bench, "-o", f"{tmp_path / 'report'}/", "-o", tmp_path / "results.parquet", "--force"),
             ("benchmark", bench, "--store", tmp_path / "store"),

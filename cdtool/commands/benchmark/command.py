@@ -14,15 +14,14 @@ from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress
 from cdtool.commands.console.options import (
+    BudgetOption,
     ClusterOption,
     ForceOption,
     JobsOption,
     JsonOption,
     OutputOption,
     QuietOption,
-    RetriesOption,
     SetOption,
-    TimeoutOption,
     listed,
 )
 from cdtool.commands.console.place import Place, location
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from cdtool.commands.scoring.benchmark_result import StoreReport
-    from cdtool.execution.store.store import Store
-    from cdtool.execution.workers import Workers
     from cdtool.results.evaluated import Evaluated
 
 
@@ -43,7 +40,7 @@ def benchmark(
         Place,
         typer.Argument(
             parser=location,
-            help="Benchmark file (TOML); see docs/benchmark-file.md.",
+            help="Benchmark file; see docs/benchmark-file.md.",
             metavar="FILE",
             autocompletion=completions.files(".toml"),
         ),
@@ -56,48 +53,37 @@ def benchmark(
             "--protocol",
             "-p",
             parser=location,
-            help="Protocol file (TOML) for -o NAME.pdf or NAME.html, the protocol. Default: [protocol] of FILE.",
+            help="Protocol file for -o NAME.pdf or .html.",
         ),
     ] = None,
     detectors: Annotated[
         str | None,
         typer.Option(
             "--detectors",
-            help="Detectors instead of the file's, as gm,vo,eo; all: all that the logs allow.",
+            "-d",
+            help="Detectors instead of the file's, or all.",
             autocompletion=completions.detector_list,
         ),
     ] = None,
-    false_alarm_budget: Annotated[
-        str | None,
-        typer.Option("--false-alarm-budget", help="Set each safety factor for this rate, as 1/1000op or 0.1/h."),
-    ] = None,
+    false_alarm_budget: BudgetOption = None,
     settings: SetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
-    retries: RetriesOption = 1,
     store: Annotated[
         Place | None,
         typer.Option(
             "--store",
             parser=location,
-            help="Folder where outcomes are kept: only recordings for which something has changed are computed.",
+            help="Folder of outcomes: only changes are computed.",
         ),
     ] = None,
-    trust_mtime: Annotated[
-        bool,
-        typer.Option("--trust-mtime", help="With --store: a file of the same size and time is the same, unread."),
-    ] = False,
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="With --store: read again what could not be read.")
-    ] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list which recordings would be computed.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list what would be computed.")] = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
 
-    Exits with status 1 if a limit or force profile in the file is violated, and with 4 if a protocol is incomplete.
+    Status 1: a limit or force profile is violated; 4: a protocol is incomplete.
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
@@ -111,28 +97,21 @@ def benchmark(
     from cdtool.report.writers.base import Report
     from cdtool.results.files.results_file import to_json
 
-    if store is None and (trust_mtime or retry_failed):
-        raise UsageError(f"{'--trust-mtime' if trust_mtime else '--retry-failed'} needs --store", "add --store DIR")
-    workers = Workers(jobs, timeout, retries, cluster)
-    changes = given_settings(settings or ())
-    use = None if store is None else Store(store, trust_times=trust_mtime, retry_failed=retry_failed)
+    given: dict[str, Any] = {
+        "detectors": _named(detectors),
+        "false_alarm_budget": false_alarm_budget,
+        "settings": given_settings(settings or ()),
+        "workers": Workers(jobs, cluster=cluster),
+        "store": None if store is None else Store(store),
+    }
     if dry_run:
-        work = (_named(detectors), false_alarm_budget, changes)
-        _show_dry_run(file, work, workers, use, as_json=as_json)
+        _show_dry_run(file, given, as_json=as_json)
         return
     documents = SECTIONS.load("protocol")(file, protocol, output or [], force)
     check_outputs(documents.reports, force=force)
     documents.check()
     with progress("benchmark", quiet=quiet) as advance:
-        done = run(
-            file,
-            detectors=_named(detectors),
-            false_alarm_budget=false_alarm_budget,
-            settings=changes,
-            workers=workers,
-            store=use,
-            progress=advance,
-        )
+        done = run(file, **given, progress=advance)
     evaluated: Evaluated = done.evaluated
     try:
         command = _command(file, protocol, output or [], detectors, false_alarm_budget, settings or [])
@@ -179,23 +158,13 @@ def _stored(outcomes: StoreReport | None) -> list[str]:
     return [f"store: {counted(outcomes.computed, 'recording')} computed, {outcomes.reused} as stored"]
 
 
-def _show_dry_run(
-    file: Path,
-    work: tuple[tuple[str, ...], str | None, Mapping[str, Any]],
-    workers: Workers,
-    store: Store | None,
-    *,
-    as_json: bool,
-) -> None:
+def _show_dry_run(file: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
     """Print which recordings would be computed, their size, and how long that takes."""
     from rich.filesize import decimal
 
     from cdtool.commands.scoring.dry_run import dry_run
 
-    detectors, budget, settings = work
-    found = dry_run(
-        file, detectors=detectors, false_alarm_budget=budget, settings=settings, workers=workers, store=store
-    )
+    found = dry_run(file, **given)
     if as_json:
         print_json(asdict(found) | {"bytes": found.bytes})
         leave(found.skipped)

@@ -31,57 +31,46 @@ def thresholds(incomplete: str) -> list[str]:
     return _beginning(incomplete, THRESHOLDS.usable_names())
 
 
-def settings(incomplete: str) -> list[str]:
-    """Return the keys of the benchmark file that begin with the typed text, each with the = before its value."""
-    from cdtool.commands.judging.settings_table import JudgingTable
-    from cdtool.commands.scoring.benchmark_file import SECTIONS
-
-    section = incomplete.partition(".")[0]
-    if section in ("inject", "tune"):
-        return _beginning(incomplete, _keys(SECTIONS.load(section).table, f"{section}."))
-    return _beginning(incomplete, [*_keys(JudgingTable), "threshold.name="])
-
-
 def keys(place: str) -> Complete:
-    """Return the completion of the keys of a model, named as module:Class, each with the = before its value."""
-    module, _, attribute = place.partition(":")
-    return lambda incomplete: _beginning(incomplete, _keys(getattr(import_module(module), attribute)))
+    """Return the completion of --set by the keys of a model, named as module:Class, then by a key's words."""
+
+    def complete(incomplete: str) -> list[str]:
+        from cdtool.commands.scoring.benchmark_file import SECTIONS
+
+        module, _, attribute = place.partition(":")
+        known = dict(_words_by_key(getattr(import_module(module), attribute), ""))
+        section = incomplete.partition(".")[0]
+        if section in SECTIONS.names():
+            known |= _words_by_key(SECTIONS.load(section).table, f"{section}.")
+        key, equals, typed = incomplete.partition("=")
+        return (
+            [f"{key}={word}" for word in _beginning(typed, known.get(key, ()))]
+            if equals
+            else _beginning(incomplete, [f"{name}=" for name in known])
+        )
+
+    return complete
 
 
-def _keys(model: object, prefix: str = "") -> Iterable[str]:
-    from cdtool.base.settings import alternatives, bare_type, is_model, keys_of
-
-    for name, key in keys_of(model).items():
-        tables = [bare_type(part) for part in alternatives(key.hint) if is_model(bare_type(part))]
-        yield from (f"{prefix}{name}=",) if not tables else _keys(tables[0], f"{prefix}{name}.")
-
-
-def operations(incomplete: str) -> list[str]:
-    """Return the ways to divide a log that begin with the typed text."""
+def _words_by_key(model: object, prefix: str) -> Iterable[tuple[str, Iterable[str]]]:
+    """Return each full key of a model with the words that it may have; empty if it may have others."""
+    from cdtool.base.settings import alternatives, bare_type, is_model, keys_of, words_of
     from cdtool.recordings.operations import HOW_TO_CUT
+    from cdtool.thresholds import THRESHOLDS
 
-    return _beginning(incomplete, HOW_TO_CUT)
-
-
-def rules(incomplete: str) -> list[str]:
-    """Return the signature's rules that begin with the typed text."""
-    from cdtool.thresholds.fitted_signature import RULES
-
-    return _beginning(incomplete, RULES)
-
-
-def sides(incomplete: str) -> list[str]:
-    """Return the sides that begin with the typed text."""
-    from cdtool.thresholds.fitted_signature import SIDES
-
-    return _beginning(incomplete, SIDES)
-
-
-def alignments(incomplete: str) -> list[str]:
-    """Return the alignments that begin with the typed text."""
-    from cdtool.recordings.motion.progress import ALIGNMENTS
-
-    return _beginning(incomplete, ALIGNMENTS)
+    known = {"operations": HOW_TO_CUT, "threshold": THRESHOLDS.usable_names()}
+    for name, key in keys_of(model).items():
+        parts = alternatives(key.hint)
+        tables = [bare_type(part) for part in parts if is_model(bare_type(part))]
+        if name in known:
+            yield name, known[name]
+        elif tables:
+            yield from _words_by_key(tables[0], f"{prefix}{name}.")
+        else:
+            switch = ("true", "false") if any(bare_type(part) is bool for part in parts) else ()
+            yield f"{prefix}{name}", [*switch, *(word for part in parts for word in words_of(part))]
+    if "threshold" in keys_of(model):
+        yield "threshold.name", known["threshold"]
 
 
 def one_of(known: Iterable[str]) -> Complete:

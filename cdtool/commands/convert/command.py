@@ -11,7 +11,7 @@ from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import leave_with, plain, print_json, with_findings
 from cdtool.commands.console.late_progress import late_progress
-from cdtool.commands.console.options import FromOption, JsonOption, ToOption, section_of
+from cdtool.commands.console.options import JsonOption
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -40,8 +40,11 @@ def convert(
             help="Machine file: write its channels in SI units. Default: all columns.",
         ),
     ] = None,
-    from_: FromOption = None,
-    to: ToOption = None,
+    from_: Annotated[
+        str | None,
+        typer.Option("--from", help="Only from here: a time as 1.5s, or a distance travelled as 0.2m."),
+    ] = None,
+    to: Annotated[str | None, typer.Option("--to", help="Only up to here.")] = None,
     recover: Annotated[
         Literal["verified", "all"] | None,
         typer.Option(
@@ -58,11 +61,13 @@ def convert(
 
     Example: cdtool convert stiff/03.csv stiff-03.mcap -m machine.toml
     """
+    from cdtool.base.settings import Place as PlaceOfKey
     from cdtool.commands.convert.converting import convert as write
     from cdtool.commands.convert.recovering import Recovered
     from cdtool.commands.convert.recovering import recover as write_what_is_left
+    from cdtool.commands.judging.named_logs import LogPart
 
-    section = section_of(from_, to)
+    section = LogPart(begin=from_, end=to).section(PlaceOfKey("convert"))
     if recover and (machine or section):
         raise UsageError("--recover copies messages as they are", "recover first, then convert with -m, --from or --to")
     done: Converted | Recovered

@@ -23,10 +23,19 @@ from cdtool.commands.console.console import (
     print_skipped,
     progress,
 )
-from cdtool.commands.console.log_options import LogOptions
 from cdtool.commands.console.logs_argument import logs_argument
-from cdtool.commands.console.option_groups import with_options
-from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption, figure_name
+from cdtool.commands.console.options import (
+    BenchmarkOption,
+    DetectorOption,
+    ForceOption,
+    JsonOption,
+    MachineUnlessBenchmarkOption,
+    QuietOption,
+    SignatureOption,
+    figure_name,
+    one_detector,
+    set_option,
+)
 from cdtool.commands.console.place import Place, location
 from cdtool.commands.detect.shown import as_rows, show_conclusion, show_detected
 
@@ -34,21 +43,25 @@ if TYPE_CHECKING:
     from cdtool.alarms.pipeline import Detection
     from cdtool.commands.detect.contact_force import ForceSummary
     from cdtool.commands.detecting.detection import Detected
-    from cdtool.commands.detecting.detection_options import DetectionOptions
+    from cdtool.commands.detecting.prepared import PreparedDetector
+    from cdtool.commands.detecting.prepared_benchmark import PreparedBenchmark
     from cdtool.machines.dynamics import Machine
     from cdtool.results.results import RecordingFinding, Skipped
 
 
-@with_options
 def detect(
     logs: Annotated[list[Place], logs_argument("Recordings to analyse.")],
-    options: LogOptions,
+    machine: MachineUnlessBenchmarkOption = None,
+    benchmark: BenchmarkOption = None,
+    signature: SignatureOption = None,
+    detectors: DetectorOption = None,
+    settings: Annotated[list[str] | None, set_option("threshold.name=baseline", "DetectionTable")] = None,
     contact_at: Annotated[
-        str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z (m, in the link's frame).")
+        str, typer.Option("--contact-at", metavar="LINK:X,Y,Z", help="Robots: estimate the force there [m].")
     ] = "",
     plot: Annotated[
         Place | None,
-        typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw; a folder for several logs."),
+        typer.Option("--plot", parser=location, help="Figure to draw; a folder for several logs."),
     ] = None,
     force: ForceOption = False,
     quiet: QuietOption = False,
@@ -56,22 +69,28 @@ def detect(
 ) -> None:
     """Run one detector over logs and show its alarms.
 
-    With --benchmark, all settings and the threshold come from that file; the results match those of `cdtool benchmark`.
+    With --benchmark the results match those of `cdtool benchmark`.
 
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
     from cdtool.base.files.writing import made_folder
+    from cdtool.commands.detecting.prepared import prepared
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.results.results import Skipped
 
-    settings = options.settings()
-    prepared, machine_file = settings.prepared(), settings.machine_file()
-    estimate_force = _force_at(contact_at, machine_file.machine) if contact_at else None
+    ready = prepared(
+        machine,
+        benchmark=benchmark,
+        signature=signature,
+        detector=detectors and one_detector(detectors),
+        settings=given_settings(settings or ()),
+    )
     run = _DetectedLogs(
-        settings,
-        _plot_names(plot, logs, runs=settings.has_runs, force=force),
-        estimate_force,
-        skipped=[*prepared.skipped] if prepared else [],
-        findings=[*prepared.losses] if prepared else [],
+        ready,
+        _plot_names(plot, logs, runs=ready.has_runs, force=force),
+        _force_at(contact_at, ready.machine_file.machine) if contact_at else None,
+        skipped=[*ready.skipped],
+        findings=[*ready.losses],
         into_folder=plot is not None and (plot.is_dir() or not plot.suffix),
     )
     folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
@@ -98,7 +117,7 @@ def detect(
 class _DetectedLogs:
     """Detection in several logs: the steps for each, and the results so far."""
 
-    settings: DetectionOptions
+    ready: PreparedDetector | PreparedBenchmark
     plot_names: Mapping[Path, Path]
     estimate_force: Callable[[Detection], ForceSummary] | None
     skipped: list[Skipped]
@@ -110,14 +129,13 @@ class _DetectedLogs:
 
     def add(self, log: Path) -> None:
         """Run detection on one log, or on each of its runs, and draw the plots; raises CdtoolError."""
-        from cdtool.commands.detecting.detection import detect_log
         from cdtool.commands.judging.runs import lost
 
-        detected = detect_log(log, self.settings)
+        detected = self.ready.detect(log)
         self.skipped += detected.skipped
         self.findings += detected.findings
         plots = self._plots(log, len(detected.runs))
-        is_cut = self.settings.has_runs
+        is_cut = self.ready.has_runs
         for number, found in enumerate(detected.runs):
             if self.estimate_force:
                 self.forces |= {item.operation: item for item in map(self.estimate_force, found.detections)}

@@ -6,23 +6,23 @@ Logs by name: one that is not among the results is answered with the nearest tha
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from os import PathLike
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of, detect_log
-from cdtool.commands.detecting.detection_options import DetectionOptions
+from cdtool.base.remote.remote_path import location
+from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of
+from cdtool.commands.detecting.prepared import prepared
 from cdtool.commands.judging.runs import several_logs
 from cdtool.detectors.detection import Status
-from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.recording import Recording
 from cdtool.report.plots.figures import described
 from cdtool.results.frames import OUTCOMES, notebook_table, rows_as_frame
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from cdtool.alarms.activation import ActivationSettings
-    from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
-    from cdtool.commands.judging.scoring_rules import ScoringRules
     from cdtool.commands.learning.learning import LearnedSignature
     from cdtool.detectors.base import Detector
     from cdtool.formats.machine_file import MachineFile
@@ -134,7 +131,8 @@ class DetectionResult:
     --------
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> limit = {"threshold.name": "limit", "threshold.limits": 400.0}
+    >>> found = cdtool.detect(log, machine, detector="momentum", settings=limit)
     >>> found
     DetectionResult(03.csv, momentum: alarm, 1 alarm, 1 contact)
     >>> found.alarms[["joint", "side"]].values.tolist(), found.contacts.outcome.tolist()
@@ -248,7 +246,8 @@ class DetectionResults(Sequence[DetectionResult]):
     --------
     >>> import cdtool
     >>> logs = ["sample_logs/gate/stiff/03.csv", "sample_logs/gate/holdout/03.csv"]
-    >>> found = cdtool.detect(logs, "sample_logs/gate/machine.toml", detector="momentum", limit=[400.0])
+    >>> limit = {"threshold.name": "limit", "threshold.limits": 400.0}
+    >>> found = cdtool.detect(logs, "sample_logs/gate/machine.toml", detector="momentum", settings=limit)
     >>> found
     DetectionResults(2 logs, momentum: 1 alarm)
     >>> [log.outcome for log in found]
@@ -389,16 +388,10 @@ def detect(  # type: ignore[overload-overlap]  # a str is one log, not a sequenc
     logs: str | Path,
     machine: str | Path | MachineFile | None = ...,
     *,
-    benchmark: str | Path | PreparedBenchmark | None = ...,
+    benchmark: str | Path | None = ...,
     signature: str | Path | LearnedSignature | SignatureFile | None = ...,
     detector: str | Detector | None = ...,
-    limit: Sequence[float] = ...,
-    warm_up: float | None = ...,
-    joints: Sequence[str] = ...,
-    section: LogSection = ...,
-    operations: str = ...,
-    activation: ActivationSettings | None = ...,
-    rules: ScoringRules | None = ...,
+    settings: Mapping[str, Any] | None = ...,
 ) -> DetectionResult: ...
 
 
@@ -407,35 +400,23 @@ def detect(
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile | None = ...,
     *,
-    benchmark: str | Path | PreparedBenchmark | None = ...,
+    benchmark: str | Path | None = ...,
     signature: str | Path | LearnedSignature | SignatureFile | None = ...,
     detector: str | Detector | None = ...,
-    limit: Sequence[float] = ...,
-    warm_up: float | None = ...,
-    joints: Sequence[str] = ...,
-    section: LogSection = ...,
-    operations: str = ...,
-    activation: ActivationSettings | None = ...,
-    rules: ScoringRules | None = ...,
+    settings: Mapping[str, Any] | None = ...,
 ) -> DetectionResults: ...
 
 
-def detect(  # noqa: PLR0913  # the public function: a keyword for each setting
+def detect(
     logs: str | Path | Sequence[str | Path],
     machine: str | Path | MachineFile | None = None,
     *,
-    benchmark: str | Path | PreparedBenchmark | None = None,
+    benchmark: str | Path | None = None,
     signature: str | Path | LearnedSignature | SignatureFile | None = None,
     detector: str | Detector | None = None,
-    limit: Sequence[float] = (),
-    warm_up: float | None = None,
-    joints: Sequence[str] = (),
-    section: LogSection = LogSection(),
-    operations: str = "whole",
-    activation: ActivationSettings | None = None,
-    rules: ScoringRules | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> DetectionResult | DetectionResults:
-    """Run one detector over one log or many: with a signature, with limits, or with those of the first seconds.
+    """Run one detector over one log or many: by a signature, by limits set by hand, or by those of the first seconds.
 
     Parameters
     ----------
@@ -443,31 +424,16 @@ def detect(  # noqa: PLR0913  # the public function: a keyword for each setting
         A log, or several.
     machine : str, Path or MachineFile, optional
         The machine file; not with `benchmark`.
-    benchmark : str, Path or PreparedBenchmark, optional
-        A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors, and
-        `signature`, which replaces its threshold.
+    benchmark : str or Path, optional
+        A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors,
+        `signature`, which replaces its threshold, and `settings`.
     signature : str, Path, Learned or SignatureFile, optional
-        A signature file or what was learned, which contains detector, threshold and activation.
+        A signature file or what was learned, which contains detector, threshold, joints and activation.
     detector : str or Detector, optional
-        Name or short name of the detector, or a detector of your own; needed with `limit` or `warm_up`.
-    limit : sequence of float, optional
-        Limit |i| < limit in the signal's unit, one number or one per joint, in place of a signature.
-    warm_up : float, optional
-        Limits from the run's own first seconds in motion (threshold `baseline`), this long [s], in place of a
-        signature.
-    joints : sequence of str, optional
-        With `limit` or `warm_up`, the joints to monitor; all by default. A signature monitors those that it was learned
-        for.
-    section : LogSection, optional
-        The part of the log that is used; the whole log by default.
-    operations : str, optional
-        How the log is cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
-        clock-reset.
-    activation : ActivationSettings, optional
-        Settings of the activation that replace those of the signature, or the default: debounce [samples], rearm [s],
-        hysteresis [share], latch.
-    rules : ScoringRules, optional
-        The onset rule of contacts, and how long after it an alarm belongs to a contact.
+        Name or short name of the detector, or a detector of your own; needed without a signature.
+    settings : mapping, optional
+        Values in place of keys of the benchmark file, or of their defaults, as `--set` has them:
+        {"threshold.name": "limit", "threshold.limits": 400.0, "activation.debounce": 9, "from": "1.5s"}.
 
     Returns
     -------
@@ -489,38 +455,26 @@ def detect(  # noqa: PLR0913  # the public function: a keyword for each setting
     --------
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> limit = {"threshold.name": "limit", "threshold.limits": 400.0}
+    >>> found = cdtool.detect(log, machine, detector="momentum", settings=limit)
     >>> found.outcome, found.alarms.joint[0], found.detections[0].statistic.unit
     ('alarm', 'gate', 'N')
     >>> found.contacts.latency_ms.between(0.0, 200.0).all().item()
     True
     """
-    options = DetectionOptions(
-        machine,
-        benchmark=benchmark,
-        signature=signature,
-        detector=detector,
-        limit=limit,
-        warm_up=warm_up,
-        joints=joints,
-        section=section,
-        operations=operations,
-        activation=activation,
-        rules=rules,
-    )
+    ready = prepared(machine, benchmark=benchmark, signature=signature, detector=detector, settings=settings)
     if isinstance(logs, str | PathLike):
-        runs = detect_log(logs, options).runs
+        runs = ready.detect(location(logs)).runs
         if len(runs) > 1:
             ids = f"{runs[0].recording.source} to {runs[-1].recording.source}"
             raise UsageError(f"{logs}: has {len(runs)} runs, {ids}", "name one, as LOG#ID, or give a list of logs")
         return DetectionResult(runs[0])
     logs = several_logs(logs)
-    options = replace(options, benchmark=options.prepared())  # learned once for all logs
     found: list[DetectedRuns] = []
     skipped: list[Skipped] = []
     for log in logs:
         try:
-            found.append(detect_log(log, options))
+            found.append(ready.detect(location(log)))
         except (UsageError, SignatureError, OutputError):  # an error in the settings affects every log
             raise
         except CdtoolError as fault:

@@ -21,9 +21,17 @@ from cdtool.commands.console.console import (
     say,
     table,
 )
-from cdtool.commands.console.log_options import LogOptions
-from cdtool.commands.console.option_groups import with_options
-from cdtool.commands.console.options import ForceOption, JsonOption, figure_name
+from cdtool.commands.console.options import (
+    BenchmarkOption,
+    DetectorOption,
+    ForceOption,
+    JsonOption,
+    MachineUnlessBenchmarkOption,
+    SignatureOption,
+    figure_name,
+    one_detector,
+    set_option,
+)
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -37,44 +45,50 @@ _SHOWN = 20
 _BLIND = "not_assessable"
 
 
-@with_options
 def explain(
     log: Annotated[Place, typer.Argument(parser=location, help="Recording to explain.", metavar="LOG")],
-    options: LogOptions,
+    machine: MachineUnlessBenchmarkOption = None,
+    benchmark: BenchmarkOption = None,
+    signature: SignatureOption = None,
+    detectors: DetectorOption = None,
+    settings: Annotated[list[str] | None, set_option("threshold.name=baseline", "DetectionTable")] = None,
     plot: Annotated[
         Place | None,
-        typer.Option(
-            "--plot",
-            parser=location,
-            help="PNG, SVG or PDF file for the first event, or an existing folder for all events.",
-        ),
+        typer.Option("--plot", parser=location, help="Figure of the first event; a folder for all."),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Explain each alarm in a log and why each missed contact was missed.
 
-    With --benchmark, all settings and the threshold come from that file; the results match those of `cdtool benchmark`.
+    With --benchmark the results match those of `cdtool benchmark`.
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
+    from cdtool.commands.detecting.prepared import prepared
     from cdtool.commands.explain.explaining import explain_log
     from cdtool.commands.judging.runs import lost
+    from cdtool.commands.judging.settings_table import given_settings
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
-    settings = options.settings()
-    explained = explain_log(log, settings)
-    prepared = settings.prepared()
-    runs = [(run.found.recording.source if settings.has_runs else str(log), run) for run in explained.runs]
-    skipped = [*(prepared.skipped if prepared else ()), *explained.skipped]
+    ready = prepared(
+        machine,
+        benchmark=benchmark,
+        signature=signature,
+        detector=detectors and one_detector(detectors),
+        settings=given_settings(settings or ()),
+    )
+    explained = explain_log(log, ready)
+    runs = [(run.found.recording.source if ready.has_runs else str(log), run) for run in explained.runs]
+    skipped = [*ready.skipped, *explained.skipped]
     skipped += [item for run in explained.runs for item in run.found.not_scored]
-    findings = [*(prepared.losses if prepared else ()), *explained.findings]
+    findings = [*ready.losses, *explained.findings]
     for run in explained.runs:
         findings += [*lost(run.found.recording), *run.found.findings]
     print_skipped(skipped, findings)
     if as_json:
         values = [_as_json_value(name, run) for name, run in runs]
-        print_json(values if settings.has_runs else values[0])
+        print_json(values if ready.has_runs else values[0])
     else:
         for _, run in runs:
             _show_explained(run)

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.plain_text import counted
-from cdtool.commands.detecting.detection import Detected, detect_log
-from cdtool.commands.detecting.detection_options import DetectionOptions
+from cdtool.base.remote.remote_path import location
+from cdtool.commands.detecting.detection import Detected
+from cdtool.commands.detecting.prepared import PreparedDetector, prepared
 from cdtool.commands.scoring.detector_inputs import inputs_of
 from cdtool.formats.machine_file import MachineFile
-from cdtool.recordings.log_section import LogSection
 from cdtool.results.explanation.explanation import Explanation, explain_operation
 from cdtool.results.results import RecordingFinding, Skipped
 
 if TYPE_CHECKING:
-    from cdtool.alarms.activation import ActivationSettings
-    from cdtool.commands.detecting.prepared_detector import PreparedBenchmark
-    from cdtool.commands.judging.scoring_rules import ScoringRules
+    from cdtool.commands.detecting.prepared_benchmark import PreparedBenchmark
     from cdtool.commands.learning.learning import LearnedSignature
     from cdtool.detectors.base import Detector
     from cdtool.formats.signature_file import SignatureFile
@@ -57,20 +55,14 @@ class Explained:
         return [event for run in self.runs for event in run.events]
 
 
-def explain(  # noqa: PLR0913  # the public function: a keyword for each setting
+def explain(
     log: str | Path,
     machine: str | Path | MachineFile | None = None,
     *,
-    benchmark: str | Path | PreparedBenchmark | None = None,
+    benchmark: str | Path | None = None,
     signature: str | Path | LearnedSignature | SignatureFile | None = None,
     detector: str | Detector | None = None,
-    limit: Sequence[float] = (),
-    warm_up: float | None = None,
-    joints: Sequence[str] = (),
-    section: LogSection = LogSection(),
-    operations: str = "whole",
-    activation: ActivationSettings | None = None,
-    rules: ScoringRules | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> Explained:
     """Explain why a detector raised each alarm in a log, and why each contact was missed.
 
@@ -78,7 +70,7 @@ def explain(  # noqa: PLR0913  # the public function: a keyword for each setting
     ----------
     log : str or Path
         The log, or LOG#ID for some of its runs. A log that is not cut into runs is one.
-    machine, benchmark, signature, detector, limit, warm_up, joints, section, operations, activation, rules : optional
+    machine, benchmark, signature, detector, settings : optional
         As for `cdtool.detect`.
 
     Returns
@@ -99,35 +91,19 @@ def explain(  # noqa: PLR0913  # the public function: a keyword for each setting
     --------
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> explained = cdtool.explain(log, machine, detector="momentum", limit=[400.0])
+    >>> limit = {"threshold.name": "limit", "threshold.limits": 400.0}
+    >>> explained = cdtool.explain(log, machine, detector="momentum", settings=limit)
     >>> [explanation.role for _, explanation in explained.events]
     ['detection']
     """
-    options = DetectionOptions(
-        machine,
-        benchmark=benchmark,
-        signature=signature,
-        detector=detector,
-        limit=limit,
-        warm_up=warm_up,
-        joints=joints,
-        section=section,
-        operations=operations,
-        activation=activation,
-        rules=rules,
-    )
-    return explain_log(log, options)
+    ready = prepared(machine, benchmark=benchmark, signature=signature, detector=detector, settings=settings)
+    return explain_log(log, ready)
 
 
-def explain_log(log: str | Path, options: DetectionOptions) -> Explained:
-    """Return the same as `explain`, which has the errors, of options that the command line has read."""
-    if benchmark := options.prepared():
-        options, machine_file = DetectionOptions(benchmark=benchmark), benchmark.setup.machine_file
-    else:
-        machine_file = options.machine_file()
-        options = replace(options, machine=machine_file)
-    detected = detect_log(log, options)
-    runs = tuple(_explained(found, machine_file) for found in detected.runs)
+def explain_log(log: str | Path, ready: PreparedDetector | PreparedBenchmark) -> Explained:
+    """Return the same as `explain`, which has the errors, with a detector that is ready."""
+    detected = ready.detect(location(log))
+    runs = tuple(_explained(found, ready.machine_file) for found in detected.runs)
     return Explained(runs, detected.skipped, detected.findings)
 
 

@@ -29,8 +29,9 @@ from cdtool.commands.identify.robot.friction_choice import FrictionForm
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, Runs, find_logs, load_runs, several_logs
 from cdtool.commands.judging.scoring_rules import ScoringRules
+from cdtool.commands.judging.settings_table import GUARD
 from cdtool.commands.judging.true_contacts import any_contacts
-from cdtool.commands.scoring.benchmark_file import GUARD, read_benchmark_file
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run

@@ -16,9 +16,7 @@ from cdtool.commands.console.options import (
     JobsOption,
     JsonOption,
     QuietOption,
-    RetriesOption,
     SetOption,
-    TimeoutOption,
     listed,
 )
 from cdtool.commands.console.place import Place, location
@@ -53,8 +51,6 @@ def inject(
     settings: SetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
-    retries: RetriesOption = 1,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -74,7 +70,7 @@ def inject(
     from cdtool.commands.judging.settings_table import given_settings
     from cdtool.execution.workers import Workers
 
-    targets, workers = output or [], Workers(jobs, timeout, retries, cluster)
+    targets, workers = output or [], Workers(jobs, cluster=cluster)
     names, given = listed(detectors or ""), given_settings(settings or ())
     folders = [target for target in targets if not target.suffix]
     if folders and len(targets) > 1:

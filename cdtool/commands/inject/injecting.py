@@ -96,6 +96,7 @@ def inject(
     (32, 'injected_stiff')
     """
     setup = read_benchmark_file(file, settings=settings)
+    workers = (workers or Workers()).limited_by(setup.execution)
     if detectors:
         setup = with_detectors(setup, detectors)
         setup = replace(setup, settings={**setup.settings, "detectors": list(setup.detectors)})

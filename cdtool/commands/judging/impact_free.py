@@ -59,8 +59,6 @@ def _described(contact: Contact) -> str:
     force = f" of {digits(round(contact.peak_force))} N" if np.isfinite(contact.peak_force) else ""
     since = f"from its start to {contact.end:.3f} s" if contact.in_progress else f"at {contact.start:.3f} s"
     shown = f"the {contact.found_by} shows a contact{force} {since}"
-    hint = " (to learn from what is before it: until = 'onset' in [learn], or learn-signature --guard"
-    hint += (
-        "; if it is not a contact, raise the onset level: [onset] above_n, or detect --onset-above)" if force else ")"
-    )
+    hint = " (to learn from what is before it, set learn.until to onset"
+    hint += "; if it is not a contact, raise onset.above_n)" if force else ")"
     return f"{shown}: not an impact-free run{hint}"

@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cdtool.base.errors import ConfigurationError, FieldsError, UsageError
+from cdtool.base.errors import ConfigurationError, FieldsError
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import first_of
-from cdtool.base.remote.remote_path import joined
+from cdtool.base.remote.remote_path import is_remote, joined, location
 from cdtool.base.settings import NotNegative, Place, setting
 from cdtool.commands.judging.runs import find_logs, resolve_all, shown_path
 from cdtool.formats.channels.run_reading import split_run
@@ -24,28 +24,41 @@ _LOGS_HINT = "give a list of texts"
 
 
 _PART = "of each log that is used: a time on its clock (3.2s) or a distance travelled (0.8m); default: the whole log"
-_FROM = Annotated[str | None, setting(f"begin of the part {_PART}", key="from", hint=f"{MARK_HINT}, in quotes")]
-_TO = Annotated[str | None, setting(f"end of the part {_PART}", key="to", hint=f"{MARK_HINT}, in quotes")]
 
 
 @dataclass(frozen=True, kw_only=True)
-class LogEntry:
+class LogPart:
+    """The part of a log that is used."""
+
+    begin: Annotated[str | None, setting(f"begin of the part {_PART}", key="from", hint=f"{MARK_HINT}, in quotes")] = (
+        None
+    )
+    end: Annotated[str | None, setting(f"end of the part {_PART}", key="to", hint=f"{MARK_HINT}, in quotes")] = None
+
+    def section(self, place: Place, common: LogSection = LogSection()) -> LogSection:
+        """Return the part, that of `common` where it is not given; raises ConfigurationError."""
+        marks: list[Mark | None] = []
+        for name, text in (("from", self.begin), ("to", self.end)):
+            with place.at(name):
+                marks.append(None if text is None else Mark.parse(text))
+        with place.at("to"):
+            return LogSection(*marks).within(common)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogEntry(LogPart):
     """A log or pattern of a list with a part of its own."""
 
     path: Annotated[str, setting("a log or a pattern")]
-    begin: _FROM = None
-    end: _TO = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class LogsTable:
+class LogsTable(LogPart):
     """A table with logs, and the part of each that is used."""
 
     logs: Annotated[
         tuple[str | LogEntry, ...], setting("logs, relative to the file; * and ? are allowed", hint=_LOGS_HINT)
     ] = ()
-    begin: _FROM = None
-    end: _TO = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,12 +123,12 @@ class LogsOf:
         `from` and `to` of the table are for all of them; an entry of its own has its own. Raises ConfigurationError for
         no match, and for a log with two different parts.
         """
-        common = _section(table, place)
+        common = table.section(place)
         found: dict[Path, LogSection] = {}
         for number, entry in enumerate(table.logs, 1):
             pattern, section = entry, common
             if isinstance(entry, LogEntry):
-                pattern, section = entry.path, _section(entry, place.below(f"logs[{number}]"), common)
+                pattern, section = entry.path, entry.section(place.below(f"logs[{number}]"), common)
             for path in find_logs([str(pattern)], self.base, place.key("logs"), runs=self.runs):
                 if found.setdefault(path, section) != section:
                     raise place.fault("logs", f"names {path} with two different parts", "name each log once")
@@ -129,22 +142,6 @@ class LogsOf:
 
     def _file(self, log: Path) -> Path:
         return split_run(log)[0] if self.runs else log
-
-
-def _section(table: LogsTable | LogEntry, place: Place, common: LogSection = LogSection()) -> LogSection:
-    """Return `from` and `to` of a table; those of `common` where it has none."""
-    begin, end = (_mark(place, name, text) for name, text in (("from", table.begin), ("to", table.end)))
-    try:
-        return LogSection(begin, end).within(common)
-    except UsageError as fault:
-        raise place.fault("to", fault.message, fault.hint) from fault
-
-
-def _mark(place: Place, name: str, text: str | None) -> Mark | None:
-    try:
-        return None if text is None else Mark.parse(text)
-    except UsageError as fault:
-        raise place.fault(name, fault.message, fault.hint) from fault
 
 
 def named_logs(
@@ -171,6 +168,25 @@ def named_logs(
     return found
 
 
+def named_file(place: Place, key: str, path: Path) -> Path:
+    """Return the file that a key names; raises ConfigurationError if it is not there. A URL is not looked up."""
+    if not is_remote(path) and not path.exists():
+        raise place.fault(key, f"{path}: no such file", "check the path")
+    return path
+
+
+def read_label_file(onset: OnsetTable, place: Place, base: Path) -> Labels | None:
+    """Return the label file that [onset] names relative to `base`; None without one. Raises ConfigurationError."""
+    if onset.labels is None:
+        for key in ("labels_clock", "labels_zone", "not_contacts"):
+            if getattr(onset, key):
+                raise place.fault(key, "is only for a label file", "name one: labels")
+        return None
+    path = named_file(place, "labels", joined(base, onset.labels))
+    clock = onset.labels_clock or "recording"
+    return read_labels(path, clock=clock, zone=onset.labels_zone, not_contacts=onset.not_contacts)
+
+
 def labels_of(
     onset: OnsetTable, place: Place, logs: LogsOf, scored: Sequence[Path], learned: Sequence[Path] = ()
 ) -> Labels | None:
@@ -183,16 +199,11 @@ def labels_of(
     If logs are cut into runs, each row is about a run of a log, LOG#ID. Raises ConfigurationError for a file
     name that matches several.
     """
-    if onset.labels is None:
-        for key in ("labels_clock", "labels_zone", "not_contacts"):
-            if getattr(onset, key):
-                raise place.fault(key, "is only for a label file", "name one: labels")
+    base, runs = logs.base, logs.runs
+    labels = read_label_file(onset, place, base)
+    if labels is None:
         return None
-    base = logs.base
-    path = joined(base, onset.labels)
-    settings = {"clock": onset.labels_clock or "recording", "zone": onset.labels_zone}
-    labels = read_labels(path, not_contacts=onset.not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
-    runs = logs.runs
+    path = location(labels.source)
     recordings, others = (
         [shown_path(split_run(log)[0] if runs else log, base) for log in some] for some in (scored, learned)
     )

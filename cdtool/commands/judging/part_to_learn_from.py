@@ -56,7 +56,7 @@ class PartToLearnFrom:
             where = f", {digits(doubt)} s before the contact at {digits(first)} s" if math.isfinite(first) else ""
             raise RecordingError(
                 f"{path}: {left} s to learn from{where}: at least {digits(_SHORTEST)} s are needed",
-                "reduce the guard ([learn] guard_s, learn-signature --guard), or leave the log out",
+                "reduce learn.guard_s, or leave the log out",
             )
         return part, ()
 

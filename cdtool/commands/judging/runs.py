@@ -10,7 +10,7 @@ from glob import escape
 from os import PathLike
 from pathlib import Path
 
-from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, is_lasting, nearest
+from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, is_lasting
 from cdtool.base.findings import Finding
 from cdtool.base.remote.remote_path import is_remote, joined, location
 from cdtool.commands.judging.impact_free import contacts_shown, unchecked, without_contacts
@@ -416,13 +416,6 @@ def shown_path(path: Path, base: Path | None = None) -> str:
         return "/".join(parts[len(above) :]) or "."
     is_below = not is_remote(path) and not is_remote(base) and path.is_relative_to(base)
     return path.relative_to(base).as_posix() if is_below else path.as_posix()
-
-
-def check_joints(joints: Sequence[str], machine: Machine) -> None:
-    """Raise UsageError for a joint that the machine does not have, before any log is read."""
-    for joint in joints:
-        if joint not in machine.joints:
-            raise UsageError(f"unknown joint '{joint}'", nearest(joint, machine.joints))
 
 
 def lost(recording: Recording) -> list[RecordingFinding]:

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from cdtool.alarms.activation import Activation
-from cdtool.base.errors import UsageError
+from cdtool.base.errors import FieldsError, UsageError, nearest
 from cdtool.base.files.bounded_loading import ContentError, parse_toml
 from cdtool.base.settings import Model, NotNegative, Place, Positive, read, setting
-from cdtool.commands.judging.named_logs import OnsetTable
+from cdtool.commands.judging.log_groups import Split
+from cdtool.commands.judging.named_logs import LogPart, OnsetTable, read_label_file
+from cdtool.commands.judging.scoring_rules import ScoringRules
+from cdtool.execution.workers import Execution
+from cdtool.machines.dynamics import Machine
+from cdtool.recordings.operations import RunCut
 from cdtool.thresholds.signature import Signature
+from cdtool.truth.onset_rule import OnsetRule
+
+# How long before its first contact a log is no longer learned from [s].
+GUARD = 0.2
+_NAME = re.compile(r"""(["'])(.*?)\1|([^.]+)""")
 
 
 @dataclass(frozen=True, kw_only=True)
-class OperationsTable:
-    """How a log is cut."""
+class MassTable:
+    """[force] for a single log: the mass before the load cell."""
 
-    by: Annotated[str, setting("whole, motion, trigger, column:NAME, label:NAME or clock-reset")]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ForceTable:
-    """[force]: limits of the contact force, and the mass before the load cell."""
-
-    profile: Annotated[str, setting("name of the force limits for all groups")] = ""
-    limits: Annotated[str, setting("your own file of force limits; default: the shipped one")] = ""
     mass_before_cell_kg: Annotated[
         NotNegative,
         setting("mass between load cell and contact: the cell does not measure its inertial force", unit="kg"),
@@ -34,75 +37,205 @@ class ForceTable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JudgingTable:
-    """The settings that `detect`, `explain`, `learn-signature`, `score`, `benchmark` and `tune` share."""
+class ForceTable(MassTable):
+    """[force]: limits of the contact force, and the mass before the load cell."""
+
+    profile: Annotated[str, setting("name of the force limits for all groups")] = ""
+    limits: Annotated[str, setting("your own file of force limits; default: the shipped one")] = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnPart:
+    """[learn] without its logs: until when each is learned from, and which of them stay together."""
+
+    until: Annotated[
+        Literal["end", "onset"], setting("onset: learn from each log up to its first contact, by load cell or labels")
+    ] = "end"
+    guard_s: Annotated[
+        NotNegative | None,
+        setting('with until = "onset": how long before the contact learning ends; default: 0.2', unit="s"),
+    ] = None
+    split: Annotated[
+        Split,
+        setting(
+            "what stays together where runs set a limit for other runs (a budget, tune): with day, no run is assessed "
+            "by what was learned on its day; the day is the date in the path, or that of the clock"
+        ),
+    ] = Split.RECORDING
+
+    def __post_init__(self) -> None:
+        if self.guard_s is not None and self.until == "end":
+            raise FieldsError(("guard_s", "until"), "is given without until", 'set until = "onset", or remove it')
+
+    @property
+    def guard(self) -> float | None:
+        """Return how long before its first contact a log is no longer learned from [s]; None: it is used to its end."""
+        return None if self.until == "end" else GUARD if self.guard_s is None else self.guard_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutionTable(Execution):
+    """[execution] of a benchmark file: also how a store is used."""
+
+    trust_mtime: Annotated[bool, setting("with a store: a file of the same size and time is the same, unread")] = False
+    retry_failed: Annotated[bool, setting("with a store: read again what could not be read")] = False
+
+
+Window = Annotated[
+    Positive,
+    setting("an alarm belongs to a contact up to this long after its onset, or until the next contact", unit="s"),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DetectorTable:
+    """How a detector is run, whatever for."""
 
     joints: Annotated[
         tuple[str, ...], setting("the joints whose signal is monitored, as in the machine file; default: all")
     ] = ()
     operations: Annotated[
-        str | OperationsTable,
+        str,
         setting(
             "how a log is cut: whole, motion or trigger; into runs, which count as recordings: column:NAME, label:NAME "
             "or clock-reset"
         ),
     ] = "whole"
-    window_s: Annotated[
-        Positive,
-        setting("an alarm belongs to a contact up to this long after its onset, or until the next contact", unit="s"),
-    ] = 1.0
     threshold: Annotated[
         str | dict[str, Any],
         setting(
             'the threshold\'s name, or a table with `name` and its settings; name = "limit" with limits sets fixed ones'
         ),
     ] = "signature"
-    false_alarm_budget: Annotated[
-        str | None, setting('"1/1000op" or "0.1/h": sets each detector\'s safety factor for it; default: none')
-    ] = None
-    signature: Annotated[Signature, setting("how the normal band is learned")] = field(default_factory=Signature)
     activation: Annotated[Activation, setting("how an exit from the limits becomes an alarm")] = field(
         default_factory=Activation
     )
     onset: Annotated[OnsetTable, setting("when a contact begins")] = field(default_factory=OnsetTable)
-    force: Annotated[ForceTable, setting("limits of the contact force")] = field(default_factory=ForceTable)
 
-    @property
-    def cut(self) -> str:
-        """Return how a log is cut."""
-        return self.operations if isinstance(self.operations, str) else self.operations.by
+    def run_cut(self, place: Place) -> RunCut | None:
+        """Return how a log is cut into runs, None if it is not; raises ConfigurationError for an unknown word."""
+        with place.at("operations", self.operations):
+            return RunCut.of(self.operations)
+
+    def check_joints(self, place: Place, machine: Machine) -> None:
+        """Note each joint that the machine does not have."""
+        for joint in self.joints:
+            if joint not in machine.joints:
+                problem = f"contains '{joint}', which is not a joint of the machine file"
+                place.note("joints", problem, nearest(joint, machine.joints))
+
+    def rules(self, place: Place, **others: float) -> ScoringRules:
+        """Return the rules for logs that no benchmark file names, the label file read; raises ConfigurationError."""
+        onset, below = self.onset, place.below("onset")
+        if onset.synchronisation == "measured":
+            problem = "is 'measured', which needs the logs of a benchmark file"
+            raise below.fault("synchronisation", problem, "give onset.synchronisation_s")
+        labels = read_label_file(onset, below, Path())
+        return ScoringRules(onset.rule, labels=labels, synchronisation=onset.synchronisation_s or 0.0, **others)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TriggersTable:
+    """[triggers]: how `cdtool score` reads the trigger file."""
+
+    clock: Annotated[
+        Literal["recording", "source"],
+        setting("clock of the trigger times: recording, as cdtool shows it, or source, the log's own"),
+    ] = "recording"
+    listed_only: Annotated[
+        bool, setting("leave out recordings without a row; else each counts as watched without an alarm")
+    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgingTable(DetectorTable):
+    """The settings that `score`, `benchmark` and `tune` share."""
+
+    window_s: Window = 1.0
+    false_alarm_budget: Annotated[
+        str | None, setting('"1/1000op" or "0.1/h": sets each detector\'s safety factor for it; default: none')
+    ] = None
+    signature: Annotated[Signature, setting("how the normal band is learned")] = field(default_factory=Signature)
+    force: Annotated[ForceTable, setting("limits of the contact force")] = field(default_factory=ForceTable)
+    triggers: Annotated[TriggersTable, setting("how a trigger file is read")] = field(default_factory=TriggersTable)
+    execution: Annotated[ExecutionTable, setting("how the work is done")] = field(default_factory=ExecutionTable)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DetectionTable(DetectorTable, LogPart):
+    """The settings of `detect` and `explain` without a benchmark file."""
+
+    window_s: Window = 1.0
+    force: Annotated[MassTable, setting("the mass before the load cell")] = field(default_factory=MassTable)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearningTable(DetectorTable, LogPart):
+    """The settings of `learn-signature`."""
+
+    signature: Annotated[Signature, setting("how the normal band is learned")] = field(default_factory=Signature)
+    learn: Annotated[LearnPart, setting("what is learned from each log")] = field(default_factory=LearnPart)
+    execution: Annotated[Execution, setting("how the work is done")] = field(default_factory=Execution)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UpkeepTable:
+    """The settings of `signature check` and `signature update`; all others are in the signature file."""
+
+    onset: Annotated[OnsetRule, setting("when a contact begins")] = field(default_factory=OnsetRule)
+    execution: Annotated[Execution, setting("how the work is done")] = field(default_factory=Execution)
+
+
+def read_settings(model: type[Model], settings: Mapping[str, Any]) -> tuple[Model, Place]:
+    """Return the model that settings describe by their keys, and their place, which has the mistakes so far.
+
+    Raises ConfigurationError with all mistakes if there is no model, as for values that do not fit together.
+    """
+    place = Place("--set", by_option=full_keys(settings), root=model)
+    table = read(model, apply_settings({}, settings), place)
+    if table is None:
+        place.finish()
+    assert table is not None
+    return table, place
+
+
+def refuse_beside_signature(values: Mapping[str, Any], place: Place, names: Sequence[str]) -> None:
+    """Note each setting that a signature has of its own."""
+    for name in names:
+        if name in values:
+            place.note(name, "cannot be combined with a signature, which has its own", "omit one of the two")
 
 
 def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a file with those of `--set`, whose keys have dots between the tables."""
     found = dict(values)
     for key, value in settings.items():
-        *tables, name = key.split(".")
+        *tables, name = _names_in(key)
         table = found
         for above in tables:
             inner = table.get(above)
             # threshold = "cusum" and [threshold] name = "cusum" say the same.
-            table[above] = dict(inner) if isinstance(inner, dict) else {"name": inner} if inner else {}
+            table[above] = dict(inner) if isinstance(inner, dict) else {"name": inner} if isinstance(inner, str) else {}
             table = table[above]
         table[name] = value
     return found
 
 
-def read_settings(model: type[Model], texts: Iterable[str]) -> Model:
-    """Return the model with the values of --set KEY=VALUE; raises ConfigurationError with every mistake."""
-    given = given_settings(texts)
-    place = Place("--set", by_option={key: f"--set {key}" for key in given})
-    found = read(model, apply_settings({}, given), place)
-    place.finish()
-    assert found is not None, "without a mistake the model is made"
-    return found
+def full_keys(settings: Mapping[str, Any] | None) -> frozenset[str]:
+    """Return the full keys of settings, as a message names them."""
+    return frozenset(".".join(_names_in(key)) for key in settings or ())
+
+
+def _names_in(key: str) -> list[str]:
+    """Return the tables and the name of a key; one with a dot is in quotes, as in impacts."stiff 1.5".window_s."""
+    return [quoted or bare for _, quoted, bare in _NAME.findall(key)] or [key]
 
 
 def given_settings(texts: Iterable[str]) -> dict[str, Any]:
     """Return the values of --set KEY=VALUE, as TOML has them; a bare word is a text. Raises UsageError.
 
-    >>> given_settings(["activation.debounce=9", "threshold.name=cusum"])
-    {'activation.debounce': 9, 'threshold.name': 'cusum'}
+    >>> given_settings(["activation.debounce=9", "threshold.name=cusum", "threshold.limits=40,inf"])
+    {'activation.debounce': 9, 'threshold.name': 'cusum', 'threshold.limits': [40, inf]}
     """
     found = {}
     for text in texts:
@@ -110,8 +243,15 @@ def given_settings(texts: Iterable[str]) -> dict[str, Any]:
         if not (name and equals and value):
             hint = "give KEY=VALUE; the page of the command in docs/ has the keys"
             raise UsageError(f"--set is '{text}'", hint)
-        try:
-            found[name] = parse_toml(f"value = {value}")["value"]
-        except ContentError:
-            found[name] = value
+        found[name] = _value_of(value)
     return found
+
+
+def _value_of(text: str) -> Any:
+    """Return a value as TOML has it, also a list without its brackets; a text that is neither as it is."""
+    for written in (text, f"[{text}]"):
+        try:
+            return parse_toml(f"value = {written}")["value"]
+        except ContentError:
+            continue
+    return text

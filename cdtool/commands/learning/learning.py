@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from cdtool.alarms.activation import Activation, ActivationSettings
+from cdtool.alarms.activation import Activation
 from cdtool.base.errors import UsageError
 from cdtool.base.remote.remote_path import location
+from cdtool.base.settings import Place
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
-from cdtool.commands.judging.runs import RunReading, Runs, check_joints, load_runs, several_logs
+from cdtool.commands.judging.runs import RunReading, Runs, load_runs, several_logs
 from cdtool.commands.judging.scoring_rules import ScoringRules
+from cdtool.commands.judging.settings_table import LearningTable, read_settings
 from cdtool.commands.learning.calibration import calibrate, in_fixed_order, kept
 from cdtool.commands.learning.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.commands.learning.normal_runs import normal_motions
-from cdtool.commands.learning.threshold_settings import set_by_hand
+from cdtool.commands.learning.threshold_settings import set_by_hand, threshold_of
 from cdtool.detectors.base import Detector
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.machine_file import MachineFile, fingerprint, machine_parameters, read_machine_file
 from cdtool.formats.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.formats.signature_store import read_signature, write_signature
+from cdtool.machines.dynamics import Machine
 from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.operations import Operation
@@ -30,7 +33,6 @@ from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.results import RecordingFinding, Skipped
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
-from cdtool.truth.onset import OnsetRule
 
 
 @dataclass(frozen=True)
@@ -67,13 +69,8 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
     detector: str | Detector,
     *,
     rule: Threshold | None = None,
-    joints: Sequence[str] = (),
-    section: LogSection = LogSection(),
-    guard: float | None = None,
-    operations: str = "whole",
-    activation: ActivationSettings | None = None,
+    settings: Mapping[str, Any] | None = None,
     false_alarm_budget: str | None = None,
-    onset: OnsetRule | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
     progress: Progress | None = None,
@@ -89,23 +86,12 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
     detector : str or Detector
         Name or short name of the detector, or a detector of your own.
     rule : Threshold, optional
-        Any threshold with its settings; by default a `Signature`.
-    joints : sequence of str, optional
-        The joints to monitor; all by default.
-    section : LogSection, optional
-        The part of each log that is learned from; the whole log by default.
-    guard : float, optional
-        Learn from each log up to this long [s] before its first contact on the load cell, label or event; by default a
-        run with a contact is left out.
-    operations : str, optional
-        How the logs are cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
-        clock-reset.
-    activation : ActivationSettings, optional
-        Settings of the activation that replace the default: debounce [samples], rearm [s], hysteresis [share], latch.
+        Any threshold with its settings, in place of the keys `threshold` and `signature`; by default a `Signature`.
+    settings : mapping, optional
+        Values in place of the defaults of keys of the benchmark file, as `--set` has them: {"signature.sides": "two",
+        "operations": "motion", "learn.until": "onset", "to": "3s"}.
     false_alarm_budget : str, optional
         As "1/300op" or "0.1/h": sets the safety factor by cross-validation on these runs.
-    onset : OnsetRule, optional
-        The rule by which a contact shows on the load cell; a run with a contact is left out.
     jobs : int, optional
         Number of logs read at a time.
     workers : Workers, optional
@@ -139,23 +125,40 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
     [('forward at 0.201 m/s', 10)]
     """
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    raised_by = Activation().changed(activation or {})  # refuses wrong settings before reading
     budget = Budget.parse(false_alarm_budget) if false_alarm_budget is not None else None
-    check_joints(joints, machine_file.machine)
+    table, place = read_settings(LearningTable, settings or {})
+    table.check_joints(place, machine_file.machine)
+    place.tried(None, table.run_cut, place)
+    section, rules = place.tried(LogSection(), table.section, place), place.tried(ScoringRules(), table.rules, place)
+    otherwise: Threshold = Signature()
+    wanted = place.tried(otherwise, _rule, rule, table, machine_file.machine, place)
+    place.finish()
     instance = machine_file.detector(detector)
-    wanted = for_machine(Signature() if rule is None else rule, machine_file.machine)
     _refuse_by_hand(wanted, budget)
     paths = [location(log) for log in several_logs(logs)]
-    if guard is not None and not guard >= 0.0:
-        raise UsageError(f"guard is {guard:g} s", "give 0 s or more")
-    part = None
-    if guard is not None or section:
-        part = PartToLearnFrom(ScoringRules(onset or OnsetRule()), dict.fromkeys(paths, section), guard)
-    reading = RunReading(operations, onset=onset, part=part, workers=workers or Workers(jobs), progress=progress)
-    runs = load_runs(paths, machine_file, reading)
-    return learned_from_runs(
-        runs, machine_file, instance, wanted, Setting(joints, operations, raised_by, budget, Split.RECORDING)
+    guard = table.learn.guard
+    part = PartToLearnFrom(rules, dict.fromkeys(paths, section), guard)
+    workers = (workers or Workers(jobs)).limited_by(table.execution)
+    reading = RunReading(
+        table.operations,
+        onset=rules.onset,
+        part=part if guard is not None or section or rules.labels else None,
+        workers=workers,
+        progress=progress,
     )
+    runs = load_runs(paths, machine_file, reading)
+    setting = Setting(table.joints, table.operations, table.activation, budget, table.learn.split)
+    return learned_from_runs(runs, machine_file, instance, wanted, setting)
+
+
+def _rule(rule: Threshold | None, table: LearningTable, machine: Machine, place: Place) -> Threshold:
+    """Return the threshold to learn: a given one, or that of the settings. Raises ConfigurationError."""
+    if rule is None:
+        return threshold_of(table.threshold, table.signature, machine.default_sides, place)[1]
+    for name in ("threshold", "signature"):
+        if any(key.partition(".")[0] == name for key in place.by_option):
+            place.note(name, "cannot be combined with the argument rule", "omit one of the two")
+    return for_machine(rule, machine)
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from cdtool.base.errors import UsageError, nearest
 from cdtool.base.settings import Place, keys_of, read
-from cdtool.commands.judging.settings_table import given_settings
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.fitted_signature import Sides
@@ -16,7 +15,6 @@ from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 
 _DEFAULT = "signature"
-_OPTIONS = {"alignment": "align"}  # of the command line, where their names differ from those of the settings
 
 
 def threshold_of(
@@ -26,12 +24,15 @@ def threshold_of(
 
     Raises ConfigurationError for an unknown threshold, and for settings that do not fit together.
 
-    A text selects a threshold with its default settings; a table has `name` and that threshold's own fields. The
+    A text selects a threshold with its default settings; a table has `name` and that threshold's own fields. `limits`
+    without a name are those of the threshold `limit`. The
     settings of the signature, also if another rule learns one, are in [signature]; so is the safety factor of any rule
     if [threshold] does not set it.
     """
     signature = signature if signature.sides else replace(signature, sides=default_sides)
-    table: dict[str, Any] = {"name": given} if isinstance(given, str) else {"name": _DEFAULT, **given}
+    table: dict[str, Any] = (
+        {"name": given} if isinstance(given, str) else {"name": "limit" if "limits" in given else _DEFAULT, **given}
+    )
     name = table.pop("name")
     below = place if isinstance(given, str) else place.below("threshold")
     key = "threshold" if isinstance(given, str) else "name"
@@ -62,20 +63,3 @@ def threshold_of(
 def set_by_hand(rule: Threshold) -> bool:
     """Whether the rule's limits or its safety factor differ from the default."""
     return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor
-
-
-def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], default_sides: Sides) -> Threshold:
-    """Return the rule of that name for a command line: `given` are KEY=VALUE settings, `signature` the signature's.
-
-    Raises ConfigurationError for an unknown name or key, or a wrong value.
-    """
-    settings = given_settings(given)
-    options = {key: f"--{_OPTIONS.get(key, key.replace('_', '-'))}" for key in signature}
-    if name == _DEFAULT:
-        options = {key: option for key, option in options.items() if key not in settings}
-        signature, settings = {**signature, **settings}, {}
-    place = Place("--set", by_option=options)
-    own = read(Signature, signature, place) or Signature()
-    rule = threshold_of({"name": name, **settings}, own, default_sides, place)
-    place.finish()
-    return rule[1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -15,8 +15,7 @@ from cdtool.commands.console.options import (
     JsonOption,
     OutputOption,
     QuietOption,
-    RetriesOption,
-    TimeoutOption,
+    set_option,
 )
 from cdtool.commands.console.place import Place, location
 from cdtool.commands.console.summary_table import finish
@@ -44,20 +43,10 @@ def score(
         ),
     ],
     output: OutputOption = None,
-    force: ForceOption = False,
-    clock: Annotated[
-        Literal["recording", "source"],
-        typer.Option(
-            "--clock", help="Clock of the trigger times: the recording's, as cdtool shows it, or the source's."
-        ),
-    ] = "recording",
-    listed_only: Annotated[
-        bool, typer.Option("--listed-only", help="Skip recordings without a row instead of counting them as no alarm.")
-    ] = False,
+    settings: Annotated[list[str] | None, set_option("triggers.clock=source", "JudgingTable")] = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
-    retries: RetriesOption = 1,
+    force: ForceOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -65,17 +54,23 @@ def score(
 
     Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
     """
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.score.score_triggers import score as run
     from cdtool.execution.workers import Workers
     from cdtool.report.outputs import check_outputs
     from cdtool.report.writers.base import Report
     from cdtool.results.files.results_file import to_json
 
-    workers = Workers(jobs, timeout, retries, cluster)
     targets = output or []
     check_outputs(targets, force=force)
     with progress("scoring", quiet=quiet) as advance:
-        done = run(triggers, benchmark, clock=clock, listed_only=listed_only, workers=workers, progress=advance)
+        done = run(
+            triggers,
+            benchmark,
+            settings=given_settings(settings or ()),
+            workers=Workers(jobs, cluster=cluster),
+            progress=advance,
+        )
     results = done.evaluated.results
     report = Report(done.evaluated, done.traces)
     written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -47,8 +47,7 @@ def score(
     triggers: str | Path,
     benchmark: str | Path,
     *,
-    clock: Literal["recording", "source"] = "recording",
-    listed_only: bool = False,
+    settings: Mapping[str, Any] | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
     progress: Progress | None = None,
@@ -61,11 +60,8 @@ def score(
         A CSV file with the columns recording, time_s and, optionally, detector and blind_until_s.
     benchmark : str or Path
         The benchmark file with groups, onset rule, windows and limits.
-    clock : {"recording", "source"}, optional
-        Whether the times are those of the recording, as cdtool shows them, or of the log's own clock, an epoch for
-        example [s].
-    listed_only : bool, optional
-        Leave out a recording without a row for a detector; else it counts as monitored without an alarm.
+    settings : mapping, optional
+        Values in place of keys of the benchmark file, as {"triggers.clock": "source"}; stated in the results.
     jobs : int, optional
         Number of logs processed at a time; the results do not depend on it.
     workers : Workers, optional
@@ -92,20 +88,14 @@ def score(
     >>> [(row.group, row.detected, row.missed, row.false_alarms) for row in scored.evaluated.summaries]
     [('stiff', 4, 0, 0), ('soft', 2, 1, 0), ('holdout', 0, 0, 1)]
     """
-    given, workers = read_triggers(location(triggers)), workers or Workers(jobs)
-    setup = read_benchmark_file(benchmark, learning=False, also_known=tuple(given.rows))
+    given = read_triggers(location(triggers))
+    setup = read_benchmark_file(benchmark, learning=False, also_known=tuple(given.rows), settings=settings)
+    workers = (workers or Workers(jobs)).limited_by(setup.execution)
     with workers.ready(to_be_seen([path for item in setup.impacts.values() for path in item.logs])):
-        return _run(setup, given, workers, clock, listed_only, progress)
+        return _run(setup, given, workers, progress)
 
 
-def _run(
-    setup: BenchmarkFile,
-    given: TriggerFile,
-    workers: Workers,
-    clock: str,
-    listed_only: bool,
-    progress: Progress | None,
-) -> BenchmarkResult:
+def _run(setup: BenchmarkFile, given: TriggerFile, workers: Workers, progress: Progress | None) -> BenchmarkResult:
     names = tuple(given.rows)
     setup, measured = with_synchronisation(setup, workers)
     base = setup.path.parent
@@ -124,12 +114,12 @@ def _run(
         findings.append(RecordingFinding.of(str(given.path), note))
     findings += measured
     if not runs:
-        findings += _unlisted(given.path, said, known, listed_only)
-        if listed_only:
+        findings += _unlisted(given.path, said, known, setup.triggers.listed_only)
+        if setup.triggers.listed_only:
             work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
     findings += unchecked(setup.limits, names, str(setup.path))
-    before = results_before(setup, _provenance(setup, given, clock), names, findings=findings)
-    scoring = _TriggerScoring(setup, given.path, said, clock, listed_only)
+    before = results_before(setup, _provenance(setup, given), names, findings=findings)
+    scoring = _TriggerScoring(setup, given.path, said)
     scored = ScoredLogs(setup, PieceScoring(setup, scoring), work, workers, progress)
     results = results_of(setup, before, scored, {}, {})
     without = _without_run(said, known, results) if runs else []
@@ -145,8 +135,6 @@ class _TriggerScoring:
     setup: BenchmarkFile
     path: Path
     said: Mapping[str, Mapping[str, Triggered]]
-    clock: str
-    listed_only: bool
 
     def __call__(self, group: str, path: Path, wanted: Wanted | None, _: object = None) -> list[LogOutcome]:
         found = score_runs(self.setup, group, path, self._detect, {})
@@ -154,7 +142,9 @@ class _TriggerScoring:
             found = self._listed_runs(found)
         outcomes = []
         for log in found:
-            beside = [row for name, said in self.said.items() for row in _beside(log, name, said, self.clock)]
+            beside = [
+                row for name, said in self.said.items() for row in _beside(log, name, said, self.setup.triggers.clock)
+            ]
             rows = replace(log.rows, skipped=(*log.rows.skipped, *beside))
             outcomes.append(outcome_of(replace(log, rows=rows), self.setup, NormalMotions, wanted))
         return outcomes
@@ -163,8 +153,8 @@ class _TriggerScoring:
         """Return the runs of a log that are scored, and report those without a row."""
         about_log, *runs = found
         known = {run.rows.recording.recording for run in runs if run.rows.recording is not None}
-        findings = (*about_log.rows.findings, *_unlisted(self.path, self.said, known, self.listed_only))
-        if self.listed_only:
+        findings = (*about_log.rows.findings, *_unlisted(self.path, self.said, known, self.setup.triggers.listed_only))
+        if self.setup.triggers.listed_only:
             runs = [run for run in runs if run.rows.recording is None or self._is_listed(run.rows.recording)]
         return [replace(about_log, rows=replace(about_log.rows, findings=findings)), *runs]
 
@@ -177,8 +167,8 @@ class _TriggerScoring:
 
     def _of_operation(self, operation: Operation) -> list[Detection]:
         log = operation.whole.name
-        shift = operation.recording.origin if self.clock == "source" else 0.0
-        asked = [name for name, said in self.said.items() if log in said or not self.listed_only]
+        shift = operation.recording.origin if self.setup.triggers.clock == "source" else 0.0
+        asked = [name for name, said in self.said.items() if log in said or not self.setup.triggers.listed_only]
         return [_detection(operation, name, self.said[name].get(log, Triggered()), shift) for name in asked]
 
 
@@ -227,7 +217,9 @@ def _beside(scored: ScoredLog, detector: str, said: Mapping[str, Triggered], clo
     if any(not first <= at <= last for at in outside):
         other = "recording" if clock == "source" else "source"
         in_ms = all(at > last and first <= at / 1e3 <= last for at in outside)
-        cause = "are the times in ms? time_s is in seconds" if in_ms else f"another clock? try --clock {other}"
+        cause = (
+            "are the times in ms? time_s is in seconds" if in_ms else f"another clock? try --set triggers.clock={other}"
+        )
         words += f"; the recording is from {first:.3f} to {last:.3f} s: {cause}"
     return [Skipped(name, words)]
 
@@ -262,15 +254,16 @@ def _released(alarms: Sequence[Alarm], crossings: Sequence[Alarm]) -> tuple[floa
     )
 
 
-def _provenance(setup: BenchmarkFile, given: TriggerFile, clock: str) -> dict[str, Any]:
+def _provenance(setup: BenchmarkFile, given: TriggerFile) -> dict[str, Any]:
     return {
         "tool": "cdtool",
         "tool_version": __version__,
         "benchmark_sha256": setup.digest,
+        **({"settings": dict(setup.settings)} if setup.settings else {}),
         "machine": setup.machine_file.machine.name,
         "machine_sha256": setup.machine_file.digest,
         "triggers_sha256": given.digest,
-        "trigger_clock": clock,
+        "trigger_clock": setup.triggers.clock,
         **setup.scoring,
         "plugins": plugin_packages(),
     }

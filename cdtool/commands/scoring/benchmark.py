@@ -110,8 +110,8 @@ def benchmark(  # noqa: PLR0913  # the public function: a keyword for each setti
     >>> [(row.group, row.detected, row.missed) for row in done.evaluated.summaries]
     [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
-    workers = workers or Workers(jobs)
     work = BenchmarkWork.of(file, detectors, false_alarm_budget, settings)
+    workers, store = work.executed_by(workers or Workers(jobs), store)
     work = replace(work, setup=work.setup.with_made(workers, progress))
     if store is not None:
         store.create()
@@ -145,6 +145,14 @@ class BenchmarkWork:
         setup = replace(setup, budget=Budget.parse(budget)) if budget is not None else setup
         refuse_limits_by_hand(setup)
         return cls(setup, limits, list(detectors) == ["all"])
+
+    def executed_by(self, workers: Workers, store: Store | None) -> tuple[Workers, Store | None]:
+        """Return workers and store with what [execution] sets of them."""
+        how = self.setup.execution
+        if store is not None:
+            trust, again = store.trust_times or how.trust_mtime, store.retry_failed or how.retry_failed
+            store = replace(store, trust_times=trust, retry_failed=again)
+        return workers.limited_by(how), store
 
 
 def _run(work: BenchmarkWork, workers: Workers, store: Store | None, progress: Progress | None) -> BenchmarkResult:

@@ -9,21 +9,29 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Protocol
 
 from cdtool.alarms.activation import Activation
-from cdtool.base.errors import ConfigurationError, FieldsError, UsageError, nearest
+from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_bytes, read_toml
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
-from cdtool.base.settings import NotNegative, Place, Positive, read, setting
+from cdtool.base.settings import Place, Positive, read, setting
 from cdtool.commands.judging.log_groups import Split
-from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_logs
+from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_file, named_logs
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, resolve_all, shown_path
 from cdtool.commands.judging.scoring_rules import ScoringRules
-from cdtool.commands.judging.settings_table import ForceTable, JudgingTable, apply_settings
+from cdtool.commands.judging.settings_table import (
+    ExecutionTable,
+    ForceTable,
+    JudgingTable,
+    LearnPart,
+    TriggersTable,
+    apply_settings,
+    full_keys,
+)
 from cdtool.commands.learning.threshold_settings import threshold_of
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
@@ -43,9 +51,6 @@ from cdtool.truth.force.limits import ForceProfile, profile_of, read_force_limit
 from cdtool.truth.onset_rule import OnsetRule
 
 HOLDOUT = "holdout"
-
-# How long before its first contact a log is no longer learned from [s].
-GUARD = 0.2
 
 
 @dataclass(frozen=True)
@@ -106,32 +111,8 @@ SECTIONS = Registry(
 
 
 @dataclass(frozen=True, kw_only=True)
-class LearnTable(LogsTable):
+class LearnTable(LearnPart, LogsTable):
     """[learn]: the logs that limits are learned from."""
-
-    until: Annotated[
-        Literal["end", "onset"], setting("onset: learn from each log up to its first contact, by load cell or labels")
-    ] = "end"
-    guard_s: Annotated[
-        NotNegative | None,
-        setting('with until = "onset": how long before the contact learning ends; default: 0.2', unit="s"),
-    ] = None
-    split: Annotated[
-        Split,
-        setting(
-            "what stays together where runs set a limit for other runs (a budget, tune): with day, no run is assessed "
-            "by what was learned on its day; the day is the date in the path, or that of the clock"
-        ),
-    ] = Split.RECORDING
-
-    def __post_init__(self) -> None:
-        if self.guard_s is not None and self.until == "end":
-            raise FieldsError(("guard_s", "until"), "is given without until", 'set until = "onset", or remove it')
-
-    @property
-    def guard(self) -> float | None:
-        """Return how long before its first contact a log is no longer learned from [s]; None: it is used to its end."""
-        return None if self.until == "end" else GUARD if self.guard_s is None else self.guard_s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,6 +212,8 @@ class BenchmarkFile:
     force_limits: Path | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     tune: Any = None
+    triggers: TriggersTable = field(default_factory=TriggersTable)
+    execution: ExecutionTable = field(default_factory=ExecutionTable)
 
     def with_made(self, workers: Workers, progress: Progress | None = None) -> BenchmarkFile:
         """Return the benchmark with the groups that a command makes for it; unchanged without one."""
@@ -381,7 +364,7 @@ def read_benchmark_file(
     `also_known`. `settings` take the place of keys of the file, as "activation.debounce".
     """
     file = location(path)
-    place = Place(str(file), by_option={key: f"--set {key}" for key in settings or ()}, root=BenchmarkTable)
+    place = Place(str(file), by_option=full_keys(settings), root=BenchmarkTable)
     values = read_toml(file, "a benchmark file", place)
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
@@ -390,11 +373,14 @@ def read_benchmark_file(
     if table is None:
         place.finish()
     assert table is not None
-    machine_file = place.tried(None, read_machine_file, joined(file.parent, table.machine))
+    machine_file = place.tried(
+        None, lambda: read_machine_file(named_file(place, "machine", joined(file.parent, table.machine)))
+    )
     if machine_file is None:
         place.finish()
     assert machine_file is not None
-    wanted = _Wanted(learning, tuple(also_known), tuple(detectors), dict(settings or {}))
+    stated = {key: value for key, value in (settings or {}).items() if key.partition(".")[0] != "execution"}
+    wanted = _Wanted(learning, tuple(also_known), tuple(detectors), stated)
     benchmark = _resolved(file, table, place, machine_file, wanted)
     place.finish()
     if learning:
@@ -421,7 +407,7 @@ def _resolved(
     otherwise: tuple[str, Threshold, Signature] = ("signature", table.signature, table.signature)
     given = (table.threshold, table.signature, machine.default_sides, place)
     threshold, rule, signature = place.tried(otherwise, threshold_of, *given)
-    cut = place.tried(None, _cut, table, place)
+    cut = place.tried(None, table.run_cut, place)
     found = LogsOf(file.parent, machine_file, cut is not None)
     if found.runs and (machine_file.columns.beside or machine_file.topics.beside):
         hint = "write each run to a log of its own, or map a channel of the log"
@@ -432,7 +418,7 @@ def _resolved(
     scored, with_impacts = _scored(impacts, impact_free=True), _scored(impacts)
     made = None
     if table.inject is not None:
-        made = place.tried(None, SECTIONS.load("inject").read, table.inject, place, found, table.cut, impacts)
+        made = place.tried(None, SECTIONS.load("inject").read, table.inject, place, found, table.operations, impacts)
     learn = _under_scored_paths(learn, scored)
     onset = place.below("onset")
     labels = place.tried(None, labels_of, table.onset, onset, found, scored, tuple(learn))
@@ -441,7 +427,7 @@ def _resolved(
         machine_file=machine_file,
         detectors=names,
         watched=table.joints,
-        operations=table.cut,
+        operations=table.operations,
         threshold=threshold,
         budget=place.tried(None, _budget, table, place),
         signature=signature,
@@ -478,11 +464,10 @@ def _resolved(
         force_limits=_force_limits(table.force, file.parent),
         settings=settings,
         tune=None if table.tune is None else read(SECTIONS.load("tune").table, table.tune, place.below("tune")),
+        triggers=table.triggers,
+        execution=table.execution,
     )
-    for joint in table.joints:
-        if joint not in machine.joints:
-            problem = f"contains '{joint}', which is not a joint of the machine file"
-            place.note("joints", problem, nearest(joint, machine.joints))
+    table.check_joints(place, machine)
     if table.points and not any(group.force for group in impacts.values()):
         place.note("points", "there is no force profile to check them against", "set [force] profile")
     with place.noting():
@@ -522,11 +507,6 @@ def _detectors(table: BenchmarkTable, place: Place, machine_file: MachineFile, w
     if len(set(names)) < len(names):
         raise place.fault("detectors", "contains a detector twice", "list each detector once")
     return names
-
-
-def _cut(table: BenchmarkTable, place: Place) -> RunCut | None:
-    with place.at("operations" if isinstance(table.operations, str) else "operations.by", table.cut):
-        return RunCut.of(table.cut)
 
 
 def _budget(table: BenchmarkTable, place: Place) -> Budget | None:
@@ -587,7 +567,7 @@ def _groups(
 ) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
     """Return the groups of impacts, the hold-out and those of changed conditions, and the sections of their logs."""
     force, below = table.force, place.below("force")
-    profiles: dict[str, ForceProfile] = place.tried({}, read_force_limits, _force_limits(force, found.base))
+    profiles: dict[str, ForceProfile] = place.tried({}, _profiles, force, below, found.base)
     profile = place.tried(None, _profile, profiles, force, below, "profile", force.profile) if profiles else None
     groups: dict[str, ImpactGroup] = {}
     sections: dict[Path, LogSection] = {}
@@ -650,6 +630,11 @@ def _conditions(
 
 def _force_limits(force: ForceTable, base: Path) -> Path | None:
     return joined(base, force.limits) if force.limits else None
+
+
+def _profiles(force: ForceTable, place: Place, base: Path) -> dict[str, ForceProfile]:
+    path = _force_limits(force, base)
+    return read_force_limits(path and named_file(place, "limits", path))
 
 
 def _profile(

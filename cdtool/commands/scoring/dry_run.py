@@ -76,8 +76,8 @@ def dry_run(
     CdtoolError
         As `cdtool.benchmark`, apart from errors of the logs.
     """
-    workers = workers or Workers()
     work = BenchmarkWork.of(file, detectors, false_alarm_budget, settings)
+    workers, store = work.executed_by(workers or Workers(), store)
     setup, to_inject = work.setup.made.found(work.setup) if work.setup.made else (work.setup, 0)
     return replace(_dry_run(replace(work, setup=setup), workers, store), to_inject=to_inject)
 

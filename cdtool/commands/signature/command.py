@@ -20,11 +20,9 @@ from cdtool.commands.console.options import (
     JobsOption,
     JsonOption,
     MachineOption,
-    OnsetAboveOption,
     QuietOption,
-    RetriesOption,
-    TimeoutOption,
     figure_name,
+    set_option,
 )
 from cdtool.commands.console.place import Place, location
 from cdtool.commands.signature.shown import checked_as_json, file_as_json, show_class, show_file
@@ -54,14 +52,7 @@ FileArgument = Annotated[
         autocompletion=completions.files(".json"),
     ),
 ]
-CutOption = Annotated[
-    str | None,
-    typer.Option(
-        "--operations",
-        help="How to divide a log into operations. Default: as for learning.",
-        autocompletion=completions.operations,
-    ),
-]
+UpkeepOption = Annotated[list[str] | None, set_option("onset.above_n=20", "UpkeepTable")]
 PlotOption = Annotated[Place | None, typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw.")]
 
 
@@ -101,23 +92,16 @@ def check(
         logs_argument("Impact-free recordings: the runs learned from and later ones, in order."),
     ],
     machine: MachineOption,
-    operations: CutOption = None,
-    target: Annotated[
-        float, typer.Option("--target", help="False-alarm probability per operation that the runs must demonstrate.")
-    ] = 1e-3,
+    target: Annotated[float, typer.Option("--target", help="False-alarm probability to demonstrate.")] = 1e-3,
     plot: Annotated[
         Place | None,
-        typer.Option(
-            "--plot", parser=location, help="PNG, SVG or PDF file of the drift; a folder for several classes."
-        ),
+        typer.Option("--plot", parser=location, help="Figure of the drift; a folder for classes."),
     ] = None,
     force: ForceOption = False,
-    onset_above: OnsetAboveOption = None,
+    settings: UpkeepOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
     quiet: QuietOption = False,
-    retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Check whether a signature was learned from enough runs and whether the machine has drifted since.
@@ -127,10 +111,10 @@ def check(
 
     Example: cdtool signature check gate.feekf.json free/*.csv april.mcap -m machine.toml --plot drift.png
     """
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.learning.normal_runs import notes_on
     from cdtool.commands.signature.upkeep import check_signature
     from cdtool.execution.workers import Workers
-    from cdtool.truth.onset import OnsetRule
 
     if plot is not None and not plot.is_dir():
         figure_name(plot, force=force)
@@ -139,10 +123,9 @@ def check(
             file,
             logs,
             machine,
-            operations=operations,
             target=target,
-            onset=OnsetRule(above=onset_above),
-            workers=Workers(jobs, timeout, retries, cluster),
+            settings=given_settings(settings or ()),
+            workers=Workers(jobs, cluster=cluster),
             progress=advance,
         )
     names = _plot_names(plot, checked, force=force)
@@ -167,45 +150,35 @@ def update(
     file: FileArgument,
     logs: Annotated[list[Place], logs_argument("Impact-free recordings to add.")],
     machine: MachineOption,
-    operations: CutOption = None,
-    forget: Annotated[
-        float | None, typer.Option("--forget", help="Forget old runs: effective number of runs to keep, 20 to 50.")
-    ] = None,
-    cap: Annotated[
-        float | None, typer.Option("--cap", help="Limit the deviation of a run to this many spreads.")
-    ] = None,
-    reserve: Annotated[
-        float | None, typer.Option("--reserve", help="Spreads by which a limit may move from its first learned value.")
-    ] = None,
-    onset_above: OnsetAboveOption = None,
+    forget: Annotated[float | None, typer.Option("--forget", help="Runs to remember, 20 to 50; default: all.")] = None,
+    cap: Annotated[float | None, typer.Option("--cap", help="Spreads that a run may deviate at most.")] = None,
+    reserve: Annotated[float | None, typer.Option("--reserve", help="Spreads that a limit may move in all.")] = None,
+    settings: UpkeepOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
     quiet: QuietOption = False,
-    retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Add impact-free runs to a signature without learning a slowly growing fault.
 
     Example: cdtool signature update gate.feekf.json april/*.csv -m machine.toml --forget 30
     """
+    from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.learning.normal_runs import notes_on
     from cdtool.commands.signature.upkeep import update_signature
     from cdtool.execution.workers import Workers
     from cdtool.thresholds.guarded_update import CAP, RESERVE
-    from cdtool.truth.onset import OnsetRule
 
     with progress("reading runs", quiet=quiet) as advance:
         done = update_signature(
             file,
             logs,
             machine,
-            operations=operations,
             forget=forget,
             cap=CAP if cap is None else cap,
             reserve=RESERVE if reserve is None else reserve,
-            onset=OnsetRule(above=onset_above),
-            workers=Workers(jobs, timeout, retries, cluster),
+            settings=given_settings(settings or ()),
+            workers=Workers(jobs, cluster=cluster),
             progress=advance,
         )
     print_skipped(done.refused, [*done.findings, *notes_on(done.file)])

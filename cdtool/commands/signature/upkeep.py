@@ -5,7 +5,7 @@ What to do with a signature, from the coverage of its runs and the drift of a se
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from cdtool.base.errors import CdtoolError, SignatureError, UsageError
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.judging.runs import RunReading, load_runs, several_logs
+from cdtool.commands.judging.settings_table import UpkeepTable, read_settings
 from cdtool.commands.learning.fitting import Pair, signals_of
 from cdtool.commands.learning.learning import learned_run
 from cdtool.commands.learning.normal_runs import with_operation
@@ -37,7 +38,6 @@ from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
 from cdtool.thresholds.signature import Signature
-from cdtool.truth.onset import OnsetRule
 
 
 def advice(coverage: SignatureCoverage | None, drift: DriftAudit | None) -> str:
@@ -182,8 +182,7 @@ def check_signature(  # noqa: PLR0913  # the public function: a keyword for each
     machine: str | Path | MachineFile,
     *,
     target: float = TARGET,
-    operations: str | None = None,
-    onset: OnsetRule | None = None,
+    settings: Mapping[str, Any] | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
     progress: Progress | None = None,
@@ -200,10 +199,9 @@ def check_signature(  # noqa: PLR0913  # the public function: a keyword for each
         The machine file.
     target : float, optional
         The chance of a false alarm per operation that the runs have to show.
-    operations : str, optional
-        How the logs are cut into operations; only the way used for learning is possible, and it is the default.
-    onset : OnsetRule, optional
-        The rule by which a contact shows on the load cell; a run with a contact is left out.
+    settings : mapping, optional
+        Values in place of the defaults of [onset], as {"onset.above_n": 20.0}; a run with a contact is left out. And of
+        [execution].
     jobs : int, optional
         Number of logs read at a time.
     workers : Workers, optional
@@ -220,7 +218,7 @@ def check_signature(  # noqa: PLR0913  # the public function: a keyword for each
     Raises
     ------
     SignatureError
-        The file does not belong to the machine, contains another threshold, or its logs were cut in another way.
+        The file does not belong to the machine, or contains another threshold.
     UsageError
         The target is not a chance.
     CdtoolError
@@ -244,7 +242,7 @@ def check_signature(  # noqa: PLR0913  # the public function: a keyword for each
     signatures = signatures_in(file)
     detector = machine_file.detector(file.detector)
     file.check(machine_file.machine, detector)
-    reading = RunReading(_cut(file, operations), onset=onset, workers=workers or Workers(jobs), progress=progress)
+    reading = _reading(file, settings, workers or Workers(jobs), progress)
     runs = load_runs([location(log) for log in several_logs(logs)], machine_file, reading, file.plausible)
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     skipped = [*runs.skipped, *unusable]
@@ -303,8 +301,7 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
     forget: float | None = None,
     cap: float = CAP,
     reserve: float = RESERVE,
-    operations: str | None = None,
-    onset: OnsetRule | None = None,
+    settings: Mapping[str, Any] | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
     progress: Progress | None = None,
@@ -325,10 +322,9 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
         The deviation of a run counts up to this many spreads.
     reserve : float, optional
         No run may move a limit further than this many spreads from where it was first learned.
-    operations : str, optional
-        How the logs are cut into operations; only the way used for learning is possible, and it is the default.
-    onset : OnsetRule, optional
-        The rule by which a contact shows on the load cell; a run with a contact is left out.
+    settings : mapping, optional
+        Values in place of the defaults of [onset], as {"onset.above_n": 20.0}; a run with a contact is left out. And of
+        [execution].
     jobs : int, optional
         Number of logs read at a time.
     workers : Workers, optional
@@ -345,7 +341,7 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
     Raises
     ------
     SignatureError
-        The file does not belong to the machine, contains another threshold, or its logs were cut in another way.
+        The file does not belong to the machine, or contains another threshold.
     UsageError
         A setting is outside its range.
 
@@ -372,7 +368,7 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
-    reading = RunReading(_cut(stored, operations), onset=onset, workers=workers or Workers(jobs), progress=progress)
+    reading = _reading(stored, settings, workers or Workers(jobs), progress)
     runs = load_runs([location(log) for log in several_logs(logs)], machine_file, reading, stored.plausible)
     added: list[str] = []
     refused = list(runs.skipped)
@@ -391,14 +387,14 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
     return Updated(rewrite_signature(path, change), tuple(added), tuple(refused), runs.findings)
 
 
-def _cut(file: SignatureFile, operations: str | None) -> str:
-    """Return how logs are cut: as for learning, since strokes cut differently are not comparable."""
-    if operations not in (None, file.operations):
-        raise SignatureError(
-            f"{file.source}: learned from logs cut by '{file.operations}', not by '{operations}'",
-            "omit --operations, or learn another signature",
-        )
-    return file.operations
+def _reading(
+    file: SignatureFile, settings: Mapping[str, Any] | None, workers: Workers, progress: Progress | None
+) -> RunReading:
+    """Return how logs are read: cut as for learning, since strokes cut differently are not comparable."""
+    table, place = read_settings(UpkeepTable, settings or {})
+    place.finish()
+    workers = workers.limited_by(table.execution)
+    return RunReading(file.operations, onset=table.onset, workers=workers, progress=progress)
 
 
 def _with_operation(

@@ -35,7 +35,7 @@ def simulate(
 
     Example: cdtool simulate gate --set free=14 --set stiff=10 --seed 1 -o gate
     """
-    from cdtool.commands.judging.settings_table import read_settings
+    from cdtool.commands.judging.settings_table import given_settings, read_settings
     from cdtool.commands.simulate.arm_recordings import simulate_arm
     from cdtool.commands.simulate.gate_recordings import simulate_gate
     from cdtool.commands.simulate.recording_folder import without_benchmark
@@ -43,7 +43,8 @@ def simulate(
 
     if trial and machine == "gate":
         raise UsageError("--trial is only for the arm", "omit it")
-    table = read_settings(SimulationTable, settings or ())
+    table, place = read_settings(SimulationTable, given_settings(settings or ()))
+    place.finish()
     simulate_machine = simulate_gate if machine == "gate" else partial(simulate_arm, trial=2 if trial == "2" else 1)
     counts = table.counts
     with progress("simulating") as advance:

@@ -150,7 +150,7 @@ def read_study(machine: MachineFile, file: str | Path | None, settings: Mapping[
     Raises UsageError, or ConfigurationError naming file and key; the inertias are required.
     """
     given = settings or {}
-    place = Place(str(file or "study"), by_option={key: f"--set {key}" for key in given})
+    place = Place(str(file or "study"), by_option=frozenset(given))
     values = read_toml(location(file), "a study file") if file else {}
     table = read(StudyTable, apply_settings(values, given), place)
     place.finish()

@@ -214,7 +214,7 @@ def tuned_signature(tuning: Tuning, tuned: TunedDetector) -> LearnedSignature:
     """Return the signature file of a tuned detector, learned from all runs; raises SignatureError, UsageError."""
     setup, activation = tuning.setup, tuning.setup.activation
     if tuned.debounce is not None:
-        activation = activation.changed({"debounce": tuned.debounce})
+        activation = replace(activation, debounce=tuned.debounce)
     detector = tuned.choice.detector(setup.machine_file.detector(tuned.detector))
     setting = Setting(setup.watched, setup.operations, activation, tuning.options.budget, setup.split)
     learned = learned_from_runs(tuning.runs, setup.machine_file, detector, tuned.choice.rule, setting)

@@ -125,9 +125,10 @@ def tune_detectors(setup: BenchmarkFile, options: TuningOptions) -> TuningResult
     workers, progress = options.workers or Workers(), options.progress
     setup = with_detectors(setup, options.detectors) if options.detectors else setup
     refuse_limits_by_hand(replace(setup, budget=options.budget))
-    setup = _with_impacts(setup, options.impacts, workers, progress)
+    readers = workers.limited_by(setup.execution)
+    setup = _with_impacts(setup, options.impacts, readers, progress)
     with workers.ready():
-        read = read_recordings(setup, options.budget, options.seed, workers, progress)
+        read = read_recordings(setup, options.budget, options.seed, readers, progress)
         if options.objective is Goal.FORCE and not np.isfinite(read.recordings.peak_of).any():
             raise UsageError("objective is 'force', but no log has the force of its contact", "map the load cell")
         made: list[TunedDetector] = []

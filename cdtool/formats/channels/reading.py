@@ -343,7 +343,7 @@ def _read_head(path: Path) -> bytes:
         if not path.exists():
             whole, mark, _ = str(path).rpartition("#")
             is_run = mark and location(whole).exists()
-            hint = f"for a run of {whole}, state how it is cut, as detect --operations column:NAME" if is_run else ""
+            hint = f"for a run of {whole}, state how it is cut, as operations=column:NAME" if is_run else ""
             raise RecordingError("no such file", hint or "check the path")
         if not path.is_file():
             raise RecordingError("is not a regular file", "save the stream to a file first")

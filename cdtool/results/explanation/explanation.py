@@ -122,7 +122,7 @@ def explain_operation(
 
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0]).detected
+    >>> found = cdtool.detect(log, machine, detector="momentum", settings={"threshold.limits": 400.0}).detected
     >>> (alarm,) = explain_operation(found.detections[0], found.matchings[0], found.activation)
     >>> alarm.role, alarm.joint, alarm.debounce, alarm.absent.value
     ('detection', 'gate', 9, 'limits set by hand')

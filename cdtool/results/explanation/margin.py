@@ -161,7 +161,7 @@ def joint_margins(detection: Detection) -> tuple[JointMargin, ...]:
 
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0]).detected
+    >>> found = cdtool.detect(log, machine, detector="momentum", settings={"threshold.limits": 400.0}).detected
     >>> (gate,) = joint_margins(found.detections[0])
     >>> gate.name, bool(np.nanmin(gate.margin) < 0.0), bool(np.nanmax(gate.share) > 1.0)
     ('gate', True, True)

@@ -32,7 +32,9 @@ for finding in cdtool.info(log, machine=machine).findings:
 # coarse; they show where to look. The load cell is below: it is never an input of a detector.
 
 # %%
-found = cdtool.detect(log, machine, detector="momentum", warm_up=2.0)
+found = cdtool.detect(
+    log, machine, detector="momentum", settings={"threshold.name": "baseline", "threshold.warm_up": 2.0}
+)
 found.plot()
 
 # %%

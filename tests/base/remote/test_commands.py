@@ -11,7 +11,7 @@ import pytest
 import cdtool as api
 from cdtool.base.remote import session, staging
 from cdtool.base.remote.remote_path import location
-from tests.command import cdtool
+from tests.command import FEW, cdtool
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 MACHINE = GATE / "machine.toml"
@@ -65,7 +65,7 @@ def test_a_report_folder_is_written_and_replaced(gate, memory):
 def test_a_signature_is_learned_used_and_updated(gate, memory, tmp_path):
     free = [f"{gate}/free/{path.name}" for path in sorted((GATE / "free").iterdir())]
     learned = cdtool(
-        "learn-signature", *free, "-m", f"{gate}/machine.toml", "-d", "feekf", "--force", "-o", "memory://g.json"
+        "learn-signature", *free, "-m", f"{gate}/machine.toml", "-d", "feekf", FEW, "-o", "memory://g.json"
     )
     assert learned.status == 0, learned.err
     here, there = [
@@ -142,10 +142,8 @@ def test_runs_of_a_log_are_named_by_its_url(memory, tmp_path):
         "memory://logs/machine.toml",
         "-d",
         "pt",
-        "--limit",
-        "1000000",
-        "--operations",
-        "column:cycle",
+        "--set=threshold.limits=1000000",
+        "--set=operations=column:cycle",
         "--json",
     )
     assert '"memory://logs/cycles #2.csv#1"' in done.out, done.err
@@ -187,7 +185,7 @@ def test_a_rosbag2_folder_at_a_url_is_one_log(memory, tmp_path):
 @pytest.mark.parametrize("pattern", ["free/*.csv", "free/0[1-5].csv", "**/free/*.csv"])
 def test_a_pattern_of_a_url_names_the_logs_that_a_shell_would_name_in_a_folder(gate, tmp_path, pattern):
     names = sorted((GATE / "free").glob("0[1-5].csv" if "[" in pattern else "*.csv"))
-    learn = ("learn-signature", "-m", MACHINE, "-d", "gm", "--force", "-o")
+    learn = ("learn-signature", "-m", MACHINE, "-d", "gm", FEW, "-o")
     by_pattern = cdtool(*learn, tmp_path / "a.json", f"{gate}/{pattern}")
     by_name = cdtool(*learn, tmp_path / "b.json", *(f"{gate}/free/{path.name}" for path in names))
     assert by_pattern.status == by_name.status == 0
@@ -202,7 +200,9 @@ def test_a_pattern_of_a_url_without_a_match_is_a_missing_file(gate):
 
 def test_a_path_at_a_url_is_one_log_in_python(gate):
     log = location(f"{gate}/stiff/03.csv")
-    one, several = [api.detect(logs, MACHINE, detector="pt", limit=[50.0]) for logs in (log, [log])]
+    one, several = [
+        api.detect(logs, MACHINE, detector="pt", settings={"threshold.limits": 50.0}) for logs in (log, [log])
+    ]
     assert several[log].alarms.equals(one.alarms) and log in several
 
 

@@ -47,14 +47,14 @@ def described(folder: Path, urdf: str = "", joints=JOINTS, more: str = "", torqu
 
 
 def refused(log: Path, machine: Path) -> str:
-    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--limit", "10")
+    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--set=threshold.limits=10")
     assert done.status == 2 and "Traceback" not in done.err
     assert len(done.err.strip().splitlines()) == 1, done.err
     return done.err
 
 
 def test_the_unchanged_robot_runs_without_its_meshes(log, tmp_path):
-    done = cdtool("detect", log, "-m", described(tmp_path), "-d", "gm", "--limit", "1e6")
+    done = cdtool("detect", log, "-m", described(tmp_path), "-d", "gm", "--set=threshold.limits=1e6")
     assert done.status == 0 and "no alarm" in done.out
 
 

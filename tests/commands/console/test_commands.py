@@ -12,7 +12,7 @@ import pytest
 from cdtool.base.exit_status import STATUSES_OF
 from cdtool.detectors import DETECTORS
 from cdtool.results.results import SCHEMA_VERSION
-from tests.command import cdtool, keys, one_line
+from tests.command import FEW, cdtool, keys, one_line
 
 
 @pytest.mark.parametrize("command", STATUSES_OF)
@@ -91,7 +91,7 @@ def test_too_few_runs_exit_with_2_and_the_number_missing(gate_folder, tmp_path):
     done = cdtool(*arguments)
     assert done.status == 2 and "7 impact-free runs" in done.err and "3 more are needed" in done.err
     assert not (tmp_path / "s.json").exists()
-    forced = cdtool(*arguments, "--force")
+    forced = cdtool(*arguments, FEW)
     assert forced.status == 0 and "7 runs forward" in forced.err and (tmp_path / "s.json").exists()
 
 
@@ -142,13 +142,18 @@ def test_detecting_an_impact_shows_time_and_latency_and_draws(gate_folder, feekf
 def test_detecting_with_a_hand_set_limit(gate_folder):
     log = gate_folder / "stiff" / "01.csv"
     machine = ("-m", gate_folder / "machine.toml")
-    done = cdtool("detect", log, *machine, "-d", "gm", "--limit", "250", "--json")
+    done = cdtool("detect", log, *machine, "-d", "gm", "--set=threshold.limits=250", "--json")
     (values,) = json.loads(done.out)
     assert values["alarms"][0]["limit"] == 250.0
     assert values["contacts"][0]["outcome"] == "detected" and values["contacts"][0]["latency_ms"] > 20.0
-    high = cdtool("detect", log, *machine, "-d", "gm", "--limit", "1e6")
+    high = cdtool("detect", log, *machine, "-d", "gm", "--set=threshold.limits=1e6")
     assert high.status == 0 and "missed" in high.out and "contact at" in high.out
-    for wrong in (("--limit", "250"), ("-d", "gm"), ("-d", "gm", "--limit", "many"), ("-d", "gmm", "--limit", "3")):
+    for wrong in (
+        ("--set=threshold.limits=250"),
+        ("-d", "gm"),
+        ("-d", "gm", "--set=threshold.limits=many"),
+        ("-d", "gmm", "--set=threshold.limits=3"),
+    ):
         assert cdtool("detect", log, *machine, *wrong).status == 2
 
 
@@ -338,7 +343,7 @@ def test_mcap_and_csv_of_the_same_run_give_the_same_alarm(gate_folder, feekf_sig
 
 
 def test_the_help_shows_text_in_brackets():
-    assert "above this [N]" in one_line(cdtool("detect", "--help").out)
+    assert "force there [m]" in one_line(cdtool("detect", "--help").out)
 
 
 def test_an_option_with_an_empty_value_is_an_error(gate_folder, tmp_path):

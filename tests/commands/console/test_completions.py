@@ -31,7 +31,7 @@ def completed(*words):
 
 def test_a_shell_completes_commands_options_and_values():
     script = Path(sys.executable).with_name("cdtool")
-    for line, expected in (("det", "detect"), ("detect --dete", "--detector"), ("detect -d fe", "feekf")):
+    for line, expected in (("det", "detect"), ("detect --dete", "--detectors"), ("detect -d fe", "feekf")):
         words = f"cdtool {line}".split()
         asked = {"COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1), "_CDTOOL_COMPLETE": "complete_bash"}
         done = subprocess.run([script], env=os.environ | asked, capture_output=True, text=True, check=True)
@@ -40,7 +40,7 @@ def test_a_shell_completes_commands_options_and_values():
 
 @pytest.mark.parametrize("command", ["detect", "explain", "learn-signature"])
 def test_detectors_are_completed_by_name_and_short_name(command):
-    assert completed(command, "--detector", "f") == ["friction_ekf", "feekf"]
+    assert completed(command, "--detectors", "f") == ["friction_ekf", "feekf"]
     assert set(completed(command, "-d", "p")) == {"pure_torque", "pure_inertia", "pt", "pi"}
 
 
@@ -52,17 +52,17 @@ def test_a_list_of_detectors_is_completed_at_its_last_name():
 def test_every_registered_name_is_a_completion():
     assert completions.detectors("") == [*DETECTORS.names(), *DETECTORS.short_names]
     assert completions.thresholds("") == THRESHOLDS.names()
-    assert completions.operations("") == list(HOW_TO_CUT)
+    assert completed("detect", "--set", "operations=") == [f"operations={how}" for how in HOW_TO_CUT]
 
 
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (("learn-signature", "--threshold", "cu"), ["cusum"]),
-        (("learn-signature", "--rule", "t"), ["thesis"]),
-        (("learn-signature", "--sides", "o"), ["one"]),
-        (("learn-signature", "--align", "p"), ["position"]),
-        (("signature", "update", "--operations", "m"), ["motion"]),
+        (("learn-signature", "--set", "threshold.name=cu"), ["threshold.name=cusum"]),
+        (("learn-signature", "--set", "signature.r"), ["signature.rule="]),
+        (("learn-signature", "--set", "signature.rule=t"), ["signature.rule=thesis"]),
+        (("detect", "--set", "activation.latch="), ["activation.latch=true", "activation.latch=false"]),
+        (("signature", "update", "--set", "ex"), ["execution.timeout_s=", "execution.retries="]),
         (("list", "KIND", "w"), ["writers"]),
         (("tune", "--set", "tune.ob"), ["tune.objective="]),
         (("inject", "--set", "inject.form"), ["inject.format="]),
@@ -105,7 +105,7 @@ from cdtool.commands.app import app
 from typer.main import get_command
 from typer import Context
 group = get_command(app)
-for name, option in (("benchmark", "--detectors"), ("learn-signature", "--threshold"), ("list", "kind")):
+for name, option in (("benchmark", "--detectors"), ("tune", "--thresholds"), ("list", "kind")):
     command = group.get_command(Context(group), name)
     parameter = next(item for item in command.params if option in (*item.opts, item.name))
     assert parameter.shell_complete(Context(command), ""), option

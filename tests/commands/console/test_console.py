@@ -14,11 +14,11 @@ from cdtool.truth.force.limits import read_force_limits
 from tests.command import cdtool
 
 
-@pytest.mark.parametrize("place", ["cdtool.commands.detecting.detection.detect_log", "cdtool.commands.app.app"])
+@pytest.mark.parametrize("place", ["cdtool.commands.detecting.prepared.prepared", "cdtool.commands.app.app"])
 def test_ctrl_c_exits_with_130_and_one_line(gate_folder, place):
     log = gate_folder / "stiff" / "01.csv"
     with mock.patch(place, side_effect=KeyboardInterrupt):
-        done = cdtool("detect", log, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+        done = cdtool("detect", log, "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
     assert (done.status, done.out, done.err) == (130, "", "interrupted\n")
 
 
@@ -46,7 +46,9 @@ BYTES = bytes(range(256)) * 4
 )
 def test_a_packed_log_or_a_workbook_gets_a_hint_how_to_convert_it(gate_folder, tmp_path, content, step):
     (tmp_path / "log.csv").write_bytes(content)
-    done = cdtool("detect", tmp_path / "log.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    done = cdtool(
+        "detect", tmp_path / "log.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400"
+    )
     assert done.status == 2 and step in done.err
 
 

@@ -15,7 +15,7 @@ import cdtool as api
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.recordings.recording import Recording, Series
 from cdtool.truth.onset import OnsetRule
-from tests.command import cdtool
+from tests.command import FEW, cdtool
 
 SHOWN = "the load cell shows a contact of "
 
@@ -35,7 +35,7 @@ def mixed(gate_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def learn(mixed: Path, output: Path, *more: object):
     logs = sorted((mixed / "free").glob("*.csv"))
-    return cdtool("learn-signature", *logs, "-m", mixed / "machine.toml", "-d", "gm", "--force", "-o", output, *more)
+    return cdtool("learn-signature", *logs, "-m", mixed / "machine.toml", "-d", "gm", FEW, "-o", output, *more)
 
 
 def benchmark_of(mixed: Path, more: str = "") -> Path:
@@ -52,7 +52,7 @@ def test_a_log_with_a_contact_is_left_out_with_force_and_time(mixed, tmp_path):
     done = learn(mixed, tmp_path / "s.json")
     assert done.status == 3
     (line,) = [line for line in done.err.splitlines() if line.startswith("left out:")]
-    assert f"04.csv: {SHOWN}" in line and "--onset-above" in line and " s: not an impact-free run" in line
+    assert f"04.csv: {SHOWN}" in line and "onset.above_n" in line and " s: not an impact-free run" in line
     assert "forward at 0.201 m/s     3" in done.out
     checked = cdtool(
         "signature", "check", tmp_path / "s.json", *sorted((mixed / "free").glob("*")), "-m", mixed / "machine.toml"
@@ -65,7 +65,7 @@ def test_a_log_with_a_contact_is_left_out_with_force_and_time(mixed, tmp_path):
 
 
 def test_a_level_set_by_hand_accepts_it(mixed, tmp_path):
-    assert "forward at 0.201 m/s     4" in learn(mixed, tmp_path / "s.json", "--onset-above", 1e6).out
+    assert "forward at 0.201 m/s     4" in learn(mixed, tmp_path / "s.json", "--set=onset.above_n=1e6").out
 
 
 def test_a_benchmark_leaves_it_out_of_learning_and_hold_out(mixed):

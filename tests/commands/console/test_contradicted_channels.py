@@ -30,7 +30,7 @@ def test_every_command_says_it_and_none_judges_by_it(gate_folder, reversed_torqu
     right = ("-m", gate_folder / "machine.toml", "-d", "gm", "-o", tmp_path / "right.json")
     assert cdtool("learn-signature", *free, *right).status == 0
     signatures = [("--signature", tmp_path / name) for name in ("gm.json", "right.json")]
-    for options in (*signatures, ("-d", "pt", "--limit", "900")):
+    for options in (*signatures, ("-d", "pt", "--set=threshold.limits=900")):
         done = cdtool("detect", hit, *machine, *options, "--json")
         (values,) = json.loads(done.out)
         assert done.status == 3 and SAID in done.err

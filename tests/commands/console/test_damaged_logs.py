@@ -25,7 +25,7 @@ def cut(gate_folder: Path, tmp_path: Path):
 
 
 def test_detect_reports_a_truncated_log_as_damaged_and_used(cut, gate_folder):
-    done = cdtool("detect", cut(1e9), "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    done = cdtool("detect", cut(1e9), "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
     assert done.status == 3 and " alarm " in done.out
     assert "loss: " in done.err and "cut.csv: the last line" in done.err
     assert "left out" not in done.err and done.err.endswith("done, but 1 log is damaged\n")
@@ -33,13 +33,13 @@ def test_detect_reports_a_truncated_log_as_damaged_and_used(cut, gate_folder):
 
 def test_left_out_and_damaged_logs_are_counted_separately(cut, gate_folder, tmp_path):
     (tmp_path / "empty.csv").touch()
-    machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
     done = cdtool("detect", tmp_path / "empty.csv", cut(1e9), cut(1e9, "too.csv"), *machine)
     assert done.status == 3 and done.err.endswith("done, but 1 item was left out and 2 logs are damaged\n")
 
 
 def test_an_alarm_after_the_load_cell_s_last_sample_has_a_reason_for_no_latency(gate_folder, tmp_path):
-    machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    machine = ("-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
     whole = cdtool("detect", gate_folder / "stiff" / "01.csv", *machine)
     (row,) = [line for line in whole.out.splitlines() if " alarm " in line]
     ends = 1e3 * (float(row.split()[2]) - 0.5)  # the log is in ms
@@ -59,9 +59,8 @@ def test_an_alarm_after_the_load_cell_s_last_sample_has_a_reason_for_no_latency(
 
 
 def test_a_false_alarm_is_shown_with_no_contact(gate_folder):
-    done = cdtool(
-        "detect", gate_folder / "holdout" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 20
-    )
+    log, machine = gate_folder / "holdout" / "01.csv", gate_folder / "machine.toml"
+    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--set=threshold.limits=20")
     rows = [line.rstrip() for line in done.out.splitlines() if " alarm " in line]
     assert rows and all(row.endswith("-  no contact") for row in rows)
 

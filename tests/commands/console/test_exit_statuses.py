@@ -130,7 +130,7 @@ def _learn(files: Folder, *logs: Path) -> Outcome:
 
 
 def _detect(files: Folder, *logs: Path) -> Outcome:
-    return cdtool("detect", *logs, "-m", files.machine, "-d", "gm", "--limit", 400)
+    return cdtool("detect", *logs, "-m", files.machine, "-d", "gm", "--set=threshold.limits=400")
 
 
 def _tune(files: Folder, benchmark: Path) -> Outcome:
@@ -283,6 +283,6 @@ def test_a_log_that_is_not_assessable_exits_with_3_and_the_reason(files):
     path = files.path / "no_torque.csv"
     path.write_text("\n".join([lines[0], *map(",".join, rows)]) + "\n", encoding="utf-8")
     for command in ("detect", "explain"):
-        done = cdtool(command, path, "-m", files.machine, "-d", "gm", "--limit", 400)
+        done = cdtool(command, path, "-m", files.machine, "-d", "gm", "--set=threshold.limits=400")
         assert done.status == 3, done.out
         assert f"not assessable: {path}: " in done.err and "100 %" in done.err

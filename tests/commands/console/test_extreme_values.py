@@ -11,7 +11,7 @@ from scipy.io import savemat
 from cdtool.base.errors import CdtoolError
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mat import Mat
-from tests.command import cdtool
+from tests.command import FEW, cdtool
 from tests.project.pages import ROOT
 
 GATE = ROOT / "sample_logs/gate"
@@ -27,8 +27,8 @@ BENCHMARK = (
 INJECT = f'[inject]\nlogs = ["{FREE[2]}"]\npositions = ["0.9m"]\nstiffnesses_n_per_mm = [50]\nfolder = "injected"\n'
 COMMANDS = {
     "info": ("info", LOG, "-m"),
-    "learn-signature": ("learn-signature", *FREE[:2], "-d", "gm", "-o", "s.json", "--force", "-m"),
-    "detect": ("detect", LOG, "-d", "gm", "--limit", 100, "-m"),
+    "learn-signature": ("learn-signature", *FREE[:2], "-d", "gm", "-o", "s.json", FEW, "-m"),
+    "detect": ("detect", LOG, "-d", "gm", "--set=threshold.limits=100", "-m"),
     "identify": ("identify", *FREE[:2], "-m"),
     "benchmark": ("benchmark",),
     "tune": ("tune", "--false-alarm-budget", "1/2op", "-o", "tuned.toml"),

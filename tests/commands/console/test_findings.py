@@ -56,7 +56,7 @@ def test_a_wrong_unit_is_reported_by_every_command_that_reads_the_log(gate_folde
     words = "times the derivative of the position (a factor as between rpm and rad/s)"
     info = _of(cdtool("info", log, "-m", machine).out, "loss")
     assert any(words in text for text in info) == (units == "m_per_s")
-    detect = cdtool("detect", log, "-m", machine, "-d", "gm", "--limit", 400)
+    detect = cdtool("detect", log, "-m", machine, "-d", "gm", "--set=threshold.limits=400")
     assert _of(detect.err, "loss") == info and detect.status == (3 if info else 0)
     learned = cdtool("learn-signature", *free, "-m", machine, "-d", "pt", "-o", tmp_path / "pt.json")
     assert (words in learned.err) == (units == "m_per_s") and learned.status == (3 if info else 0)
@@ -69,7 +69,7 @@ def test_info_names_a_contact_in_progress_that_detect_does_not_score(gate_folder
     pressed = next(i for i, row in enumerate(rows) if float(row.split(",")[5]) > 0.5)
     begun = damaged(log, tmp_path / "begun.csv", without=range(pressed + 20))
     words = "a contact is in progress when it begins"
-    assert words in cdtool("detect", begun, *machine, "-d", "gm", "--limit", 400).err
+    assert words in cdtool("detect", begun, *machine, "-d", "gm", "--set=threshold.limits=400").err
     assert words in cdtool("info", begun, *machine).out
 
 

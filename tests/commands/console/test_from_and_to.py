@@ -1,4 +1,4 @@
-"""A part of a log on the command line: detect, convert and learn-signature with --from and --to."""
+"""A part of a log: the keys from and to of detect and learn-signature, and convert with --from and --to."""
 
 import json
 
@@ -19,7 +19,7 @@ def machine(gate_folder):
 
 
 def detected(log, machine, *arguments):
-    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--limit", "400", "--json", *arguments)
+    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--set=threshold.limits=400", "--json", *arguments)
     (row,) = json.loads(done.out)
     return row
 
@@ -27,9 +27,9 @@ def detected(log, machine, *arguments):
 def test_detect_uses_only_the_part(log, machine):
     whole = detected(log, machine)
     (alarm,) = whole["alarms"][:1]
-    part = detected(log, machine, "--from", "1s", "--to", f"{alarm['time_s'] + 0.3:.3f}s")
+    part = detected(log, machine, "--set=from=1s", f"--set=to={alarm['time_s'] + 0.3:.3f}s")
     assert part["alarms"][0]["time_s"] == pytest.approx(alarm["time_s"], abs=0.002)
-    before = detected(log, machine, "--to", f"{1000 * alarm['time_s'] - 400:.0f} ms")
+    before = detected(log, machine, f"--set=to={1000 * alarm['time_s'] - 400:.0f} ms")
     assert before["verdict"] == "no alarm" and not before["alarms"]
 
 
@@ -60,17 +60,20 @@ def test_convert_cuts_by_the_distance_travelled_with_a_machine_file(log, machine
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("marks", "words"),
     [
-        (("--from", "3s", "--to", "2s"), "the end, 2 s, is not after the begin, 3 s"),
-        (("--to", "2"), "--to is '2' (give a number with its unit"),
-        (("--from", "99s"), "no sample from 99 s"),
-        (("--to", "1rad"), "1 rad of travel"),
+        ({"from": "3s", "to": "2s"}, "the end, 2 s, is not after the begin, 3 s"),
+        ({"to": "2"}, "give a number with its unit"),
+        ({"from": "99s"}, "no sample from 99 s"),
+        ({"to": "1rad"}, "1 rad of travel"),
     ],
 )
-def test_a_wrong_part_is_one_line(log, machine, tmp_path, arguments, words):
-    for command in (("detect", log, "-d", "gm", "--limit", "400"), ("convert", log, tmp_path / "x.csv")):
-        done = cdtool(*command, "-m", machine, *arguments)
+def test_a_wrong_part_is_one_line(log, machine, tmp_path, marks, words):
+    by_key = [f"--set={name}={mark}" for name, mark in marks.items()]
+    by_option = [f"--{name}={mark}" for name, mark in marks.items()]
+    detect = ("detect", log, "-d", "gm", "--set=threshold.limits=400", *by_key)
+    for command in (detect, ("convert", log, tmp_path / "x.csv", *by_option)):
+        done = cdtool(*command, "-m", machine)
         assert done.status == 2 and words in one_line(done.err) and "Traceback" not in done.err
     assert not (tmp_path / "x.csv").exists()
 
@@ -78,17 +81,9 @@ def test_a_wrong_part_is_one_line(log, machine, tmp_path, arguments, words):
 def test_a_signature_is_learned_from_what_is_before_the_contacts(gate_folder, machine, tmp_path):
     logs = [*sorted((gate_folder / "free").glob("*.csv")), gate_folder / "stiff" / "01.csv"]
     plain = cdtool("learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "a.json", "--json")
-    assert plain.status == 3 and "--guard" in one_line(plain.err)
-    guarded = cdtool(
-        "learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "b.json", "--json", "--guard", "0.2"
-    )
+    assert plain.status == 3 and "set learn.until" in one_line(plain.err)
+    part = ("--json", "--set=learn.until=onset")
+    guarded = cdtool("learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "b.json", *part)
     assert guarded.status == 0, guarded.err
     runs = [json.loads(done.out)["classes"][0]["runs"] for done in (plain, guarded)]
     assert runs[1] == runs[0] + 1
-    negative = cdtool("learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "c.json", "--guard", "-1")
-    assert negative.status == 2 and "guard is -1 s" in one_line(negative.err)
-
-
-def test_a_part_cannot_be_combined_with_a_benchmark_file(gate_folder, log):
-    done = cdtool("detect", log, "-b", gate_folder / "benchmark.toml", "-d", "gm", "--from", "1s")
-    assert done.status == 2 and "--from cannot be combined with --benchmark" in one_line(done.err)

@@ -137,8 +137,9 @@ def test_labels_in_ms_have_kinds_in_every_output_and_some_are_no_contacts(plain,
     again = cdtool("report", tmp_path / "new.json", "-o", tmp_path / "again.md")
     assert "stiff/head" in again.out and "stiff/head" in (tmp_path / "again.md").read_text(encoding="utf-8")
     shown = cdtool(
-        *("detect", tmp_path / "stiff" / "b.csv", "-m", tmp_path / "machine.toml", "-d", "pi", "--limit", "5"),
-        *("--labels", tmp_path / "labels.csv", "--labels-clock", "source"),
+        *("detect", tmp_path / "stiff" / "b.csv", "-m", tmp_path / "machine.toml", "-d", "pi"),
+        *("--set=threshold.limits=5", f"--set=onset.labels={tmp_path}/labels.csv", "--set=onset.labels_clock=source"),
     )
     assert shown.status in (0, 3) and "Traceback" not in shown.err
-    assert cdtool("detect", SAMPLES / "stiff" / "03.csv", "-b", file, "--labels-clock", "source").status == 2
+    wrong = cdtool("detect", tmp_path / "x.csv", "-b", SAMPLES / "benchmark.toml", "--set=onset.labels_clock=source")
+    assert wrong.status == 2 and "--set onset.labels_clock: is only for a label file" in wrong.err

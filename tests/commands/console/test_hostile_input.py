@@ -376,7 +376,8 @@ NUMBERS = ("99999999999999999999", "-99999999999999999999", "0", "-1", "nan", "1
 
 @pytest.mark.parametrize("value", NUMBERS, ids=lambda value: value[:24])
 def test_a_debounce_with_many_digits_is_one_line(value):
-    done = cdtool("detect", LOG, "-m", GATE / "machine.toml", "-d", "gm", "--limit", "40", "--debounce", value)
+    keys = ("--set=threshold.limits=40", f"--set=activation.debounce={value}")
+    done = cdtool("detect", LOG, "-m", GATE / "machine.toml", "-d", "gm", *keys)
     assert done.status == 2 and done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert "debounce" in done.err and len(done.err) <= LONGEST_LINE + 1 and "Traceback" not in done.err
 
@@ -410,7 +411,7 @@ def test_an_error_line_is_cut_at_300_characters_and_the_cut_is_marked(tmp_path):
 
 def test_left_out_lines_are_cut_as_well(tmp_path):
     logs = [written(tmp_path / f"{'n' * 200}{i}.csv", "") for i in range(2)]
-    arguments = ("-m", GATE / "machine.toml", "-d", "gm", "--limit", "40")
+    arguments = ("-m", GATE / "machine.toml", "-d", "gm", "--set=threshold.limits=40")
     done = cdtool("detect", LOG, *logs, *arguments)
     assert done.status == 3
     assert all(len(line) <= LONGEST_LINE for line in done.err.splitlines()), done.err
@@ -440,8 +441,8 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
         "--help",
         "detect --help",
         f"info {LOG}",
-        f"detect {LOG} -m {GATE}/machine.toml -d gm --limit 1000",
-        f"detect {LOG} -m {GATE}/machine.toml -d gm --limit 1000 --json",
+        f"detect {LOG} -m {GATE}/machine.toml -d gm --set threshold.limits=1000",
+        f"detect {LOG} -m {GATE}/machine.toml -d gm --set threshold.limits=1000 --json",
         "plan --difference-ms 5 --std-ms 3",
     ],
 )
@@ -481,7 +482,7 @@ def test_a_full_standard_output_is_one_line_and_status_2():
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii", "latin-1", "utf-8:strict"])
 def test_characters_that_the_terminal_does_not_have_are_replaced(tmp_path, encoding):
     log = written(tmp_path / "Ω ☃ é.csv", LOG.read_bytes())
-    detect = ("detect", log, "-m", GATE / "machine.toml", "-d", "gm", "--limit", 1000)
+    detect = ("detect", log, "-m", GATE / "machine.toml", "-d", "gm", "--set=threshold.limits=1000")
     with command_server(*IMPORTS, environment={"PYTHONIOENCODING": encoding}) as server:
         server.warm_up(*detect)
         for arguments in (("info", log), ("--help",), ("list", "detectors"), detect):
@@ -521,7 +522,7 @@ def test_missing_memory_is_one_line(tmp_path):
     )
     path = written(tmp_path / "m.toml", f'{machine}[channels]\ntime = {{ column = "t", unit = "ms" }}\n{columns}')
     done = subprocess.run(
-        [sys.executable, "-c", code, "detect", str(log), "-m", str(path), "-d", "gm", "--limit", "1"],
+        [sys.executable, "-c", code, "detect", str(log), "-m", str(path), "-d", "gm", "--set=threshold.limits=1"],
         capture_output=True,
         text=True,
         cwd=ROOT,

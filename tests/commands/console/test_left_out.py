@@ -70,7 +70,7 @@ def test_too_few_runs_say_why_the_first_was_left_out_in_full(gate_folder, tmp_pa
     given = (*logs, gate_folder / "free" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "pi")
     left_out, error = cdtool("learn-signature", *given, "-o", tmp_path / "pi.json").err.splitlines()[-2:]
     assert left_out.startswith("left out: ") and "0.csv: the load cell shows a contact of " in left_out
-    assert left_out.endswith("or detect --onset-above)") and len(left_out) <= 300
+    assert left_out.endswith("raise onset.above_n)") and len(left_out) <= 300
     assert "left out before: 3 runs (add runs; to learn from fewer, but at least 2: " in error
 
 

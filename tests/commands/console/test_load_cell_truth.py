@@ -12,7 +12,7 @@ import cdtool as api
 from cdtool.commands.compare.comparison import compare_builds
 from cdtool.results.files.results_file import read_results
 from cdtool.results.summary import summarise
-from tests.command import cdtool
+from tests.command import FEW, cdtool
 from tests.commands.console.changed_logs import SAMPLES, changed, folder_of
 from tests.synthetic.builds import build_results
 
@@ -75,9 +75,7 @@ def test_a_drifting_load_cell_shows_no_contact_in_runs_to_learn_from(tmp_path):
     for i in range(1, 4):
         changed(SAMPLES / "free" / f"0{i + 2}.csv", tmp_path / "free" / f"{i}.csv", drifting)
     logs = sorted((tmp_path / "free").glob("*.csv"))
-    done = cdtool(
-        "learn-signature", *logs, "-m", SAMPLES / "machine.toml", "-d", "gm", "--force", "-o", tmp_path / "s.json"
-    )
+    done = cdtool("learn-signature", *logs, "-m", SAMPLES / "machine.toml", "-d", "gm", FEW, "-o", tmp_path / "s.json")
     assert done.status == 0 and "shows a contact" not in done.err
 
 

@@ -70,7 +70,7 @@ def test_an_uncut_log_of_two_strokes_gets_a_hint_how_to_cut_it(tmp_path, more):
     file, log = benchmark_of(tmp_path, two_strokes(), more)
     scored, detected = cdtool("benchmark", file), cdtool("detect", log, "-b", file)
     for done in (scored, detected):
-        told = 'not assessable: cut it with operations = "motion" in the benchmark file, or detect --operations motion'
+        told = 'not assessable: cut it with operations = "motion"'
         assert (told in done.err) == (not more)
         assert done.err.count("cut it with") <= 1
     assert ("1 not assessable" in scored.out) == (not more)
@@ -115,7 +115,7 @@ def test_strokes_at_creep_speed_are_a_note_where_faster_ones_are_learned(tmp_pat
         angle = np.cumsum([row[2] for row in rows]) * 0.10472e-3
         lines = [",".join(f"{v:.9g}" for v in (k, *rows[k][1:3], angle[k], rows[k][4], 0.0)) for k in range(len(rows))]
         log.write_text("\n".join([",".join(COLUMNS), *lines]) + "\n", encoding="utf-8")
-    options = ("-m", tmp_path / "machine.toml", "-d", "feekf", "--operations", "motion")
+    options = ("-m", tmp_path / "machine.toml", "-d", "feekf", "--set=operations=motion")
     learned = cdtool("learn-signature", *logs, *options, "-o", tmp_path / "signature.json")
     assert learned.status == 0
     told = "friction_ekf: 5 strokes at creep speed not learned, and not assessed: runs forward at"

@@ -58,7 +58,7 @@ def test_a_file_of_this_version_causes_no_note_on_versions(gate_folder, feekf_si
 def test_an_older_signature_raises_the_same_alarms_as_a_new_one(gate_folder, signature, tmp_path):
     machine, log = ("-m", gate_folder / "machine.toml"), gate_folder / "stiff" / "01.csv"
     free = sorted((gate_folder / "free").glob("*.csv"))
-    steps = ("--set", "position_step=0.05", "--set", "position_window=0.1")
+    steps = ("--set=signature.position_step=0.05", "--set=signature.position_window=0.1")
     new = tmp_path / "new.json"
     learned = cdtool("learn-signature", *free, *machine, "-d", "pi", *steps, "-o", new)
     assert learned.status == 0, learned.err

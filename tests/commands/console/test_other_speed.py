@@ -49,9 +49,9 @@ def test_a_partly_matching_speed_is_named_with_and_without_an_alarm(at_speed, ga
     log = at_speed(0.5, range(4000, 6000))
     signature = tmp_path / "pi.json"
     free = sorted((gate_folder / "free").glob("*.csv"))
-    factor = ("--safety-factor", 0.5 if verdict == "alarm" else 50)
+    factor = f"--set=signature.safety_factor={0.5 if verdict == 'alarm' else 50}"
     machine = ("-m", gate_folder / "machine.toml")
-    done = cdtool("learn-signature", *free, *machine, "-d", "pi", *factor, "-o", signature)
+    done = cdtool("learn-signature", *free, *machine, "-d", "pi", factor, "-o", signature)
     assert done.status == 0, done.err
     (row,) = json.loads(cdtool("detect", log, *machine, "--signature", signature, "--json").out)
     assert row["verdict"] == verdict and 0.0 < row["not_judged"]["other speed"] < 0.5

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import cdtool
+from tests.command import FEW, cdtool
 
 TEXT = "x"
 
@@ -28,7 +28,7 @@ def folder(gate_folder: Path, tmp_path: Path) -> Path:
 
 def learn(folder: Path, output: Path):
     logs = sorted((folder / "free").glob("*.csv"))
-    return cdtool("learn-signature", *logs, "-m", folder / "machine.toml", "-d", "gm", "--force", "-o", output)
+    return cdtool("learn-signature", *logs, "-m", folder / "machine.toml", "-d", "gm", FEW, "-o", output)
 
 
 def bytes_of(folder: Path) -> dict[str, bytes]:
@@ -189,7 +189,7 @@ def test_force_never_overwrites_an_input(folder):
 def test_a_dead_link_is_refused_before_any_work(folder):
     (folder / "link.json").symlink_to("nowhere.json")
     for words in (("benchmark", folder / "benchmark.toml"), ("learn-signature", folder / "free" / "01.csv")):
-        more = ("-m", folder / "machine.toml", "-d", "gm", "--force") if words[0] == "learn-signature" else ()
+        more = ("-m", folder / "machine.toml", "-d", "gm", FEW) if words[0] == "learn-signature" else ()
         done = cdtool(*words, *more, "-o", folder / "link.json")
         assert done.status == 2 and "is a link to a missing file" in done.err and done.out == ""
     assert not (folder / "nowhere.json").exists()

@@ -27,6 +27,11 @@ back_to_n = 8.0
 """
 
 
+def own(seconds):
+    """Return the options of limits from the first seconds."""
+    return ("--set=threshold.name=baseline", f"--set=threshold.warm_up={seconds}")
+
+
 @pytest.mark.parametrize("learn", ["", '[learn]\nlogs = ["free/*.csv"]'])
 def test_a_benchmark_needs_no_runs_to_learn_from_and_ignores_them_for_the_limits(gate_folder, tmp_path, learn):
     file = gate_folder / f"own{bool(learn)}.toml"
@@ -63,21 +68,22 @@ def test_another_threshold_still_needs_runs(gate_folder):
 
 def test_detect_and_explain_use_the_first_seconds_with_warm_up(gate_folder):
     log, machine = gate_folder / "stiff" / "01.csv", gate_folder / "machine.toml"
-    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--warm-up", "0.8")
-    assert done.status == 0 and "baseline of the first 0.8 s in motion" in one_line(done.out)
-    why = cdtool("explain", log, "-m", machine, "-d", "gm", "--warm-up", "0.8")
+    done = cdtool("detect", log, "-m", machine, "-d", "gm", *own(0.8))
+    assert done.status == 0 and "threshold 'baseline', from each run itself" in one_line(done.out)
+    why = cdtool("explain", log, "-m", machine, "-d", "gm", *own(0.8))
     assert why.status == 0 and "the limits are those of the run's own first seconds" in one_line(why.out)
-    late = cdtool("detect", log, "-m", machine, "-d", "gm", "--warm-up", "60")
+    late = cdtool("detect", log, "-m", machine, "-d", "gm", *own(60))
     assert late.status == 3 and "not assessable" in late.out and "start-up 100 %" in one_line(late.out)
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--warm-up", "1"), "a warm-up requires a detector"),
-        (("--warm-up", "0", "-d", "gm"), "warm_up is 0"),
-        (("--warm-up", "1", "--limit", "40", "-d", "gm"), "one of --signature FILE, --limit VALUE, --warm-up SECONDS"),
-        (("-d", "gm"), "give a signature, a limit or a warm-up"),
+        (own(1), "no detector is given"),
+        ((*own(0), "-d", "gm"), "--set threshold.warm_up: is 0"),
+        ((*own(1), "--set=threshold.limits=40", "-d", "gm"), "--set threshold.limits: unknown key"),
+        (("-d", "gm"), "no threshold is given (give --signature FILE, or set threshold.limits"),
+        (("-d", "gm", "--set=threshold=cusum"), "--set threshold: 'cusum' is learned from impact-free runs"),
     ],
 )
 def test_a_wrong_combination_is_one_line(gate_folder, arguments, words):

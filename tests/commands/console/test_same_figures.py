@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from cdtool.commands.console.console import number
-from cdtool.commands.detecting import prepared_detector
+from cdtool.commands.detecting import prepared_benchmark
 from tests.command import cdtool
 
 SAMPLES = Path(__file__).parents[3] / "sample_logs"
@@ -43,7 +43,13 @@ mass_before_cell_kg = {mass}
 @pytest.fixture(autouse=True)
 def learn_once(monkeypatch):
     """Learn the threshold once per file and detector instead of in each command."""
-    monkeypatch.setattr(prepared_detector, "prepare_benchmark", cache(prepared_detector.prepare_benchmark))
+    anew = prepared_benchmark.prepare_benchmark
+    known = cache(anew)
+
+    def prepare(file, settings, **given):
+        return anew(file, settings=settings, **given) if settings else known(file, **given)
+
+    monkeypatch.setattr(prepared_benchmark, "prepare_benchmark", prepare)
 
 
 def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
@@ -90,13 +96,13 @@ def check(file: Path, detector: str) -> int:
     truth = rows_of(results["contacts"])
     assert truth
     paths = sorted({str(file.parent / log) for log, _ in truth})
-    detected = cdtool("detect", *paths, "--benchmark", file, "--detector", detector, "--json")
+    detected = cdtool("detect", *paths, "--benchmark", file, "--detectors", detector, "--json")
     items = json.loads(detected.out)
     assert rows_of([row for item in items for row in item["contacts"]]) == truth
-    shown = cdtool("detect", *paths, "--benchmark", file, "--detector", detector).out
+    shown = cdtool("detect", *paths, "--benchmark", file, "--detectors", detector).out
     false = {}
     for path in paths:
-        values = json.loads(cdtool("explain", path, "--benchmark", file, "--detector", detector, "--json").out)
+        values = json.loads(cdtool("explain", path, "--benchmark", file, "--detectors", detector, "--json").out)
         own = rows_of(values["contacts"])
         assert own and all(truth[key] == row for key, row in own.items())
         alarms = {item["time_s"]: item for item in values["alarms"] if item["role"] == "detection"}
@@ -133,8 +139,8 @@ def test_with_every_relevant_setting_changed_from_its_default(sample, detector, 
     assert check(benchmark_with_other_settings(tmp_path, sample), detector) >= 6
 
 
-def test_individual_options_give_the_results_of_the_file(tmp_path):
-    """The results of `detect` with individual options and with the file are the same: levels, limit, latency."""
+def test_single_keys_give_the_results_of_the_file(tmp_path):
+    """The results of `detect` with --set and with the file are the same: levels, limit, latency."""
     log, machine = SAMPLES / "gate" / "soft" / "03.csv", SAMPLES / "gate" / "machine.toml"
     file = tmp_path / "benchmark.toml"
     file.write_text(
@@ -144,48 +150,51 @@ def test_individual_options_give_the_results_of_the_file(tmp_path):
         "[force]\nmass_before_cell_kg = 10.0\n",
         encoding="utf-8",
     )
-    options = ("--window", 0.7, "--onset-above", 25, "--onset-back-to", 5, "--onset-hold", 0.004)
-    options += ("--onset-separation", 0.8, "--synchronisation", 0.003, "--mass-before-cell", 10)
+    keys = ("threshold.limits=1.2", "window_s=0.7", "onset.above_n=25", "onset.back_to_n=5", "onset.hold_s=0.004")
+    keys += ("onset.separation_s=0.8", "onset.synchronisation_s=0.003", "force.mass_before_cell_kg=10")
+    options = [f"--set={key}" for key in keys]
     by_file = json.loads(cdtool("benchmark", file, "--json").out)["contacts"]
     for command in ("detect", "explain"):
-        by_hand = json.loads(cdtool(command, log, "-m", machine, "-d", "pi", "--limit", 1.2, *options, "--json").out)
+        by_hand = json.loads(cdtool(command, log, "-m", machine, "-d", "pi", *options, "--json").out)
         rows = by_hand[0]["contacts"] if command == "detect" else by_hand["contacts"]
         assert list(rows_of(rows).values()) == list(rows_of(by_file).values())
 
 
-@pytest.mark.parametrize("command", ["detect", "explain"])
 @pytest.mark.parametrize(
-    "option",
+    ("options", "words"),
     [
-        ("--machine", "m.toml"),
-        ("--operations", "whole"),
-        ("--limit", "3"),
-        ("--debounce", 3),
-        ("--no-latch",),
-        ("--onset-above", 3),
-        ("--onset-hold", 0),
-        ("--onset-sigmas", 5),
-        ("--labels", "l.csv"),
-        ("--window", 1),
-        ("--mass-before-cell", 0),
+        (("-m", "m.toml"), "a machine file cannot be combined with a benchmark file"),
+        (("--set=from=1s",), "--set from: unknown key"),
+        (("-s", "s.json", "--set=threshold=limit"), "--set threshold: cannot be combined with a signature"),
+        (("-s", "s.json", "--set=signature.rule=thesis"), "--set signature: cannot be combined with a signature"),
     ],
 )
-def test_a_setting_together_with_the_benchmark_file_is_refused(command, option):
-    file = SAMPLES / "gate" / "benchmark.toml"
-    done = cdtool(command, SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, *option)
-    assert done.status == 2
-    assert done.err.startswith(
-        f"error: {'--latch' if option[0] == '--no-latch' else option[0]} cannot be combined with"
-    )
+def test_what_a_benchmark_file_or_a_signature_has_of_its_own_is_refused(options, words):
+    gate = SAMPLES / "gate"
+    done = cdtool("detect", gate / "stiff" / "03.csv", "-b", gate / "benchmark.toml", "-d", "gm", *options)
+    assert done.status == 2 and done.err.startswith(f"error: {words}"), done.err
+
+
+def test_a_key_takes_the_place_of_that_of_the_file(tmp_path):
+    gate, debounce = SAMPLES / "gate", "--set=activation.debounce=1"
+    rows = {}
+    for options in ((), (debounce,)):
+        done = cdtool("benchmark", gate / "benchmark.toml", "-d", "pi", *options, "--json")
+        found = cdtool("detect", gate / "soft/03.csv", "-b", gate / "benchmark.toml", "-d", "pi", *options, "--json")
+        truth = rows_of(json.loads(done.out)["contacts"])
+        ((key, row),) = rows_of(json.loads(found.out)[0]["contacts"]).items()
+        assert truth["soft/03.csv", key[1]] == row
+        rows[options] = row["latency_ms"]
+    assert rows[(debounce,)] < rows[()]
 
 
 def test_a_detector_is_required_if_the_file_has_several():
     file = SAMPLES / "gate" / "benchmark.toml"
     done = cdtool("explain", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file)
-    assert done.status == 2 and "names 5 detectors (give --detector, one of pure_inertia" in done.err
+    assert done.status == 2 and "names 5 detectors (give --detectors, one of pure_inertia" in done.err
     done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file, "-d", "vo")
     assert done.status == 2 and "does not name detector 'vo'" in done.err
-    done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "-d", "pi", "--limit", 3)
+    done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "-d", "pi")
     assert done.status == 2 and "no machine file is given (give --machine FILE or --benchmark FILE)" in done.err
 
 

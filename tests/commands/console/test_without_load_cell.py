@@ -12,7 +12,7 @@ import cdtool as api
 from cdtool.base.errors import SignatureError
 from cdtool.formats.mcap.write import Stream, write_mcap
 from tests.base.findings.facts import fact_of
-from tests.command import cdtool
+from tests.command import FEW, cdtool
 
 CELL = "load_cell"
 
@@ -49,7 +49,7 @@ def benchmark_of(folder: Path, gate_folder: Path, *impacts: Path) -> Path:
 def test_a_signature_is_learned_with_a_note_that_contacts_cannot_be_checked(bare, gate_folder, tmp_path):
     logs = sorted((bare / "free").glob("*.csv"))
     done = cdtool(
-        "learn-signature", *logs, "-m", gate_folder / "machine.toml", "-d", "gm", "--force", "-o", tmp_path / "s.json"
+        "learn-signature", *logs, "-m", gate_folder / "machine.toml", "-d", "gm", FEW, "-o", tmp_path / "s.json"
     )
     assert done.status == 0, done.err
     told = [line for line in done.err.splitlines() if CELL in line]
@@ -92,7 +92,8 @@ def test_an_impact_log_without_it_is_left_out_with_the_column_that_is_missing(ba
 
 
 def test_detect_shows_the_alarm_and_says_why_it_has_no_latency(bare, gate_folder):
-    done = cdtool("detect", bare / "stiff" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    limit = ("-d", "gm", "--set=threshold.limits=400")
+    done = cdtool("detect", bare / "stiff" / "01.csv", "-m", gate_folder / "machine.toml", *limit)
     assert done.status == 0, done.err
     (row,) = [line for line in done.out.splitlines() if " alarm " in line]
     assert row.rstrip().endswith("-  force is not in this log")
@@ -114,7 +115,9 @@ def test_a_repeated_column_is_not_reported_as_missing(gate_folder, tmp_path):
     lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
     twice = [f"{line},{line.split(',')[lines[0].split(',').index(CELL)]}" for line in lines]
     (tmp_path / "twice.csv").write_text("\n".join(twice) + "\n", encoding="utf-8")
-    done = cdtool("detect", tmp_path / "twice.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
+    done = cdtool(
+        "detect", tmp_path / "twice.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400"
+    )
     assert done.status == 2 and "2 columns have the name" in done.err
 
 

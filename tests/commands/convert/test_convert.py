@@ -17,7 +17,7 @@ def test_a_converted_log_is_read_with_its_new_machine_file(tmp_path):
     out = tmp_path / "run.mcap"
     done = cdtool("convert", LOGS / "gate/stiff/03.csv", out, "-m", machine)
     assert done.status == 0 and "7 columns on 1 clock" in done.out
-    arguments = ("-d", "gm", "--limit", 400, "--json")
+    arguments = ("-d", "gm", "--set=threshold.limits=400", "--json")
     before = cdtool("detect", LOGS / "gate/stiff/03.csv", "-m", machine, *arguments)
     after = cdtool("detect", out, "-m", f"{out}.machine.toml", *arguments)
     assert before.status == after.status == 0

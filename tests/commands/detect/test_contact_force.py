@@ -96,9 +96,11 @@ def test_an_invalid_point_is_refused(text):
 def test_detect_shows_the_force_with_its_alarms(tmp_path):
     simulate_arm(tmp_path / "logs", {"free": 1, "holdout": 0, "stiff": 1, "soft": 0}, seed=1)
     command = ("detect", tmp_path / "logs/stiff/01.csv", "-m", tmp_path / "logs/machine.toml", "-d", "gm")
-    done = cdtool(*command, "--limit", "6,inf", "--contact-at", "arm:0.28,0,0")
+    done = cdtool(*command, "--set=threshold.limits=6,inf", "--contact-at", "arm:0.28,0,0")
     assert done.status == 0 and "estimated force at arm (0.28, 0, 0) m" in done.out
-    values = json.loads(cdtool(*command, "--limit", "6,inf", "--contact-at", "arm:0.28,0,0", "--json").out)[0]
+    values = json.loads(cdtool(*command, "--set=threshold.limits=6,inf", "--contact-at", "arm:0.28,0,0", "--json").out)[
+        0
+    ]
     estimate = values["estimated_force"]
     assert estimate["link"] == "arm" and estimate["point_m"] == [0.28, 0.0, 0.0]
     # The load cell's peak, plus what the joint's dry friction, unknown to the machine file, adds at this lever.

@@ -17,6 +17,8 @@ from tests.command import Outcome, cdtool, one_line
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 
+LIMIT = "--set=threshold.limits="
+
 
 @pytest.fixture
 def explain(gate_folder: Path) -> Callable[..., Outcome]:
@@ -65,7 +67,7 @@ def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_move
 
 
 def test_a_missed_contact_is_explained_with_its_closest_approach(explain):
-    done = explain("soft/02.csv", "-d", "pi", "--limit", "30")
+    done = explain("soft/02.csv", "-d", "pi", "--set=threshold.limits=30")
     told = " ".join(done.out.split())
     assert done.status == 0
     assert "missed: no alarm within 1000 ms" in told
@@ -75,7 +77,7 @@ def test_a_missed_contact_is_explained_with_its_closest_approach(explain):
 
 
 def test_a_low_limit_gives_a_false_alarm_that_points_to_the_command(explain):
-    done = explain("holdout/01.csv", "-d", "gm", "--limit", "100")
+    done = explain("holdout/01.csv", "-d", "gm", "--set=threshold.limits=100")
     told = " ".join(done.out.split())
     assert done.status == 0
     assert "false alarm at" in told and "no contact belongs to it" in told
@@ -90,7 +92,7 @@ def test_a_log_without_events_states_that_there_is_nothing_to_explain(explain, f
 
 
 def test_the_json_is_strict_and_contains_every_number(explain):
-    done = explain("soft/01.csv", "-d", "pi", "--limit", "30", "--json")
+    done = explain("soft/01.csv", "-d", "pi", "--set=threshold.limits=30", "--json")
     values = json.loads(done.out, parse_constant=lambda name: pytest.fail(name))
     (missed,) = values["missed"]
     assert values["alarms"] == [] and values["verdicts"][0]["verdict"] == "no alarm"
@@ -123,7 +125,7 @@ def test_a_spike_is_named_on_screen_and_in_the_json(explain, gate_folder, feekf_
         cells[speed] = f"{float(cells[speed]) - 900.0:.6g}"
         rows[k] = ",".join(cells)
     log.write_text("\n".join((head, *rows)) + "\n")
-    arguments = ("spike.csv", "-s", feekf_signature, "--debounce", "2")
+    arguments = ("spike.csv", "-s", feekf_signature, "--set=activation.debounce=2")
     (alarm, *_) = json.loads(explain(*arguments, "--json").out)["alarms"]
     (found,) = alarm["glitches"]
     assert (found["kind"], found["channel"], found["joint"], found["samples"]) == ("spike", "speed", "gate", 6)
@@ -154,14 +156,15 @@ def test_the_alarm_in_the_json_is_that_of_detect(explain, feekf_signature, gate_
 
 def test_the_given_debounce_is_the_one_shown(explain):
     for debounce in (1, 4):
-        done = explain("stiff/01.csv", "-d", "gm", "--limit", "250", "--debounce", debounce, "--json")
+        keys = ("--set=threshold.limits=250", f"--set=activation.debounce={debounce}")
+        done = explain("stiff/01.csv", "-d", "gm", *keys, "--json")
         (alarm,) = json.loads(done.out)["alarms"]
         assert alarm["debounce_samples"] == debounce
         assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(1e-3 * (debounce - 1))
 
 
 def test_a_folder_gets_a_figure_of_every_event(explain, tmp_path):
-    done = explain("stiff/01.csv", "-d", "gm", "--limit", "100", "--plot", tmp_path)
+    done = explain("stiff/01.csv", "-d", "gm", "--set=threshold.limits=100", "--plot", tmp_path)
     events = done.out.count(", momentum: ")
     assert events >= 2
     assert [path.name for path in sorted(tmp_path.iterdir())] == [f"{i:03d}_01.png" for i in range(1, events + 1)]
@@ -169,7 +172,8 @@ def test_a_folder_gets_a_figure_of_every_event(explain, tmp_path):
 
 def test_an_arm_is_explained_joint_by_joint():
     arm = GATE.parent / "arm" / "trial_1"
-    done = cdtool("explain", arm / "stiff" / "01.csv", "-m", arm / "machine.toml", "-d", "gm", "--limit", "4", "--json")
+    command = ("explain", arm / "stiff" / "01.csv", "-m", arm / "machine.toml", "-d", "gm")
+    done = cdtool(*command, "--set=threshold.limits=4", "--json")
     (alarm,) = json.loads(done.out)["alarms"]
     assert alarm["joint"] == "arm" and {item["joint"] for item in alarm["moved"]} == {"arm"}
     assert alarm["moved"][0]["channel"] == "acceleration"
@@ -179,23 +183,24 @@ def test_an_arm_is_explained_joint_by_joint():
 @pytest.mark.parametrize(
     ("log", "arguments", "words"),
     [
-        ("stiff/01.csv", ("--limit", "250"), ("a limit requires a detector",)),
-        ("stiff/01.csv", ("-d", "gm"), ("a signature, a limit or a warm-up",)),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "many"), ("--limit", "many")),
-        ("stiff/01.csv", ("-d", "gmm", "--limit", "3"), ("gmm", "did you mean gm")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--plot", "why.gif"), ("why.gif", ".svg")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--debounce", "0"), ("debounce", "at least 1")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--joints", "elbow"), ("elbow", "gate")),
-        ("stiff/none.csv", ("-d", "gm", "--limit", "3"), ("none.csv", "no such file")),
+        ("stiff/01.csv", f"{LIMIT}250", ("no detector is given",)),
+        ("stiff/01.csv", "-d gm", ("no threshold is given",)),
+        ("stiff/01.csv", f"-d gm,pi {LIMIT}3", ("give one name",)),
+        ("stiff/01.csv", f"-d gm {LIMIT}many", ("--set threshold.limits: is 'many'",)),
+        ("stiff/01.csv", f"-d gmm {LIMIT}3", ("gmm", "did you mean gm")),
+        ("stiff/01.csv", f"-d gm {LIMIT}3 --plot why.gif", ("why.gif", ".svg")),
+        ("stiff/01.csv", f"-d gm {LIMIT}3 --set=activation.debounce=0", ("activation.debounce", "from 1 to 1e+09")),
+        ("stiff/01.csv", f"-d gm {LIMIT}3 --set=joints=elbow", ("elbow", "gate")),
+        ("stiff/none.csv", f"-d gm {LIMIT}3", ("none.csv", "no such file")),
         # The figure's folder is checked before the log.
-        ("stiff/none.csv", ("-d", "gm", "--limit", "3", "--plot", "absent/why.png"), ("no folder absent", "create")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "inf"), ("--limit is 'inf'", "no joint is monitored")),
-        ("stiff/01.csv", ("-d", "gm", "--limit", "inf,inf"), ("--limit is 'inf,inf'", "no joint is monitored")),
-        ("machine.toml", ("-d", "gm", "--limit", "3"), ("machine.toml",)),
+        ("stiff/none.csv", f"-d gm {LIMIT}3 --plot absent/why.png", ("no folder absent", "create")),
+        ("stiff/01.csv", f"-d gm {LIMIT}inf", ("--set threshold: limits are [inf", "no joint is monitored")),
+        ("stiff/01.csv", f"-d gm {LIMIT}inf,inf", ("--set threshold: limits are [inf", "no joint is monitored")),
+        ("machine.toml", f"-d gm {LIMIT}3", ("machine.toml",)),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(explain, log, arguments, words):
-    done = explain(log, *arguments)
+    done = explain(log, *arguments.split())
     assert done.status == 2 and done.out == ""
     assert done.err.startswith("error: ") and done.err.count("\n") == 1, done.err
     assert all(word in done.err for word in words), done.err
@@ -211,7 +216,7 @@ def test_a_partly_lost_log_is_explained_with_status_3(gate_folder, feekf_signatu
 def test_names_from_files_cannot_control_the_terminal(explain, gate_folder, tmp_path):
     evil = tmp_path / "a\x1b[2Jb\u202ec.csv"
     evil.write_bytes((gate_folder / "stiff" / "01.csv").read_bytes())
-    done = cdtool("explain", evil, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", "250")
+    done = cdtool("explain", evil, "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=250")
     assert done.status == 0 and "\x1b" not in done.out and "\u202e" not in done.out
 
 

@@ -57,7 +57,7 @@ def test_values_not_in_the_log_are_marked_placeholders(tmp_path):
         assert "CHECK" in text[at] or (text[at - 1].startswith("#") and "CHECK" in "".join(text[at - 2 : at]))
     mapped = [i for i, line in enumerate(text) if " = {" in line and not line.startswith("#")]
     assert all("guessed" in text[i] or text[i - 1].startswith("#") for i in mapped)
-    done = cdtool("detect", LOGS / "gate/stiff/03.csv", "-m", path, "-d", "gm", "--limit", 400)
+    done = cdtool("detect", LOGS / "gate/stiff/03.csv", "-m", path, "-d", "gm", "--set=threshold.limits=400")
     assert done.status == 2 and "needs the inertia" in done.err
 
 

@@ -94,7 +94,7 @@ def test_without_ground_truth_it_writes_a_label_file_to_fill_in(gate, tmp_path):
     assert done.status == 0 and "fill in" in done.out and "protocol init" not in done.out
     rows = (tmp_path / "study" / "labels.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0] == "recording,start_s,end_s,uncertainty_s" and len(rows) == 1 + len(logs)
-    found = api.detect(logs, gate / "machine.toml", detector="gm", limit=[400])
+    found = api.detect(logs, gate / "machine.toml", detector="gm", settings={"threshold.limits": 400})
     contacts = {log.name: each.detected.contacts[0] for log, each in zip(logs, found, strict=True)}
     filled = [rows[0], *(f"{row[:-3]},{contacts[row[:-3].rpartition('/')[2]].start},6.9," for row in rows[1:])]
     (tmp_path / "study" / "labels.csv").write_text("\n".join(filled), encoding="utf-8")

@@ -17,8 +17,8 @@ from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import RunCut
 from cdtool.results.files.results_file import to_json
 from cdtool.truth.synchronisation import latency
+from tests.command import FEW, one_line
 from tests.command import cdtool as command
-from tests.command import one_line
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 RUNS = ("free/03", "free/04", "holdout/03", "stiff/03", "soft/03")
@@ -78,7 +78,7 @@ def separate(folder) -> cdtool.BenchmarkResult:
 
 @pytest.fixture(scope="module")
 def together(folder) -> Path:
-    return benchmark_file(folder, "together", '[operations]\nby = "column:run_id"', "all.csv#{}")
+    return benchmark_file(folder, "together", 'operations = "column:run_id"', "all.csv#{}")
 
 
 def figures(results) -> list[dict]:
@@ -90,10 +90,8 @@ def figures(results) -> list[dict]:
     ]
 
 
-@pytest.mark.parametrize("operations", ['operations = "column:run_id"', '[operations]\nby = "label:run_id"'])
+@pytest.mark.parametrize("operations", ['operations = "column:run_id"', 'operations = "label:run_id"'])
 def test_a_benchmark_of_runs_has_the_results_of_separate_files(folder, separate, operations):
-    if operations.startswith("["):  # a table in TOML ends the keys above it
-        assert "by" in operations
     done = cdtool.benchmark(benchmark_file(folder, "cut", operations, "all.csv#{}"))
     assert figures(done.results) == figures(separate.results)
     assert [(row.group, row.recordings, row.operations, row.hours) for row in done.results.exposure] == [
@@ -143,10 +141,10 @@ def test_a_run_that_is_named_twice_is_learned_from_once(folder, together):
 
 def test_a_run_without_its_cut_and_a_folder_for_plots_are_understood(folder, tmp_path):
     log = f"{folder / 'all.csv'}#stiff_03"
-    options = ("-m", folder / "machine.toml", "-d", "gm", "--limit", "400")
+    options = ("-m", folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
     refused = command("detect", log, *options)
-    assert refused.status == 2 and "state how it is cut, as detect --operations column:NAME" in one_line(refused.err)
-    drawn = command("detect", log, *options, "--operations", "column:run_id", "--plot", tmp_path / "plots")
+    assert refused.status == 2 and "state how it is cut, as operations=column:NAME" in one_line(refused.err)
+    drawn = command("detect", log, *options, "--set=operations=column:run_id", "--plot", tmp_path / "plots")
     assert drawn.status == 0 and len(list((tmp_path / "plots").iterdir())) == 1
 
 
@@ -202,18 +200,19 @@ def test_triggers_name_runs_even_one_with_the_id_zero(tmp_path):
     reasons = {item.recording: item.reason for item in results.skipped}
     assert "no such run" in reasons["all.csv#7"] and "cut into runs" in reasons["all.csv"]
     assert "t: 1 of 2 recordings without a row" in next(item.reason for item in results.findings)
-    listed = cdtool.score(triggers, tmp_path / "b.toml", listed_only=True).evaluated.results
+    listed = cdtool.score(triggers, tmp_path / "b.toml", settings={"triggers.listed_only": True}).evaluated.results
     assert [row.recording for row in listed.recordings] == ["all.csv#0"]
 
 
 def test_detect_and_explain_show_each_run_by_name(folder):
-    options = ("-m", folder / "machine.toml", "-d", "gm", "--limit", "400", "--operations", "column:run_id")
+    limit = ("-m", folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
+    options = (*limit, "--set=operations=column:run_id")
     shown = command("detect", folder / "all.csv", *options, "--json")
     found = json.loads(shown.out)
     assert [(Path(item["log"]).name, item["verdict"]) for item in found] == [
         (f"all.csv#{key}", "alarm" if key.startswith(("stiff", "soft")) else "no alarm") for key in IDS
     ]
-    alone = json.loads(command("detect", folder / "stiff_03.csv", *options[:-2], "--json").out)
+    alone = json.loads(command("detect", folder / "stiff_03.csv", *limit, "--json").out)
     assert [item["alarms"] for item in found if item["log"].endswith("#stiff_03")] == [alone[0]["alarms"]]
     explained = json.loads(command("explain", f"{folder / 'all.csv'}#s*", *options, "--json").out)
     assert [Path(item["log"]).name for item in explained] == ["all.csv#stiff_03", "all.csv#soft_03"]
@@ -222,27 +221,26 @@ def test_detect_and_explain_show_each_run_by_name(folder):
 
 
 def test_one_call_for_one_recording_refuses_several_runs(folder):
-    settings = {"detector": "gm", "limit": [400.0], "operations": "column:run_id"}
+    given = {"detector": "gm", "settings": {"threshold.limits": 400, "operations": "column:run_id"}}
+    log, machine = folder / "all.csv", folder / "machine.toml"
     with pytest.raises(UsageError, match="has 5 runs"):
-        cdtool.detect(folder / "all.csv", folder / "machine.toml", **settings)
-    assert len(cdtool.explain(folder / "all.csv", folder / "machine.toml", **settings).runs) == 5
-    assert cdtool.detect(f"{folder}/all.csv#stiff_03", folder / "machine.toml", **settings).recording.name.endswith(
-        "#stiff_03"
-    )
-    assert len(cdtool.detect([folder / "all.csv"], folder / "machine.toml", **settings)) == 5
+        cdtool.detect(log, machine, **given)
+    assert len(cdtool.explain(log, machine, **given).runs) == 5
+    assert cdtool.detect(f"{log}#stiff_03", machine, **given).recording.name.endswith("#stiff_03")
+    assert len(cdtool.detect([log], machine, **given)) == 5
 
 
 def test_a_signature_learned_from_runs_knows_these_runs(folder, tmp_path):
     signature = tmp_path / "gate.json"
     learned = command(
         "learn-signature", f"{folder / 'all.csv'}#free_*", "-m", folder / "machine.toml", "-d", "gm",
-        "--operations", "column:run_id", "--force", "-o", signature,
+        "--set=operations=column:run_id", FEW, "-o", signature,
     )  # fmt: skip
     assert learned.status == 0, learned.err
     runs = json.loads(signature.read_text())["runs"]
     assert [Path(run["name"]).name for run in runs] == ["all.csv#free_03", "all.csv#free_04"]
     shown = command(
-        "detect", folder / "all.csv", "-m", folder / "machine.toml", "-s", signature, "--operations", "column:run_id"
+        "detect", folder / "all.csv", "-m", folder / "machine.toml", "-s", signature, "--set=operations=column:run_id"
     )
     assert "free_04: the signature was learned from this log" in one_line(shown.err)
     assert "holdout_03: the signature was learned" not in one_line(shown.err)
@@ -265,10 +263,9 @@ def test_a_benchmark_file_detects_and_explains_a_run_with_the_window_of_its_grou
     ("operations", "words"),
     [
         ('operations = "columns:x"', r"operations: is 'columns:x'"),
-        ("[operations]\nby = 3", r"operations\.by: is 3"),
-        ('[operations]\nby = "column:"', r"operations\.by: is 'column:' \(write column:NAME"),
-        ('[operations]\nby = "motion"\nthen = 1', r"unknown key|then"),
-        ("[operations]", r"operations\.by: is missing"),
+        ("operations = 3", r"operations: is 3"),
+        ('operations = "column:"', r"operations: is 'column:' \(write column:NAME"),
+        ('[operations]\nby = "motion"', r"operations: is a table"),
     ],
 )
 def test_a_wrong_cut_names_the_key(folder, operations, words):
@@ -361,7 +358,7 @@ def test_a_load_cell_in_a_file_of_its_own_cannot_be_divided_into_runs(folder):
     path = changed(folder, "own_cell", 'operations = "column:run_id"', "all.csv#{}", ("machine.toml", "own.toml"))
     with pytest.raises(ConfigurationError, match="operations: cannot divide a channel that is in a file of its own"):
         cdtool.benchmark(path)
-    arguments = ("-m", folder / "own.toml", "--operations", "column:run_id", "-d", "gm", "--limit", "200")
+    arguments = ("-m", folder / "own.toml", "--set=operations=column:run_id", "-d", "gm", "--set=threshold.limits=200")
     done = command("detect", f"{folder / 'all.csv'}#stiff_03", *arguments)
     assert done.status == 2 and "cannot be divided into the runs of" in one_line(done.err)
 

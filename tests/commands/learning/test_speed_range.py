@@ -30,12 +30,16 @@ def door(tmp_path_factory) -> Path:
 
 def learn(door: Path, *names: str, rule: Signature = RULE, **options):
     logs = [door / f"{name}.csv" for name in names]
-    return cdtool.learn_signature(logs, door / "machine.toml", "gm", rule=rule, operations="motion", **options)
+    return cdtool.learn_signature(
+        logs, door / "machine.toml", "gm", rule=rule, settings={"operations": "motion"}, **options
+    )
 
 
 def outcomes(door: Path, name: str, learned) -> list[str]:
     write_signature(door / "s.json", learned.signature)
-    found = cdtool.detect(door / f"{name}.csv", door / "machine.toml", signature=door / "s.json", operations="motion")
+    found = cdtool.detect(
+        door / f"{name}.csv", door / "machine.toml", signature=door / "s.json", settings={"operations": "motion"}
+    )
     return [item.verdict.outcome for item in found.detections]
 
 

@@ -10,7 +10,6 @@ import pytest
 import cdtool
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import ConfigurationError, UsageError
-from cdtool.commands.learning.threshold_settings import rule_of
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.formats.signature_store import write_signature
 from cdtool.thresholds import THRESHOLDS
@@ -21,6 +20,7 @@ from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
 from tests.synthetic.door import MACHINE, write_log
 
+MOTION = {"operations": "motion"}
 HEAD = 'machine = "machine.toml"\ndetectors = ["gm"]\noperations = "motion"\n'
 LOGS = '[learn]\nlogs = ["free.csv"]\n[impacts.push]\nlogs = ["hits.csv"]\n[holdout]\nlogs = ["quiet.csv"]\n'
 
@@ -124,7 +124,7 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
         ('[threshold]\nname = "cusum"\ndrfit = 1\n', "threshold.drfit: unknown key.*did you mean drift"),
         ('[threshold]\nname = "cusum"\ndrift = "1"\n', "threshold.drift: is '1'.*a number"),
         ('[threshold]\nname = "cusum"\norder = 2.5\n', "threshold.order: is 2.5.*whole number"),
-        ('[threshold]\nname = "cusum"\norder = 99\n', "threshold.order: is 99.*of at most 20"),
+        ('[threshold]\nname = "cusum"\norder = 99\n', "threshold.order: is 99.*from 1 to 20"),
         ('[threshold]\nname = "cusum"\nsignature = "x"\n', "threshold.signature: unknown key"),
         ('[threshold]\nname = "glr"\nwindows = [0.5]\n', "threshold.windows.1.: is 0.5.*whole number"),
         ('[threshold]\nname = "signature"\nsafety_factor = 3\n', r"threshold.safety_factor.*\[signature\]"),
@@ -167,12 +167,13 @@ class InnovationOfAnyOrder(Innovation):
         """Accept every order."""
 
 
-def test_a_number_may_be_given_where_none_is_the_default(monkeypatch):
+def test_a_number_may_be_given_where_none_is_the_default(monkeypatch, door):
     monkeypatch.setitem(THRESHOLDS.table, "innovation", f"{__name__}:InnovationOfAnyOrder")
-    rule = rule_of("innovation", ["order=10"], {}, "one")
+    file = written(door, '[threshold]\nname = "innovation"\n')
+    rule = read_benchmark_file(file, settings={"threshold.order": 10}).rule
     assert isinstance(rule, InnovationOfAnyOrder) and rule.order == 10
-    with pytest.raises(ConfigurationError, match="order: is 'ten'"):
-        rule_of("innovation", ["order=ten"], {}, "one")
+    with pytest.raises(ConfigurationError, match=r"--set threshold\.order: is 'ten'"):
+        read_benchmark_file(file, settings={"threshold.order": "ten"})
 
 
 def test_a_signature_may_follow_its_runs(door):
@@ -202,14 +203,14 @@ def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_bud
         door / "machine.toml",
         "gm",
         rule=Cusum(signature=Signature(force=True)),
-        operations="motion",
+        settings=MOTION,
         false_alarm_budget="1/8op",
     ).signature
     assert [item.safety_factor for item in learned.current] == [wanted.safety_factor] * 2
     assert (learned.origin.by, learned.origin.budget) == ("budget", "1/8op")
     assert (learned.origin.operations, learned.origin.alarms) == (wanted.operations, wanted.alarms)
     write_signature(tmp_path / "s.json", learned)
-    found = cdtool.detect(door / "hits.csv", door / "machine.toml", signature=tmp_path / "s.json", operations="motion")
+    found = cdtool.detect(door / "hits.csv", door / "machine.toml", signature=tmp_path / "s.json", settings=MOTION)
     assert [found.detections[i].verdict.outcome for i in (1, 2, 5)] == ["alarm"] * 3
     assert found.detected.threshold.endswith(f"set for 1/8op on 24 operations, {wanted.alarms} alarms")
 
@@ -217,10 +218,10 @@ def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_bud
 def test_a_factor_set_by_hand_is_refused_with_a_budget_and_shown_without(door):
     machine, logs = door / "machine.toml", [door / "free.csv"]
     with pytest.raises(UsageError, match="set by hand cannot be combined with a false-alarm budget 1/8op"):
-        cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion", false_alarm_budget="1/8op")
-    by_hand = cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), operations="motion").signature
+        cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), settings=MOTION, false_alarm_budget="1/8op")
+    by_hand = cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), settings=MOTION).signature
     assert by_hand.described == "limit, safety factor 9 set by hand"
-    limits = cdtool.learn_signature(logs, machine, "gm", rule=Limit(limits=(50.0,)), operations="motion").signature
+    limits = cdtool.learn_signature(logs, machine, "gm", rule=Limit(limits=(50.0,)), settings=MOTION).signature
     assert limits.described == "limit 50 N set by hand"
-    plain = cdtool.learn_signature(logs, machine, "gm", rule=Limit(), operations="motion").signature
+    plain = cdtool.learn_signature(logs, machine, "gm", rule=Limit(), settings=MOTION).signature
     assert plain.described == "limit, safety factor 5.5 by default"

@@ -22,7 +22,7 @@ import cdtool
 result = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
 figures = [getattr(result.plot, name)() for name in ("latency", "survival", "amoc", "triggers")]
 figures.append(cdtool.detect("sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml", detector="gm",
-    limit=[400.0]).plot())
+    settings={"threshold.limits": 400.0}).plot())
 assert all(figure._repr_png_()[0].startswith(b"\\x89PNG") for figure in figures)
 print("matplotlib.pyplot" in sys.modules)
 """
@@ -78,7 +78,7 @@ def test_the_triggers_of_a_recording_are_found_by_any_ending_of_one(result):
 
 
 def test_a_detection_is_drawn_as_by_the_command():
-    found = cdtool.detect(LOG, MACHINE, detector="gm", limit=[400.0])
+    found = cdtool.detect(LOG, MACHINE, detector="gm", settings={"threshold.limits": 400.0})
     figure = found.plot()
     assert isinstance(figure, Figure) and figure._repr_png_()[0].startswith(PNG)
     assert "03.csv" in figure.description

@@ -28,7 +28,7 @@ def result():
 
 @pytest.fixture(scope="module")
 def found():
-    return cdtool.detect(LOG, MACHINE, detector="momentum", limit=[400.0])
+    return cdtool.detect(LOG, MACHINE, detector="momentum", settings={"threshold.limits": 400.0})
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_the_signal_becomes_a_frame_with_its_limits(found):
 
 
 def test_a_log_without_alarm_or_contact_has_empty_frames_with_all_columns(found):
-    quiet = cdtool.detect(GATE / "holdout" / "03.csv", MACHINE, detector="momentum", limit=[1e6])
+    quiet = cdtool.detect(GATE / "holdout" / "03.csv", MACHINE, detector="momentum", settings={"threshold.limits": 1e6})
     assert quiet.outcome == "no alarm" and len(quiet.alarms) == len(quiet.contacts) == 0
     for name in ("alarms", "contacts"):
         full, empty = getattr(found, name), getattr(quiet, name)
@@ -150,7 +150,7 @@ def test_detect_takes_one_log_or_many_and_lists_what_cannot_be_read(tmp_path):
     with pytest.raises(cdtool.CdtoolError, match=r"none of 1 log can be used, the first: .*broken"):
         cdtool.detect([broken], MACHINE, signature=learned)
     with pytest.raises(cdtool.CdtoolError, match="unknown detector"):
-        cdtool.detect(logs, MACHINE, detector="momentun", limit=[1.0])
+        cdtool.detect(logs, MACHINE, detector="momentun", settings={"threshold.limits": 1.0})
 
 
 def test_results_are_read_back_from_their_file(result, tmp_path):

@@ -57,10 +57,10 @@ def test_a_detector_that_violates_the_contract_is_refused_in_one_line():
         name = "nothing"
 
     with pytest.raises(cdtool.CdtoolError, match="detector Nothing has no attribute 'short_name'"):
-        cdtool.detect(LOG, MACHINE, detector=Nothing(), limit=[1.0])
+        cdtool.detect(LOG, MACHINE, detector=Nothing(), settings={"threshold.limits": 1.0})
     impostor = type("Impostor", (Effort,), {"name": "momentum"})
     with pytest.raises(cdtool.CdtoolError, match="has the name of a detector of cdtool itself"):
-        cdtool.detect(LOG, MACHINE, detector=impostor(), limit=[1.0])
+        cdtool.detect(LOG, MACHINE, detector=impostor(), settings={"threshold.limits": 1.0})
 
 
 def test_a_benchmark_file_takes_the_name_of_a_detector_only():

@@ -15,7 +15,7 @@ LOGS = [LOG, GATE / "stiff" / "04.csv", GATE / "holdout" / "03.csv"]
 
 @pytest.fixture(scope="module")
 def found():
-    return cdtool.detect(LOGS, MACHINE, detector="gm", limit=[400.0])
+    return cdtool.detect(LOGS, MACHINE, detector="gm", settings={"threshold.limits": 400.0})
 
 
 @pytest.mark.parametrize("name", ["04.csv", "stiff/04.csv", LOGS[1], str(LOGS[1]), 1, -2])
@@ -45,7 +45,7 @@ def test_an_unknown_name_is_answered_with_the_nearest(found):
 def test_a_log_that_was_left_out_is_answered_with_the_reason(tmp_path):
     broken = tmp_path / "broken.csv"
     broken.write_text("a,b\n", encoding="utf-8")
-    found = cdtool.detect([LOG, broken], MACHINE, detector="gm", limit=[400.0])
+    found = cdtool.detect([LOG, broken], MACHINE, detector="gm", settings={"threshold.limits": 400.0})
     with pytest.raises(KeyError, match=r"no log 'broken\.csv' in these results \(it was left out: .*broken\.csv"):
         found["broken.csv"]
     assert "broken.csv" not in found and found.skipped.recording.tolist() == [str(broken)]
@@ -67,10 +67,10 @@ def test_reading_without_a_machine_file_says_what_to_pass_and_how_to_get_one():
 
 def test_an_unknown_detector_is_answered_with_the_nearest_and_where_the_list_is():
     with pytest.raises(cdtool.CdtoolError) as caught:
-        cdtool.detect(LOG, MACHINE, detector="momentun", limit=[400.0])
+        cdtool.detect(LOG, MACHINE, detector="momentun", settings={"threshold.limits": 400.0})
     assert caught.value.hint == "did you mean momentum or kalman_momentum? cdtool list detectors shows all"
     with pytest.raises(cdtool.CdtoolError) as caught:
-        cdtool.detect(LOG, MACHINE, detector="xyz", limit=[400.0])
+        cdtool.detect(LOG, MACHINE, detector="xyz", settings={"threshold.limits": 400.0})
     assert caught.value.hint == "cdtool list detectors shows all"
 
 

@@ -127,7 +127,7 @@ def test_an_unassessable_section_over_a_contact_shortens_the_exposure(logs, meas
 
 def test_a_recording_without_assessable_time_is_not_assessable_with_a_reason(logs, measured):
     rows = "stiff/01.csv,0,plc,100\nstiff/02.csv,0,plc,100\n"
-    values, _ = scored(logs, rows, "--listed-only", status=3)
+    values, _ = scored(logs, rows, "--set=triggers.listed_only=true", status=3)
     assert {row["outcome"] for row in values["contacts"]} == {"not_assessable"}
     assert {row["reason"] for row in values["contacts"]} == {"stated in the trigger file"}
 
@@ -136,7 +136,7 @@ def test_listed_only_leaves_recordings_out_detector_by_detector(logs, measured):
     at = onsets(measured)
     rows = f"stiff/01.csv,{at['stiff/01.csv'] + 0.04},plc,\nstiff/02.csv,{at['stiff/02.csv'] + 0.04},plc,\n"
     rows += f"stiff/02.csv,{at['stiff/02.csv'] + 0.06},edge,\n"
-    values, err = scored(logs, rows, "--listed-only")
+    values, err = scored(logs, rows, "--set=triggers.listed_only=true")
     found = {(row["detector"], row["recording"]): row["latency_ms"] for row in values["contacts"]}
     assert found == {
         ("plc", "stiff/01.csv"): pytest.approx(40.0),
@@ -166,19 +166,19 @@ def test_triggers_on_the_source_clock_are_converted_and_a_wrong_clock_is_reporte
     at = onsets(measured)
     times = {name: origin + at[name] + 0.045 for name in ("stiff/01.csv", "soft/01.csv")}
     rows = "".join(f"{name},{time:.4f},plc,\n" for name, time in times.items()) + "holdout/01.csv,,plc,\n"
-    values, err = scored(tmp_path, rows, "--clock", "source")
+    values, err = scored(tmp_path, rows, "--set=triggers.clock=source")
     assert [row["latency_ms"] for row in values["contacts"]] == [pytest.approx(45.0, abs=1.0)] * 2 and err == ""
     assert values["provenance"]["trigger_clock"] == "source"
     wrong, err = scored(tmp_path, rows, status=3)
     assert {row["outcome"] for row in wrong["contacts"]} == {"missed"}
-    assert "1 of 1 row outside all operations" in err and "try --clock source" in err
+    assert "1 of 1 row outside all operations" in err and "try --set triggers.clock=source" in err
     assert [item["recording"] for item in wrong["skipped"]] == ["stiff/01.csv", "soft/01.csv"]
 
 
 def test_trigger_times_in_ms_are_named(logs, measured):
     rows = "".join(f"{name},{1e3 * (onset + 0.045):.0f},plc,\n" for name, onset in onsets(measured).items())
     _, err = scored(logs, rows + QUIET, status=3)
-    assert "are the times in ms? time_s is in seconds" in err and "--clock" not in err
+    assert "are the times in ms? time_s is in seconds" in err and "triggers.clock" not in err
 
 
 def test_rows_of_recordings_that_are_not_scored_are_a_note(logs, measured):
@@ -229,7 +229,7 @@ def test_a_wrong_file_is_one_line_and_status_2(logs, header, rows, words):
 
 
 def test_nothing_to_score_never_exits_with_0(logs, tmp_path):
-    done = score(logs, "stiff/99.csv,1.0,plc,\n", "--listed-only")
+    done = score(logs, "stiff/99.csv,1.0,plc,\n", "--set=triggers.listed_only=true")
     assert (
         done.status == 2 and "no row is about a scored recording" in one_line(done.err) and "stiff/99.csv" in done.err
     )

@@ -10,7 +10,7 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import ConfigurationError, UsageError
-from cdtool.commands.detecting.prepared_detector import prepare_benchmark
+from cdtool.commands.detecting.prepared_benchmark import prepare_benchmark
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.results.files.results_file import read_results, to_json
@@ -248,4 +248,4 @@ def test_operations_in_a_machine_file_get_a_hint_where_they_belong(gate, made):
     (gate / "cut.toml").write_text(text.replace("[machine]\n", made), encoding="utf-8")
     with pytest.raises(ConfigurationError, match=r"operations: is a key of the benchmark file") as fault:
         read_machine_file(gate / "cut.toml")
-    assert "--operations motion" in fault.value.hint
+    assert "--set operations=motion" in fault.value.hint

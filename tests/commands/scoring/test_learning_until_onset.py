@@ -7,7 +7,7 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import ConfigurationError
-from cdtool.commands.detecting.prepared_detector import PreparedBenchmark, prepare_benchmark
+from cdtool.commands.detecting.prepared_benchmark import PreparedBenchmark, prepare_benchmark
 from cdtool.commands.judging.runs import load_runs
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
@@ -126,9 +126,7 @@ def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate, results
         assert scored.matched is not None
         ((row,),) = scored.matched.contacts
         assert row.latency_ms == rows[row.recording]
-        assert not cdtool.detect(log, benchmark=prepared).detected.learned, (
-            "scored with what was learned from the others"
-        )
+        assert not prepared.detect(log).runs[0].learned, "scored with what was learned from the others"
 
 
 def test_a_threshold_that_needs_the_logs_own_part_leaves_it_not_assessable_with_the_reason(gate):
@@ -229,9 +227,9 @@ def test_the_load_cells_synchronisation_is_part_of_the_guard(gate):
 
 
 def test_a_copy_of_a_log_is_said_to_have_been_learned_from(gate, prepared, tmp_path):
-    assert not cdtool.detect(gate / "stiff" / "01.csv", benchmark=prepared).detected.learned
+    assert not prepared.detect(gate / "stiff" / "01.csv").runs[0].learned
     shutil.copy(gate / "stiff" / "01.csv", tmp_path / "copy.csv")
-    assert cdtool.detect(tmp_path / "copy.csv", benchmark=prepared).detected.learned
+    assert prepared.detect(tmp_path / "copy.csv").runs[0].learned
 
 
 def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):

@@ -26,7 +26,7 @@ def test_the_default_is_three_milliseconds_and_is_stated_in_time():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"hold_s": 0.5}, r"onset\.hold_s: is 0\.5 .give a number of at least 0 and of at most 0\.1"),
+        ({"hold_s": 0.5}, r"onset\.hold_s: is 0\.5 .give a number from 0 to 0\.1"),
         ({"above_n": 5.0, "back_to_n": 8.0}, "onset.back_to_n: is 8, more than above_n"),
         ({"samples": 3}, r"onset\.samples: unknown key"),
     ],

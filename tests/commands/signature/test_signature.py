@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import Outcome, cdtool
+from tests.command import FEW, Outcome, cdtool
 from tests.synthetic.ageing import write_ageing_gate
 
 
@@ -50,7 +50,7 @@ def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
     path = tmp_path / "cusum.json"
     free = logs_of(gate_folder)
     learned = cdtool(
-        "learn-signature", *free, "-m", gate_folder / "machine.toml", "-d", "gm", "-t", "cusum", "-o", path
+        "learn-signature", *free, "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold=cusum", "-o", path
     )
     assert learned.status == 0 and "cusum, safety factor 15 by default" in learned.out, learned.err
     done = cdtool("signature", "show", path)
@@ -160,24 +160,24 @@ def test_a_check_with_some_of_the_runs_is_reported(gate_folder, signature):
 
 def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):
     path, machine = tmp_path / "cut.json", ("-m", gate_folder / "machine.toml")
-    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--operations", "motion", "-o", path)
+    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--set=operations=motion", "-o", path)
     assert cdtool(*learn).status == 0
     again = cdtool("signature", "update", path, *logs_of(gate_folder), *machine)
     assert again.status == 2 and "already in the signature" in again.err
-    other = cdtool("signature", "update", path, *logs_of(gate_folder), *machine, "--operations", "whole")
-    assert other.status == 2 and "learned from logs cut by 'motion', not by 'whole'" in other.err
+    other = cdtool("signature", "update", path, *logs_of(gate_folder), *machine, "--set=operations=whole")
+    assert other.status == 2 and "--set operations: unknown key" in other.err
 
 
 def test_the_origin_of_a_budget_is_dropped_when_the_factor_changes(gate_folder, tmp_path):
     path, machine = tmp_path / "b.json", ("-m", gate_folder / "machine.toml")
-    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--force", "-o", path)
-    done = cdtool(*learn, "--false-alarm-budget", "1/5op", "--debounce", 5)
+    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", FEW, "-o", path)
+    done = cdtool(*learn, "--false-alarm-budget", "1/5op", "--set=activation.debounce=5")
     assert done.status == 0 and "set for 1/5op on 11 operations" in done.out, done.err
     log = gate_folder / "holdout" / "01.csv"
     assert "with an activation different" not in cdtool("detect", log, *machine, "-s", path).out
     assert (
         "with an activation different from the file's"
-        in cdtool("detect", log, *machine, "-s", path, "--debounce", 1).out
+        in cdtool("detect", log, *machine, "-s", path, "--set=activation.debounce=1").out
     )
     updated = cdtool("signature", "update", path, log, *machine)
     shown = " ".join(cdtool("signature", "show", path).out.split())
@@ -186,39 +186,30 @@ def test_the_origin_of_a_budget_is_dropped_when_the_factor_changes(gate_folder, 
 
 def test_limits_set_by_hand_exclude_a_factor_and_need_no_runs(gate_folder, tmp_path):
     (log, *_), machine = logs_of(gate_folder), ("-m", gate_folder / "machine.toml")
-    learn = (
-        "learn-signature",
-        log,
-        *machine,
-        "-d",
-        "gm",
-        "-t",
-        "limit",
-        "--set",
-        "limits=400",
-        "-o",
-        tmp_path / "l.json",
-    )
+    learn = ("learn-signature", log, *machine, "-d", "gm", "--set=threshold.limits=400", "-o", tmp_path / "l.json")
     done = cdtool(*learn)
     assert done.status == 0 and "limit 400 N set by hand" in done.out and "less certain" not in done.err
-    refused = cdtool(*learn, "-k", 3)
+    refused = cdtool(*learn, "--set=threshold.safety_factor=3")
     assert refused.status == 2 and "cannot be combined with limits set by hand" in refused.err
 
 
 @pytest.mark.parametrize(
-    ("options", "named"),
+    ("keys", "named"),
     [
-        (("--rule", "foo"), "--rule: is 'foo'"),
-        (("--align", "foo"), "--align: is 'foo'"),
-        (("--sides", "three"), "--sides: is 'three'"),
-        (("--safety-factor", "-1"), "--safety-factor: is -1"),
-        (("--threshold", "cusum", "--rule", "foo"), "--rule: is 'foo'"),
-        (("--set", "rule=foo"), "--set: rule: is 'foo'"),
-        (("--set", "foo=1"), "--set: foo: unknown key"),
-        (("--threshold", "cusum", "--set", "drift=a"), "--set: threshold.drift: is 'a'"),
+        (("signature.rule=foo",), "signature.rule: is 'foo'"),
+        (("signature.alignment=foo",), "signature.alignment: is 'foo'"),
+        (("signature.sides=three",), "signature.sides: is 'three'"),
+        (("signature.safety_factor=-1",), "signature.safety_factor: is -1"),
+        (("threshold.name=cusum", "signature.rule=foo"), "signature.rule: is 'foo'"),
+        (("rule=foo",), "rule: unknown key (write signature.rule)"),
+        (("foo=1",), "foo: unknown key"),
+        (("threshold.name=cusum", "threshold.drift=a"), "threshold.drift: is 'a'"),
+        (("learn.guard_s=-1", "learn.until=onset"), "learn.guard_s: is -1"),
     ],
 )
-def test_a_wrong_setting_is_named_by_the_option_that_was_given(gate_folder, tmp_path, options, named):
+def test_a_wrong_setting_is_named_by_its_key(gate_folder, tmp_path, keys, named):
     machine, log = gate_folder / "machine.toml", gate_folder / "free" / "01.csv"
-    done = cdtool("learn-signature", log, "-m", machine, "-d", "gm", "-o", tmp_path / "s.json", *options)
-    assert done.status == 2 and done.err.startswith(f"error: {named}"), done.err
+    done = cdtool(
+        "learn-signature", log, "-m", machine, "-d", "gm", "-o", tmp_path / "s.json", *(f"--set={key}" for key in keys)
+    )
+    assert done.status == 2 and done.err.startswith(f"error: --set {named}"), done.err

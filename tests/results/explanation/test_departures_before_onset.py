@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.commands.detecting.prepared_detector import prepare_benchmark
-from cdtool.commands.explain.explaining import explain
+from cdtool.commands.detecting.prepared_benchmark import prepare_benchmark
+from cdtool.commands.explain.explaining import explain_log
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
 
@@ -18,7 +18,7 @@ def test_no_channel_departs_before_the_onset_of_a_contact(folder, detector):
     prepared = prepare_benchmark(LOGS / folder / "benchmark.toml", detector=detector)
     early, events = [], 0
     for log in sorted(path for group in ("stiff", "soft") for path in (LOGS / folder / group).iterdir()):
-        for _, item in explain(log, benchmark=prepared).events:
+        for _, item in explain_log(log, prepared).events:
             assert item.contact is not None
             events += 1
             earliest = item.contact.start - item.contact.uncertainty - 5e-3

@@ -99,8 +99,8 @@ def coverage(
     >>> done.map.positions, sorted(done.map.cells)
     ((0.99, 1.04), ['momentum'])
     """
-    workers = workers or Workers()
     setup = read_benchmark_file(file, settings=settings)
+    workers = (workers or Workers()).limited_by(setup.execution)
     setup = with_detectors(setup, detectors) if detectors else setup
     section = section_of(setup)
     units = {mark.unit for mark in section.positions}

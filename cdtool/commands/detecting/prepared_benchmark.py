@@ -8,9 +8,12 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from cdtool.base.errors import UsageError, nearest
+from cdtool.base.errors import RecordingError, UsageError, nearest
 from cdtool.base.plain_text import counted
+from cdtool.base.settings import Place
+from cdtool.commands.detecting.detection import Detected, DetectedRuns
 from cdtool.commands.judging.runs import load_runs
+from cdtool.commands.judging.settings_table import apply_settings, full_keys, refuse_beside_signature
 from cdtool.commands.learning.learning import LearnedSignature, signature_of
 from cdtool.commands.learning.normal_runs import normals_for, normals_of, notes_on
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
@@ -19,6 +22,7 @@ from cdtool.commands.scoring.measured_synchronisation import with_synchronisatio
 from cdtool.commands.scoring.scoring import Detect, ScoredLog, detect_with, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE
 from cdtool.formats.channels.run_reading import split_run
+from cdtool.formats.machine_file import MachineFile
 from cdtool.formats.signature_file import SignatureFile
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.plausible import LearnedRanges
@@ -49,6 +53,59 @@ class PreparedBenchmark:
     skipped: tuple[Skipped, ...] = ()
     losses: tuple[RecordingFinding, ...] = ()
     runs: tuple[Operation, ...] = ()
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether each log is cut into runs."""
+        return self.setup.has_runs
+
+    @property
+    def machine_file(self) -> MachineFile:
+        """Return the machine file."""
+        return self.setup.machine_file
+
+    def detect(self, log: Path) -> DetectedRuns:
+        """Return the detection as `cdtool benchmark` scores it; raises RecordingError if it leaves the log out."""
+        every = self.score(log)
+        skipped, findings, found = list[Skipped](), list[RecordingFinding](), list[Detected]()
+        if self.setup.has_runs:
+            skipped, findings, every = list(every[0].rows.skipped), list(every[0].rows.findings), every[1:]
+        for scored in every:
+            detected = self._detected(scored, log)
+            if detected is None:
+                skipped += scored.left_out or [Skipped(str(log), "no operation is assessable")]
+            else:
+                found.append(detected)
+        if not found:
+            reason = skipped[0].reason if skipped else "no operation is assessable"
+            raise RecordingError(reason if str(log) in reason else f"{log}: {reason}")
+        return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
+
+    def _detected(self, scored: ScoredLog, log: Path) -> Detected | None:
+        """Return the detection in a scored recording; None if it was left out."""
+        matched = scored.matched
+        judged = (
+            [(item, rows) for item, rows in zip(matched.judged, matched.contacts, strict=True) if item.detections]
+            if matched
+            else []
+        )
+        if scored.recording is None or matched is None or not judged:
+            return None
+        return Detected(
+            scored.recording,
+            tuple(item.detections[0] for item, _ in judged),
+            scored.contacts,
+            tuple(item.matchings[0] for item, _ in judged),
+            self.described,
+            self.setup.activation,
+            self.has_judged_itself(scored.recording),
+            self.window(log),
+            tuple(rows for _, rows in judged),
+            matched.not_scored,
+            (*matched.findings, *self.setup.rules_of("").findings, *self.notes),
+            self.normals_for(scored.recording),
+            self.setup.onset.described,
+        )
 
     def score(self, log: Path) -> list[ScoredLog]:
         """Return the rows of a log, or of each of its runs, as in a benchmark: with the window of its group, if any.
@@ -90,14 +147,21 @@ def prepare_benchmark(
     *,
     detector: str | None = None,
     signature: str | Path | LearnedSignature | SignatureFile | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> PreparedBenchmark:
     """Read a benchmark file and learn the threshold of one of its detectors, or use that of a signature file.
 
-    `detector` is optional if the file names only one, or a signature is given. Raises ConfigurationError for a wrong
-    file, SignatureError if nothing can be learned or the signature does not belong, UsageError for an ambiguous
-    detector.
+    `detector` is optional if the file names only one, or a signature is given. `settings` take the place of keys of the
+    file. Raises ConfigurationError for a wrong file, SignatureError if nothing can be learned or the signature does not
+    belong, UsageError for an ambiguous detector.
     """
-    setup, measured = with_synchronisation(read_benchmark_file(file, detectors=(detector,) if detector else ()))
+    if signature is not None:
+        place = Place(str(file), by_option=full_keys(settings))
+        own = ("threshold", "signature", "false_alarm_budget")
+        refuse_beside_signature(apply_settings({}, settings or {}), place, own)
+        place.finish()
+    named = (detector,) if detector else ()
+    setup, measured = with_synchronisation(read_benchmark_file(file, detectors=named, settings=settings))
     machine_file = setup.machine_file
     if signature is not None:
         stored = signature_of(signature)
@@ -162,7 +226,7 @@ def _chosen(setup: BenchmarkFile, detector: str | None) -> str:
     if detector is None:
         raise UsageError(
             f"{setup.path} names {len(setup.detectors)} detectors",
-            f"give --detector, one of {', '.join(setup.detectors)}",
+            f"give --detectors, one of {', '.join(setup.detectors)}",
         )
     name: str = setup.machine_file.detector(detector).name
     if name not in setup.detectors:
