@@ -83,6 +83,11 @@ QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Only the concl
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
+def keys_option(meaning: str, model: str) -> Any:
+    """Return the option --set of the keys of a model, named as module:Class, with what its help says."""
+    return typer.Option("--set", metavar="KEY=VALUE", help=meaning, autocompletion=completions.keys(model))
+
+
 def set_option(example: str, table: str) -> Any:
     """Return the option --set for the keys of a table of `judging.settings_table`, with one as an example."""
     return keys_option(f"As {example}; docs/benchmark-file.md.", f"cdtool.commands.judging.settings_table:{table}")
@@ -96,11 +101,6 @@ def one_detector(text: str) -> str:
     if "," in text:
         raise UsageError(f"--detectors is '{text}'", "give one name: this command runs one detector")
     return text
-
-
-def keys_option(meaning: str, model: str) -> Any:
-    """Return the option --set of the keys of a model, named as module:Class, with what its help says."""
-    return typer.Option("--set", metavar="KEY=VALUE", help=meaning, autocompletion=completions.keys(model))
 
 
 def listed(text: str) -> tuple[str, ...]:
