@@ -112,7 +112,6 @@ def cases(inputs: Path) -> list[Case]:
             ("signature", "update", "{out}/s.json", free[3], *machine, "--reserve", "30"),
             ("learn-signature", *free[:3], *machine, *learn),
         ),
-        Case("signature show", _plot("signature", "show", b), _plot("signature", "show", a)),
         Case(
             "signature check",
             _plot("signature", "check", a, *free, *machine),

@@ -15,7 +15,7 @@ from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, leave_with, plain, print_json, print_skipped, with_findings
 from cdtool.commands.console.late_progress import late_progress
 from cdtool.commands.console.logs_argument import logs_argument
-from cdtool.commands.console.options import JsonOption, QuietOption
+from cdtool.commands.console.options import JsonOption
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -61,7 +61,6 @@ def init(
             metavar="KEY=VALUE",
         ),
     ] = None,
-    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Draft a machine file from a log, or with a folder as output also a benchmark file from several logs.
@@ -80,25 +79,24 @@ def init(
         if len(logs) > 1 or machine is not None or free:
             what = "--machine" if machine is not None else "--free" if free else f"{len(logs)} logs"
             raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
-        with late_progress("analysing the log", quiet=quiet):
+        with late_progress("analysing the log"):
             drafted = draft(logs[0], output, force=force, csv=settings, urdf=urdf)
         if as_json:
             print_json(with_findings(drafted))
         else:
-            if not quiet:
-                typer.echo(drafted.text)
+            typer.echo(drafted.text)
             first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
             typer.echo(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
             typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(drafted.path)}")
         _warn(drafted)
         leave_with(drafted.findings)
         return
-    with late_progress("analysing the logs", quiet=quiet):
+    with late_progress("analysing the logs"):
         study = init_study(logs, output, machine=machine, force=force, csv=settings, free=free or (), urdf=urdf)
     if as_json:
         print_json(asdict(study))
     else:
-        _show(study, logs, output, quiet=quiet)
+        _show(study, logs, output)
     if study.machine:
         _warn(study.machine)
     print_skipped(study.skipped)
@@ -119,11 +117,10 @@ def _settings(given: list[str]) -> dict[str, Any]:
     return values
 
 
-def _show(study: DraftedStudy, logs: list[Path], output: Path, *, quiet: bool) -> None:
+def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
     from cdtool.commands.init.benchmark_draft import patterns
 
-    if not quiet:
-        typer.echo(study.text)
+    typer.echo(study.text)
     names = [*([study.machine_path] if study.machine else []), study.path, *study.beside]
     typer.echo(
         f"{', '.join(map(plain, names))} written: drafts based on guesses. Check each line marked CHECK, then run"

@@ -17,7 +17,6 @@ from cdtool.commands.console.options import (
     JsonOption,
     QuietOption,
     SetOption,
-    listed,
 )
 from cdtool.commands.console.place import Place, location
 
@@ -44,10 +43,6 @@ def inject(
         ),
     ] = None,
     force: ForceOption = False,
-    detectors: Annotated[
-        str | None,
-        typer.Option("--detectors", help="Detectors instead of the file's.", autocompletion=completions.detector_list),
-    ] = None,
     settings: SetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
@@ -71,13 +66,13 @@ def inject(
     from cdtool.execution.workers import Workers
 
     targets, workers = output or [], Workers(jobs, cluster=cluster)
-    names, given = listed(detectors or ""), given_settings(settings or ())
+    given = given_settings(settings or ())
     folders = [target for target in targets if not target.suffix]
     if folders and len(targets) > 1:
         raise UsageError(f"--output is {plain(folders[0])} and others", "give one folder, or the files of a map")
     if folders:
         with progress("injecting", quiet=quiet) as advance:
-            made = write_logs(file, folders[0], detectors=names, settings=given, workers=workers, progress=advance)
+            made = write_logs(file, folders[0], settings=given, workers=workers, progress=advance)
         print_skipped(made.skipped, ())
         if as_json:
             print_json(made)
@@ -88,9 +83,7 @@ def inject(
     check_coverage_files(targets, [file], force=force)
     with_traces = any(target.suffix.lower() == PAGE for target in targets)
     with progress("coverage", quiet=quiet) as advance:
-        done = coverage(
-            file, detectors=names, settings=given, with_traces=with_traces, workers=workers, progress=advance
-        )
+        done = coverage(file, settings=given, with_traces=with_traces, workers=workers, progress=advance)
     print_skipped(done.skipped, done.findings)
     write_coverage(done, targets)
     if as_json:

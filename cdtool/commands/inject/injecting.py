@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from cdtool.commands.inject.inject_section import InjectSection
 from cdtool.commands.inject.injected_logs import CONTACTS, InjectedLogs, write_injected, write_recording
 from cdtool.commands.inject.with_injected import mark_as_made, section_of
 from cdtool.commands.judging.settings_table import apply_settings
-from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors
+from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
 from cdtool.execution.workers import Progress, Workers
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.reading import read_as_logged
@@ -51,7 +51,6 @@ def inject(
     file: str | Path,
     output: str | Path,
     *,
-    detectors: Sequence[str] = (),
     settings: Mapping[str, Any] | None = None,
     workers: Workers | None = None,
     progress: Progress | None = None,
@@ -65,10 +64,8 @@ def inject(
     output : str or Path
         A new or empty folder: a group of recordings per obstacle, contacts.csv with the exact contacts, injected.json
         with the origin of each, copies of the logs to learn from, and machine.toml and benchmark.toml for all of them.
-    detectors : sequence of str, optional
-        Detectors in place of the file's, for the written benchmark file.
     settings : mapping, optional
-        Values in place of keys of the file, as {"inject.format": "mcap"}.
+        Values in place of keys of the file, as {"inject.format": "mcap", "detectors": ["gm"]}.
     workers : Workers, optional
         How the work is done; in this process by default.
     progress : callable, optional
@@ -97,9 +94,6 @@ def inject(
     """
     setup = read_benchmark_file(file, settings=settings)
     workers = (workers or Workers()).limited_by(setup.execution)
-    if detectors:
-        setup = with_detectors(setup, detectors)
-        setup = replace(setup, settings={**setup.settings, "detectors": list(setup.detectors)})
     section = section_of(setup)
     folder = location(output)
     require_free_folder(folder)

@@ -57,31 +57,20 @@ PlotOption = Annotated[Place | None, typer.Option("--plot", parser=location, hel
 
 
 @signature.command("show", epilog=statuses_words("signature show"))
-def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False, as_json: JsonOption = False) -> None:
+def show(file: FileArgument, as_json: JsonOption = False) -> None:
     """Show a signature file: machine, detector, threshold, classes of motion, runs, and how far the limits have moved.
 
-    Example: cdtool signature show gate.feekf.json --plot signature.png
+    Example: cdtool signature show gate.feekf.json
     """
     from cdtool.commands.learning.normal_runs import notes_on
-    from cdtool.commands.signature.upkeep import signatures_in
     from cdtool.formats.signature_store import read_signature
 
-    drawn = figure_name(plot, force=force) if plot else None
     stored = read_signature(file)
     print_skipped((), notes_on(stored))
-    pairs = signatures_in(stored) if drawn else ()
     if as_json:
         print_json(file_as_json(stored))
     else:
         show_file(stored)
-    if drawn:
-        from cdtool.commands.signature.signature_plot import plot_signature
-
-        plot_signature(
-            [current for current, _ in pairs], [first for _, first in pairs], stored.unit, stored.detector, drawn
-        )
-        if not as_json:
-            typer.echo(f"plot written to {plain(drawn)}")
 
 
 @signature.command("check", epilog=statuses_words("signature check"))

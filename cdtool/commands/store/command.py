@@ -53,7 +53,6 @@ def gc(
     older_than: Annotated[
         float, typer.Option("--older-than", min=0.0, help="Days since its last use above which an entry is removed.")
     ] = 30.0,
-    as_json: JsonOption = False,
 ) -> None:
     """Remove entries that no run has used for a time.
 
@@ -62,9 +61,6 @@ def gc(
     from cdtool.execution.store.upkeep import collect_garbage
 
     done = collect_garbage(folder, older_than_days=older_than)
-    if as_json:
-        print_json(asdict(done))
-        return
     typer.echo(
         f"{plain(folder)}: {counted(done.removed, 'entry')} removed, {done.kept} kept; "
         f"{decimal(done.bytes_before)} before, {decimal(done.bytes_after)} now"

@@ -61,7 +61,7 @@ def test_the_command_draws_the_map_and_prints_a_table(gate: Path) -> None:
     assert len(recordings) == 24 and all(item["recording"].endswith(".csv") for item in recordings)
     assert (gate / "map.png").read_bytes().startswith(b"\x89PNG")
     assert "2 positions from 0.3 to 1.2 m" in done.out
-    again = command("inject", gate / "coverage.toml", "--json", "--detectors", "gm")
+    again = command("inject", gate / "coverage.toml", "--json", "--set", "detectors=gm")
     cells = json.loads(again.out)["cells"]
     assert len(cells) == 6
     assert {cell["detector"] for cell in cells} == {"momentum"}
@@ -106,7 +106,7 @@ def test_the_worst_contact_of_each_cell_has_a_trigger_plot(gate: Path, monkeypat
     for name in ("MOST_STRIKING", "MOST_SLOW", "MOST_SAMPLED"):
         monkeypatch.setattr(f"cdtool.results.traces.choice.{name}", 2)
     monkeypatch.setattr("cdtool.commands.inject.coverage.coverage._ALL_TRACES_KEPT", 4)
-    done = cdtool.coverage(gate / "coverage.toml", detectors=["pi"], with_traces=True)
+    done = cdtool.coverage(gate / "coverage.toml", settings={"detectors": ["pi"]}, with_traces=True)
     worst = {cell.recordings[0].recording for cells in done.map.cells.values() for cell in cells.values()}
     assert set(done.traces) == worst
     for cells in done.map.cells.values():
@@ -122,7 +122,7 @@ def test_logs_of_clearly_different_speed_split_the_map(gate: Path, monkeypatch: 
         return {log: 0.1 * (place + 1) for place, log in enumerate(speeds)}
 
     monkeypatch.setattr("cdtool.commands.inject.coverage.coverage.speed_classes", by_log)
-    done = command("inject", gate / "coverage.toml", "--detectors", "gm")
+    done = command("inject", gate / "coverage.toml", "--set", "detectors=gm")
     assert done.status == 0
     lines = [line.split()[1:5] for line in done.out.splitlines() if line.startswith("momentum ")]
     assert lines[:2] == [["5", "0.1", "2", "0"], ["5", "0.2", "2", "0"]]
@@ -139,10 +139,10 @@ def test_two_obstacles_that_begin_alike_make_no_map(gate: Path) -> None:
 def test_a_cell_and_the_table_have_the_range_of_the_brackets(gate: Path) -> None:
     text = (gate / "model.toml").read_text(encoding="utf-8")
     (gate / "model.toml").write_text(text.partition("[model.controller]")[0], encoding="utf-8")
-    done = cdtool.coverage(gate / "coverage.toml", detectors=["gm"])
+    done = cdtool.coverage(gate / "coverage.toml", settings={"detectors": ["gm"]})
     cell = done.map.cells["momentum"][CellKey(0.3, 5e3)]
     assert cell.range_ms[1] > cell.range_ms[0] + 1.0
-    printed = command("inject", gate / "coverage.toml", "--detectors", "gm").out
+    printed = command("inject", gate / "coverage.toml", "--set", "detectors=gm").out
     line = next(line for line in printed.splitlines() if line.startswith("momentum") and " 5 " in line)
     highest = max(done.map.cells["momentum"][CellKey(position, 5e3)].range_ms[1] for position in (0.3, 1.2))
     assert f"to {highest:.3g}" in line

@@ -93,7 +93,7 @@ def test_the_same_seed_gives_the_same_bytes_and_the_jobs_do_not_matter(gate: Pat
 @pytest.mark.parametrize("file_format", ["csv", "mcap", "parquet"])
 def test_the_folder_is_a_benchmark_of_its_own(gate: Path, file_format: str) -> None:
     path = write(gate, INJECT)
-    done = cdtool.inject(path, gate / "out", settings={"inject.format": file_format}, detectors=["gm"])
+    done = cdtool.inject(path, gate / "out", settings={"inject.format": file_format, "detectors": ["gm"]})
     (case,) = done.logs.cases
     assert case.file.endswith(file_format)
     results = cdtool.benchmark(gate / "out" / "benchmark.toml").results

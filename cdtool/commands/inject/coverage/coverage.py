@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from cdtool.commands.inject.injected_logs import InjectedCase
 from cdtool.commands.inject.with_injected import injected_logs, section_of, with_groups
 from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.scoring.benchmark import benchmark
-from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
+from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.execution.workers import Progress, Workers
 from cdtool.machines.dynamics import has_links
 from cdtool.results.results import RecordingFinding, Skipped
@@ -54,7 +54,6 @@ class Coverage:
 def coverage(
     file: str | Path,
     *,
-    detectors: Sequence[str] = (),
     settings: Mapping[str, Any] | None = None,
     with_traces: bool = False,
     workers: Workers | None = None,
@@ -66,10 +65,8 @@ def coverage(
     ----------
     file : str or Path
         A benchmark file with a section [inject].
-    detectors : sequence of str, optional
-        Detectors in place of the file's.
     settings : mapping, optional
-        Values in place of keys of the file, as {"inject.seed": 1}.
+        Values in place of keys of the file, as {"inject.seed": 1, "detectors": ["gm"]}.
     with_traces : bool, optional
         Also return the trigger plot of the worst contact of each cell: missed, otherwise the slowest. At most 200.
     workers : Workers, optional
@@ -95,13 +92,12 @@ def coverage(
     Examples
     --------
     >>> import cdtool
-    >>> done = cdtool.coverage("sample_logs/gate/inject.toml", detectors=["gm"])
+    >>> done = cdtool.coverage("sample_logs/gate/inject.toml", settings={"detectors": ["gm"]})
     >>> done.map.positions, sorted(done.map.cells)
     ((0.99, 1.04), ['momentum'])
     """
     setup = read_benchmark_file(file, settings=settings)
     workers = (workers or Workers()).limited_by(setup.execution)
-    setup = with_detectors(setup, detectors) if detectors else setup
     section = section_of(setup)
     units = {mark.unit for mark in section.positions}
     if len(units) > 1:
