@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import shlex
-import tomllib
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -53,11 +52,11 @@ def init(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
-    csv: Annotated[
+    settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--csv",
-            help="A key of [csv] in the machine file, for a table that is not read without: header=false, decimal=,",
+            "--set",
+            help="A key of [csv], for a table that is not read without: csv.header=false, csv.decimal=,",
             metavar="KEY=VALUE",
         ),
     ] = None,
@@ -71,16 +70,20 @@ def init(
     """
     from cdtool.commands.init.drafting import init as draft
     from cdtool.commands.init.drafting import init_study
+    from cdtool.commands.judging.settings_table import apply_settings, given_settings
 
-    settings = _settings(csv or [])
-    if settings and machine is not None:
-        raise UsageError("--csv and --machine: both state how tables are read", "write [csv] into the machine file")
+    given = apply_settings({}, given_settings(settings or ()))
+    csv = given.pop("csv", {})
+    if given:
+        raise UsageError(f"--set {next(iter(given))}: unknown key", "give a key of [csv], as csv.header=false")
+    if csv and machine is not None:
+        raise UsageError("--set and --machine: both state how tables are read", "write [csv] into the machine file")
     if output.suffix == ".toml":
         if len(logs) > 1 or machine is not None or free:
             what = "--machine" if machine is not None else "--free" if free else f"{len(logs)} logs"
             raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
         with late_progress("analysing the log"):
-            drafted = draft(logs[0], output, force=force, csv=settings, urdf=urdf)
+            drafted = draft(logs[0], output, force=force, csv=csv, urdf=urdf)
         if as_json:
             print_json(with_findings(drafted))
         else:
@@ -92,7 +95,7 @@ def init(
         leave_with(drafted.findings)
         return
     with late_progress("analysing the logs"):
-        study = init_study(logs, output, machine=machine, force=force, csv=settings, free=free or (), urdf=urdf)
+        study = init_study(logs, output, machine=machine, force=force, csv=csv, free=free or (), urdf=urdf)
     if as_json:
         print_json(asdict(study))
     else:
@@ -101,20 +104,6 @@ def init(
         _warn(study.machine)
     print_skipped(study.skipped)
     leave(study.skipped)
-
-
-def _settings(given: list[str]) -> dict[str, Any]:
-    """Return KEY=VALUE as values of TOML; what is not one is a text."""
-    values: dict[str, Any] = {}
-    for text in given:
-        key, mark, value = text.partition("=")
-        if not mark or not key.strip():
-            raise UsageError(f"--csv {text}: is no KEY=VALUE", "for example --csv header=false")
-        try:
-            values[key.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            values[key.strip()] = value
-    return values
 
 
 def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:

@@ -293,8 +293,8 @@ def _checked_together(logs: Sequence[Path], machine_file: MachineFile) -> tuple[
 
 
 def _pins(csv: Mapping[str, Any]) -> TablePins:
-    """Return the dialect that --csv sets; raises ConfigurationError."""
-    place = Place("--csv")
+    """Return the dialect that --set gives; raises ConfigurationError."""
+    place = Place("--set", by_option={f"csv.{key}" for key in csv}).below("csv")
     pins = read_pins(csv, place)
     place.finish()
     return pins
@@ -304,13 +304,13 @@ def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
     """Return all columns of a log; a table that cannot be read without settings names the option for them."""
     is_table = found.name == Csv.name
     if csv and not is_table:
-        raise UsageError(f"{path}: is {found.name}, not a text table", "remove --csv")
+        raise UsageError(f"{path}: is {found.name}, not a text table", "remove --set csv.*")
     try:
         return Csv().columns(path, pins=_pins(csv)) if csv else found.columns(path)
     except RecordingError as fault:
         if not is_table or csv:
             raise
-        raise RecordingError(fault.message, f"{fault.hint}; keys of [csv] here: --csv header=false") from fault
+        raise RecordingError(fault.message, f"{fault.hint}; keys of [csv] here: --set csv.header=false") from fault
 
 
 def _with_words(path: Path, found: Format, csv: Mapping[str, Any]) -> tuple[Source, tuple[UnreadWord, ...]]:

@@ -1,4 +1,4 @@
-"""`cdtool init --csv KEY=VALUE`: a draft from a table that is not read without settings."""
+"""`cdtool init --set csv.KEY=VALUE`: a draft from a table that is not read without settings."""
 
 import tomllib
 from pathlib import Path
@@ -23,12 +23,12 @@ def glued(tmp_path):
 
 def test_a_table_that_cannot_be_read_names_the_option(glued, tmp_path):
     done = cdtool("init", glued, "-o", tmp_path / "m.toml")
-    assert done.status == 2 and "--csv header=false" in one_line(done.err)
+    assert done.status == 2 and "--set csv.header=false" in one_line(done.err)
     assert not (tmp_path / "m.toml").exists()
 
 
 def test_the_settings_are_used_and_are_part_of_the_draft(glued, tmp_path):
-    done = cdtool("init", glued, "-o", tmp_path / "m.toml", "--csv", "header=false", "--csv", "separator=comma")
+    done = cdtool("init", glued, "-o", tmp_path / "m.toml", "--set", "csv.header=false", "--set", "csv.separator=comma")
     assert done.status == 0, done.err
     values = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))
     assert values["csv"] == {"header": False, "separator": "comma"} and values["channels"]["time"]["column"] == 0
@@ -44,11 +44,12 @@ def test_lists_and_numbers_are_written_as_toml(glued, tmp_path):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (("--csv", "header"), "--csv header: is no KEY=VALUE"),
-        (("--csv", "heder=false"), "--csv: heder: unknown key (did you mean header?"),
-        (("--csv", "decimal=x"), "--csv: decimal: is 'x'"),
-        (("--csv", "encoding=idna"), "--csv: encoding: is 'idna'"),
-        (("--csv", "header=false", "--machine", "m.toml"), "--csv and --machine: both state how tables are read"),
+        (("--set", "header=false"), "--set header: unknown key"),
+        (("--set", "csv.header"), "--set is 'csv.header'"),
+        (("--set", "csv.heder=false"), "--set csv.heder: unknown key (did you mean header?"),
+        (("--set", "csv.decimal=x"), "--set csv.decimal: is 'x'"),
+        (("--set", "csv.encoding=idna"), "--set csv.encoding: is 'idna'"),
+        (("--set", "csv.header=false", "--machine", "m.toml"), "--set and --machine: both state how tables are read"),
     ],
 )
 def test_a_wrong_setting_is_one_line(glued, tmp_path, given, words):
