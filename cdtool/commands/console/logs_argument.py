@@ -14,7 +14,7 @@ _PATTERN = frozenset("*?[")
 
 def logs_argument(description: str) -> Any:
     """Return the argument of one or more logs, with its description in the help."""
-    return typer.Argument(parser=location, callback=_each_log, help=description, metavar="LOG...")
+    return typer.Argument(parser=location, callback=_each_log, help=description, metavar="LOG")
 
 
 def _each_log(logs: list[Path]) -> list[Path]:

@@ -36,7 +36,7 @@ _DOUBT = (
 
 def identify(
     logs: Annotated[
-        list[str], typer.Argument(help="Impact-free logs; patterns such as free/*.csv are allowed.", metavar="LOGS...")
+        list[str], typer.Argument(help="Impact-free logs; patterns such as free/*.csv are allowed.", metavar="LOG")
     ],
     machine: Annotated[
         Place,
