@@ -50,7 +50,9 @@ def test_each_message_is_a_contact_and_rebounds_are_one(folder):
 
 
 def test_an_alarm_is_matched_with_it_and_no_detector_reads_it(folder):
-    found = cdtool.detect(folder / "log.mcap", folder / "machine.toml", detector="pt", limit=[50.0])
+    found = cdtool.detect(
+        folder / "log.mcap", folder / "machine.toml", detector="pt", settings={"threshold.limits": 50}
+    )
     outcomes = [(item.outcome, round(item.latency, 3)) for item in found.detected.matchings[0].matches]
     assert outcomes[0] == ("detected", 0.019) and outcomes[1][0] == "missed"
     assert "event" not in found.detections[0].operation.recording.without_ground_truth()

@@ -284,7 +284,7 @@ def test_a_threshold_whose_other_methods_fail_is_one_line_too(install, tmp_path,
     broken = f"class Fitted(FittedLimit):\n    def {method}(self, *given): return 1 / 0\n"
     install(THRESHOLD.replace("class Fitted(FittedLimit):\n", broken), group="thresholds")
     learn = ("learn-signature", GATE / "free/03.csv", GATE / "free/04.csv", "-m", GATE / "machine.toml")
-    done = cdtool(*learn, "-d", "gm", "-t", "odd", "-o", tmp_path / "s.json")
+    done = cdtool(*learn, "-d", "gm", "--set=threshold=odd", "-o", tmp_path / "s.json")
     if method == "with_safety_factor":
         assert done.status == 0, done.err
         for command in (("detect", LOG, "--set=activation.hysteresis=0.2"), ("explain", LOG)):

@@ -12,7 +12,7 @@ import pytest
 
 import cdtool
 from cdtool.alarms.activation import Activation
-from cdtool.base.errors import SignatureError, UsageError
+from cdtool.base.errors import ConfigurationError, SignatureError
 from cdtool.commands.detecting.prepared import prepared
 from cdtool.formats.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
@@ -31,17 +31,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_one_long_log_gives_a_signature_for_each_direction(folder):
-    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", operations="motion")
+    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", settings=MOTION)
     assert [(motion.direction, runs) for motion, runs in learned.runs] == [(1, 12), (-1, 12)]
     with pytest.raises(SignatureError, match="1 impact-free run "):
         cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm")
 
 
 def test_contacts_are_found_in_both_directions_and_nothing_else(folder, tmp_path):
-    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", operations="motion")
+    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "gm", settings=MOTION)
     write_signature(tmp_path / "door.json", learned.signature)
     found = cdtool.detect(
-        folder / "hits.csv", folder / "machine.toml", signature=tmp_path / "door.json", operations="motion"
+        folder / "hits.csv", folder / "machine.toml", signature=tmp_path / "door.json", settings=MOTION
     )
     outcomes = [detection.verdict.outcome for detection in found.detections]
     assert outcomes == ["no alarm", "alarm", "alarm", "no alarm", "no alarm", "alarm"]
@@ -50,6 +50,7 @@ def test_contacts_are_found_in_both_directions_and_nothing_else(folder, tmp_path
     assert found.contacts.onset_s.tolist() == pytest.approx([6.0, 10.0, 22.0], abs=0.01)
 
 
+MOTION = {"operations": "motion"}
 BENCHMARK = """
 machine = "machine.toml"
 detectors = ["gm", "pt"]
@@ -101,14 +102,14 @@ def test_a_trigger_channel_cuts_too_and_a_wrong_way_to_cut_is_refused(folder):
     cut = {"threshold.limits": 70, "operations": "trigger"}
     found = cdtool.detect(folder / "hits.csv", folder / "trigger.toml", detector="pt", settings=cut)
     assert [detection.verdict.outcome for detection in found.detections] == ["alarm"] * 3
-    with pytest.raises(UsageError, match="motion"):
+    with pytest.raises(ConfigurationError, match="motion"):
         cdtool.detect(folder / "hits.csv", folder / "machine.toml", settings=cut | {"operations": "strokes"})
 
 
 def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_path):
     path = tmp_path / "door.json"
-    machine = ("-m", folder / "machine.toml", "--set=operations=motion")
-    assert run("learn-signature", folder / "free.csv", *machine, "-d", "gm", "-o", path).status == 0
+    machine, cut = ("-m", folder / "machine.toml"), "--set=operations=motion"
+    assert run("learn-signature", folder / "free.csv", *machine, cut, "-d", "gm", "-o", path).status == 0
     first = json.loads(path.read_text())
     done = run("signature", "update", path, folder / "quiet.csv", *machine, "--forget", 20)
     assert done.status == 0 and "6 runs added" in done.out
@@ -120,7 +121,7 @@ def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_pat
 
 def test_the_signature_rule_is_stored_in_the_file(folder):
     rule = Signature(sides="two", safety_factor=7.0, alignment="position")
-    settings = {"operations": "motion", "activation.debounce": 4}
+    settings = MOTION | {"activation.debounce": 4}
     learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, settings=settings)
     fitted = learned.signature.current[0]
     assert (fitted.sides, fitted.safety_factor, fitted.alignment) == ("two", 7.0, "position")

@@ -81,7 +81,7 @@ def test_limits_set_by_hand_monitor_the_chosen_joints(forearm):
     assert found.joints == ("forearm",) and found.detections[0].statistic.values.shape[1] == 1
     both = api.detect(log, machine, detector="gm", settings={"threshold.limits": [3.9, 0.6]})
     assert both.joints == ("arm", "forearm")
-    with pytest.raises(UsageError, match="did you mean forearm"):
+    with pytest.raises(ConfigurationError, match="did you mean forearm"):
         api.detect(log, machine, detector="gm", settings={"threshold.limits": 0.6, "joints": "forarm"})
 
 

@@ -207,7 +207,11 @@ def refuse_beside_signature(values: Mapping[str, Any], place: Place, names: Sequ
 
 
 def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a file with those of `--set`, whose keys have dots between the tables."""
+    """Return the values of a file with those of `--set`, whose keys have dots between the tables.
+
+    >>> apply_settings({"threshold": "glr"}, {"threshold.order": 4, 'impacts."stiff 1.5".window_s': 2})
+    {'threshold': {'name': 'glr', 'order': 4}, 'impacts': {'stiff 1.5': {'window_s': 2}}}
+    """
     found = dict(values)
     for key, value in settings.items():
         *tables, name = _names_in(key)

@@ -135,7 +135,7 @@ def test_one_stray_stamp_does_not_change_the_verdict(tmp_path, row, stamp):
     log = tmp_path / "03.csv"
     log.write_text("\n".join(lines) + "\n")
     whole, stray = (
-        cdtool.detect(path, gate / "machine.toml", detector="momentum", limit=[300.0])
+        cdtool.detect(path, gate / "machine.toml", detector="momentum", settings={"threshold.limits": 300})
         for path in (gate / "stiff" / "03.csv", log)
     )
     assert [alarm.time for item in whole.detections for alarm in item.verdict.alarms]
