@@ -36,9 +36,11 @@ from cdtool.commands.learning.threshold_settings import threshold_of
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
 from cdtool.execution.workers import Progress, Workers
+from cdtool.formats.channels.channel_map import ChannelMap, TimeSource
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.labels import Labels
 from cdtool.formats.machine_file import MachineFile, read_machine_file
+from cdtool.machines import MACHINES
 from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.operations import RunCut
 from cdtool.results.curves.false_alarm_budget import Budget
@@ -373,19 +375,24 @@ def read_benchmark_file(
     if table is None:
         place.finish()
     assert table is not None
-    machine_file = place.tried(
-        None, lambda: read_machine_file(named_file(place, "machine", joined(file.parent, table.machine)))
-    )
-    if machine_file is None:
-        place.finish()
-    assert machine_file is not None
+    path = joined(file.parent, table.machine)
+    machine_file = place.tried(None, lambda: read_machine_file(named_file(place, "machine", path)))
     stated = {key: value for key, value in (settings or {}).items() if key.partition(".")[0] != "execution"}
     wanted = _Wanted(learning, tuple(also_known), tuple(detectors), stated)
+    if machine_file is None:  # the rest is checked with another one, but for what depends on its channels and model
+        table, machine_file = replace(table, limits={}, inject=None), _other_machine(table.joints)
     benchmark = _resolved(file, table, place, machine_file, wanted)
     place.finish()
     if learning:
         _refuse_unknown_locations(benchmark)
     return benchmark
+
+
+def _other_machine(joints: Sequence[str]) -> MachineFile:
+    values = {"joints": list(joints) or ["axis"], "load_mass": 1.0, "transmission_ratio": 1.0}
+    machine = MACHINES.load("linear_axis").read(values, Place(""))
+    no_channels = ChannelMap(TimeSource(), (), machine.joints)
+    return MachineFile(Path(), machine, no_channels, no_channels, {}, "")
 
 
 @dataclass(frozen=True)

@@ -249,3 +249,15 @@ def test_operations_in_a_machine_file_get_a_hint_where_they_belong(gate, made):
     with pytest.raises(ConfigurationError, match=r"operations: is a key of the benchmark file") as fault:
         read_machine_file(gate / "cut.toml")
     assert "--set operations=motion" in fault.value.hint
+
+
+def test_a_missing_machine_file_hides_no_other_mistake(gate):
+    wrong = (
+        HEAD.replace("machine.toml", "machin.toml").replace('"gm"', '"gmm"')
+        + 'threshold = "cusun"\njoints = ["gate"]\n'
+    )
+    with pytest.raises(ConfigurationError) as fault:
+        run(gate, wrong, '[learn]\nlogs = ["fre/*.csv"]\n', STIFF)
+    said = [line.split("b.toml: ")[1].split(" (")[0] for line in str(fault.value).splitlines()]
+    assert [line.split(": ")[0] for line in said] == ["machine", "detectors", "threshold", "learn.logs"]
+    assert "machin.toml: no such file" in said[0] and "unknown detector 'gmm'" in said[1]
