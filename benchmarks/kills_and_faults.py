@@ -155,7 +155,16 @@ def _run_once(inputs: Path) -> None:
         ("benchmark", f"{inputs}/benchmark.toml", "-o", f"{inputs}/first.json", "-o", f"{inputs}/first.html"),
         ("info", f"{inputs}/1.csv", "-m", f"{inputs}/gate/machine.toml"),
         ("convert", f"{inputs}/1.csv", f"{inputs}/first.csv", "--force"),
-        ("signature", "show", f"{inputs}/a.json", "--plot", f"{inputs}/first.png"),
+        (
+            "detect",
+            f"{inputs}/1.csv",
+            "-m",
+            f"{inputs}/gate/machine.toml",
+            "-s",
+            f"{inputs}/a.json",
+            "--plot",
+            f"{inputs}/first.png",
+        ),
     ):
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             status = _cdtool(words)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cdtool.base.arrays import FloatArray
 from cdtool.impact.restitution import Restitution, newton, poisson, stronge
 
@@ -97,9 +95,3 @@ class Collision:
     def stays(self) -> bool:
         """Whether the bodies stay in contact in the end."""
         return not self.impacts[-1].separated
-
-    @property
-    def last_separation(self) -> float:
-        """Time of the last separation [s]; NaN without one."""
-        ends = [float(impact.time[-1]) for impact in self.impacts if impact.separated]
-        return ends[-1] if ends else float(np.nan)

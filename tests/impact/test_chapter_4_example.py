@@ -145,7 +145,7 @@ def test_eight_contacts_part_and_the_ninth_stays(motion, collision):
     assert [hit.separated for hit in collision.impacts] == [True] * 8 + [False] and collision.stays
     parted = motion.contacts[-2]
     assert 1e3 * (parted.start + parted.duration - motion.contacts[0].start) == pytest.approx(44.25, abs=5e-3)
-    assert 1e3 * collision.last_separation == pytest.approx(44.25, abs=5e-3)
+    assert 1e3 * collision.impacts[-2].time[-1] == pytest.approx(44.25, abs=5e-3)
 
 
 def test_the_load_comes_to_rest_where_the_push_is_carried():

@@ -177,8 +177,3 @@ def test_without_an_integral_part_the_torque_stays_below_the_force():
     proportional = replace(example.SPEED_LOOP, integral=0.0)
     found = torque_by_force(example.TRANSMISSION, proportional)
     assert found.gain == pytest.approx(0.015 * 0.05 / (0.05 + 0.03))
-
-
-def test_scipy_gets_the_same_transfer_function():
-    found = about(10)
-    assert found.as_scipy().poles == pytest.approx(found.poles)

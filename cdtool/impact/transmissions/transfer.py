@@ -12,7 +12,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
 
 if TYPE_CHECKING:
-    from scipy.signal import TransferFunction
+    pass
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -52,12 +52,6 @@ class Transfer:
         while numerator[-1] == denominator[-1] == 0.0:
             numerator, denominator = numerator[:-1], denominator[:-1]
         return Transfer(_trimmed(numerator), _trimmed(denominator), self.unit)
-
-    def as_scipy(self) -> TransferFunction[np.float64, np.float64]:
-        """The same for scipy.signal."""
-        from scipy.signal import TransferFunction
-
-        return TransferFunction(*self._coefficients)
 
     @property
     def _coefficients(self) -> tuple[FloatArray, FloatArray]:

@@ -105,7 +105,7 @@ from cdtool.commands.app import app
 from typer.main import get_command
 from typer import Context
 group = get_command(app)
-for name, option in (("benchmark", "--detectors"), ("tune", "--thresholds"), ("list", "kind")):
+for name, option in (("benchmark", "--detectors"), ("tune", "--detectors"), ("list", "kind")):
     command = group.get_command(Context(group), name)
     parameter = next(item for item in command.params if option in (*item.opts, item.name))
     assert parameter.shell_complete(Context(command), ""), option

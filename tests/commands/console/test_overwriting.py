@@ -145,7 +145,6 @@ def test_plots_are_drawn_again_over_figures_of_cdtool_only(folder):
     commands = (
         ("detect", *log, "--plot", plot),
         ("explain", *log, "--plot", plot),
-        ("signature", "show", signature, "--plot", plot),
         ("study", "sensors", "-m", folder / "machine.toml", "--set", "impact.speed=0.2", "-o", plot),
     )
     for words in commands:

@@ -17,8 +17,8 @@ from tests.synthetic.builds import build_results
 
 # What these print is what they are asked for: nothing would be left of it.
 ONLY_A_TABLE = {"info", "explain", "list", "plan", "schema", "store", "study", "signature show", "protocol"}
-# These print what they wrote, and a bar on a terminal.
-ONLY_A_BAR = {"convert", "simulate"}
+# These print what they wrote or drafted, and a bar on a terminal.
+ONLY_A_BAR = {"convert", "init", "simulate"}
 _HEADINGS = re.compile(r"^ *(detector|group|recording|stiffness|key|class|run) {2,}\w", re.MULTILINE)
 
 

@@ -147,7 +147,7 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
         ),
         (
             '[signature]\nspeed_range = true\nalignment = "time"\n',
-            "signature: speed_range cannot be combined with alignment 'time'.*time_then_position",
+            "signature.speed_range: cannot be combined with alignment 'time'.*time_then_position",
         ),
         ('[signature]\nspeed_range = "yes"\n', "signature.speed_range: is 'yes'"),
     ],

@@ -30,7 +30,7 @@ def words_of_the_command_for(folder: str) -> list[str]:
     (line,) = [line for line in lines if line.endswith(f" -o sample_logs/{folder}")]
     words = shlex.split(line)[:-1]
     for group in set(GROUPS) - set(FOLDERS[folder]):
-        words[words.index(f"--{group}") + 1] = "0"
+        words = [f"{group}=0" if word.startswith(f"{group}=") else word for word in words]
     return words
 
 
