@@ -77,7 +77,6 @@ PARSED_ELSEWHERE = {
     "cdtool/commands/console/console.py": "the result of a command, encoded two lines above",
     "cdtool/formats/messages/json_messages.py": "one message of a log, whose nesting is a reason",
     "cdtool/commands/protocol/document/words.py": "a file of the package",
-    "cdtool/commands/init/command.py": "one value of an option",
     "cdtool/base/findings/kinds.py": "a file of the package",
     "cdtool/commands/init/names/units_in_names.py": "the table of units that ships with cdtool",
     "cdtool/commands/init/names/words.py": "the table of words that ships with cdtool",
