@@ -116,7 +116,7 @@ def _chosen(key: str, tables: Mapping[str, dict[str, Any]], *, required: bool) -
     for table in tables.values():
         properties |= {name: value for name, value in table["properties"].items() if name not in properties}
     depends: dict[str, Any] = {}
-    for name, table in reversed(tables.items()):  # nested: taplo proposes no key of a table that has an allOf
+    for name, table in reversed(list(tables.items())):  # nested: taplo proposes no key of a table that has an allOf
         names = {"enum": sorted({key, *table["properties"]})}
         depends = {
             "if": {"properties": {key: {"const": name}}, "required": [key]},

@@ -371,12 +371,16 @@ def read_benchmark_file(
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
-    table = read(BenchmarkTable, apply_settings(values, settings or {}), place)
+    given, machine_file = apply_settings(values, settings or {}), None
+    table = read(BenchmarkTable, given, place)
+    if table is not None:
+        named = joined(file.parent, table.machine)
+        machine_file = place.tried(None, lambda: read_machine_file(named_file(place, "machine", named)))
+    else:  # perhaps only for want of a machine
+        table = read(BenchmarkTable, {**given, "machine": ""}, replace(place, mistakes=[], misspelt=[]))
     if table is None:
         place.finish()
     assert table is not None
-    path = joined(file.parent, table.machine)
-    machine_file = place.tried(None, lambda: read_machine_file(named_file(place, "machine", path)))
     stated = {key: value for key, value in (settings or {}).items() if key.partition(".")[0] != "execution"}
     wanted = _Wanted(learning, tuple(also_known), tuple(detectors), stated)
     if machine_file is None:  # the rest is checked with another one, but for what depends on its channels and model

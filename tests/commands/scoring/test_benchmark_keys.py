@@ -261,3 +261,13 @@ def test_a_missing_machine_file_hides_no_other_mistake(gate):
     said = [line.split("b.toml: ")[1].split(" (")[0] for line in str(fault.value).splitlines()]
     assert [line.split(": ")[0] for line in said] == ["machine", "detectors", "threshold", "learn.logs"]
     assert "machin.toml: no such file" in said[0] and "unknown detector 'gmm'" in said[1]
+
+
+@pytest.mark.parametrize("machine", ["", "machine = 3\n", "machine = machine.toml\n"])
+def test_a_machine_that_is_not_named_hides_no_other_mistake(gate, machine):
+    wrong = HEAD.replace('machine = "machine.toml"\n', machine).replace('"gm"', '"gmm"') + 'threshold = "cusun"\n'
+    with pytest.raises(ConfigurationError) as fault:
+        run(gate, wrong, '[learn]\nlogs = ["fre/*.csv"]\n', STIFF)
+    first, *others = [line.split("b.toml: ")[1] for line in str(fault.value).splitlines()]
+    assert first.startswith("not valid TOML: Invalid value (at line 1" if machine.endswith("toml\n") else "machine: ")
+    assert [line.split(": ")[0] for line in others] == ["detectors", "threshold", "learn.logs"]
