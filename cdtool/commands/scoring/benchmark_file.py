@@ -149,7 +149,10 @@ class BenchmarkTable(JudgingTable):
     holdout: Annotated[
         LogsTable | None, setting("impact-free logs for false alarms, none of which is learned from")
     ] = None
-    impacts: Annotated[dict[str, ImpactsTable], setting("groups of logs with impacts")] = field(default_factory=dict)
+    impacts: Annotated[
+        dict[str, ImpactsTable],
+        setting("groups of logs with impacts", hint="define groups of impact logs: [impacts.stiff] logs = [...]"),
+    ] = field(default_factory=dict)
     conditions: Annotated[dict[str, ConditionTable], setting("changed conditions of the machine")] = field(
         default_factory=dict
     )
@@ -159,9 +162,10 @@ class BenchmarkTable(JudgingTable):
     points: Annotated[dict[str, LogList], setting("tests at one point of the machine: their forces are averaged")] = (
         field(default_factory=dict)
     )
-    limits: Annotated[dict[str, Bounds], setting("what a pipeline checks: detector.group.metric")] = field(
-        default_factory=dict
-    )
+    limits: Annotated[
+        dict[str, Bounds],
+        setting("what a pipeline checks: detector.group.metric", hint="give { max = 50 }, { min = 1 } or both"),
+    ] = field(default_factory=dict)
     inject: Annotated[dict[str, Any] | None, setting("contacts that are put into impact-free logs")] = None
     protocol: Annotated[dict[str, Any] | None, setting("the test protocol of the benchmark")] = None
     tune: Annotated[dict[str, Any] | None, setting("what cdtool tune minimises and tries")] = None

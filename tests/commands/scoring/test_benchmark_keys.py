@@ -160,6 +160,7 @@ def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
         ('[force]\nprofil = "x"\n', "force.profil: unknown key"),
         ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*also in 'a'"),
         ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown metric"),
+        ('[limits]\n"gm.stiff.p95_ms" = 50\n', "limits.gm.stiff.p95_ms: is 50 .give { max = 50 }, { min = 1 } or both"),
     ],
 )
 def test_a_wrong_key_is_one_line_that_names_it(gate, text, said):
