@@ -426,7 +426,7 @@ def _table(key: Key, kind: Any, values: Mapping[str, Any], place: Place) -> Any:
 def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
     """Return a list; a single value is a list with one. Its items are counted from 1; --set may have joints=a,b."""
     kinds = [part for part in get_args(hint) if part is not Ellipsis]
-    if isinstance(value, str) and bare_type(kinds[0]) is str and place.is_option(name):
+    if isinstance(value, str) and str in map(bare_type, alternatives(kinds[0])) and place.is_option(name):
         value = [part.strip() for part in value.split(",")]
     single = not isinstance(value, list | tuple)
     items = [value] if single else value

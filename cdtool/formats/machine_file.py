@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +20,14 @@ from cdtool.base.remote.remote_path import location
 from cdtool.base.settings import Place, read, setting
 from cdtool.base.value_words import value_in_words
 from cdtool.detectors import DETECTORS
-from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TablePins, TimeSource, channel_maps
+from cdtool.formats.channels.channel_map import (
+    ChannelMap,
+    ChannelSource,
+    ColumnsTable,
+    TablePins,
+    TimeSource,
+    channel_maps,
+)
 from cdtool.machines import MACHINES
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.machines.joint_machine import per_joint
@@ -135,6 +143,8 @@ def read_machine_file(path: str | Path) -> MachineFile:
         given, below, units = written.get("channels", {}), place.below("channels"), machine.accepted_units
         columns, topics = channel_maps(given, below, joints, units)
         topics = replace(topics, named=len(joints) > 1 or "joints" in values["machine"])
+    elif isinstance(given := written.get("channels"), dict):  # how many columns and which units needs the machine
+        read(ColumnsTable, given, place.below("channels"))
     pins, model = TablePins(), None
     gains: dict[str, dict[str, Gain]] = {}
     if table is not None:
@@ -166,9 +176,19 @@ def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:
     known = MACHINES.names_for(kind)
     if kind not in known:
         problem = "is missing" if kind is None else f"is {value_in_words(kind)}"
-        raise place.below("machine").fault("type", problem, nearest(str(kind), known))
+        place.below("machine").note("type", problem, nearest(str(kind), known))
+        close = get_close_matches(str(kind), known, n=1, cutoff=0.7)
+        if not close:
+            return None
+        kind = close[0]  # to check the rest of the file
     machine: Machine | None = MACHINES.load(kind).read(table, place.below("machine"))
-    return machine
+    return machine or MACHINES.load(kind).read(_least(table), Place(""))
+
+
+def _least(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of [machine] that make an axis to check the channels with, whatever is wrong with the others."""
+    ratio = {} if table.get("coordinates") == "load" else {"transmission_ratio": 1.0}
+    return {**ratio, **{key: table[key] for key in ("name", "joints", "coordinates") if key in table}}
 
 
 def fingerprint(machine: Machine) -> str:

@@ -15,14 +15,14 @@ import re
 import stat
 import tomllib
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from sys import intern
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdtool.base.errors import CdtoolError, ConfigurationError
+from cdtool.base.errors import CdtoolError, ConfigurationError, MistakesError
 from cdtool.base.files.kinds import kind_of
 from cdtool.base.remote.storage import StorageError
 
@@ -50,6 +50,8 @@ _PIECE = MIB
 _MOST_DIGITS = 19
 _LARGEST_INTEGER = 2**63
 
+#: The beginning of a table or of a key with its value; not that of an item in a list.
+_STATEMENT = re.compile(r"""\s*+(?:\[\[?[\w.' "-]++\]|(?:[\w.-]++|"[^"]*+")\s*+=)""")
 # The time that tomllib takes for a key is quadratic in its parts.
 _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')\s*+\.\s*+){16}""")
 # The end is optional: the rest of an unterminated text is searched only once, not from each of its quotes.
@@ -60,7 +62,8 @@ _NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
 class ContentError(ValueError):
     """The contents of a file are not as required; the text is the reason, on one line, without the file's name.
 
-    `line` is the one that is not TOML, counted from 1, if the rest of the text may be.
+    `line` is the one that is not TOML, counted from 1, if the rest of the text may be; behind the last one if it ends
+    too early.
     """
 
     line: int | None = None
@@ -128,7 +131,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as fault:
         broken = ContentError(str(fault))
         at = re.search(r"at line (\d+)", str(fault))  # of tomllib, which has no attribute for it before Python 3.14
-        broken.line = int(at[1]) if at else None
+        broken.line = int(at[1]) if at else text.count("\n") + 1
         raise broken from fault
     except RecursionError as fault:
         raise ContentError("nested too deeply") from fault
@@ -148,21 +151,41 @@ def read_toml(path: Path, what: str, place: Place | None = None) -> dict[str, An
     until the next one.
     """
     text = read_text(path, ConfigurationError, most=MOST_TOML)
-    lines = text.splitlines()
+    lines, mistakes = text.splitlines(), place.mistakes if place else []
     for _ in range(_MOST_BROKEN_LINES):
         try:
             return parse_toml("\n".join(lines) + "\n")
         except ContentError as fault:
-            error, line = _not_toml(path, text, what, fault), (fault.line or 0) - 1
-            if place is None or _other_kind(text) or not 0 <= line < len(lines) or not lines[line].strip():
-                raise error from fault
-            place.mistakes.append(error)
-            broken_header = lines[line].lstrip().startswith("[")
+            broken, reason = _broken_lines(lines, fault)
+            mistakes.append(_not_toml(path, text, what, reason))
+        if place is None or not broken or _other_kind(text):
+            break
+        for line in broken:
             lines[line] = ""
-            while broken_header and line + 1 < len(lines) and not lines[line + 1].lstrip().startswith("["):
-                line += 1
-                lines[line] = ""
-    raise place.mistakes[-1] if place else ConfigurationError(f"{path}: not valid TOML")
+    raise MistakesError.of(mistakes)
+
+
+def _broken_lines(lines: Sequence[str], fault: ContentError) -> tuple[range, str]:
+    """Return the lines without which the rest may be TOML, empty if none are known, and what is wrong with them.
+
+    A list without its end is reported where the next statement begins, or at the end of the text.
+    """
+    if fault.line is None:
+        return range(0), str(fault)
+    line = fault.line - 1
+    reported = lines[line] if line < len(lines) else ""
+    if not reported.strip() or _STATEMENT.match(reported):
+        above = next((i for i in reversed(range(line)) if _STATEMENT.match(lines[i])), line)
+        try:
+            parse_toml("\n".join(lines[above:line]))
+        except ContentError:
+            return range(above, line), f"a list that does not end (at line {above + 1})"
+    if not reported.strip():
+        return range(0), str(fault)
+    end = line + 1
+    if reported.lstrip().startswith("["):
+        end = next((i for i in range(end, len(lines)) if lines[i].lstrip().startswith("[")), len(lines))
+    return range(line, end), str(fault)
 
 
 def _other_kind(text: str) -> str:
@@ -171,10 +194,10 @@ def _other_kind(text: str) -> str:
     return "" if kind.endswith(("machine file", "benchmark file")) else kind
 
 
-def _not_toml(path: Path, text: str, what: str, fault: ContentError) -> ConfigurationError:
+def _not_toml(path: Path, text: str, what: str, reason: str) -> ConfigurationError:
     kind = _other_kind(text)
     if not kind:
-        return ConfigurationError(f"{path}: not valid TOML: {fault}", "write texts in quotes, decimals with a point")
+        return ConfigurationError(f"{path}: not valid TOML: {reason}", "write texts in quotes, decimals with a point")
     swapped = "; it may be swapped with the signature" if (kind, what) == _SWAPPED else ""
     return ConfigurationError(f"{path}: is {kind}, not {what}", f"give {what}{swapped}")
 

@@ -115,19 +115,17 @@ def _chosen(key: str, tables: Mapping[str, dict[str, Any]], *, required: bool) -
     properties: dict[str, Any] = {}
     for table in tables.values():
         properties |= {name: value for name, value in table["properties"].items() if name not in properties}
-    depends = [
-        {
+    depends: dict[str, Any] = {}
+    for name, table in reversed(list(tables.items())):  # nested: taplo proposes no key of a table that has an allOf
+        names = {"enum": sorted({key, *table["properties"]})}
+        depends = {
             "if": {"properties": {key: {"const": name}}, "required": [key]},
-            "then": {
-                "propertyNames": {"enum": sorted({key, *table["properties"]})},
-                "required": table.get("required", []),
-            },
+            "then": {"propertyNames": names, "required": table.get("required", [])},
+            "else": depends,
         }
-        for name, table in tables.items()
-    ]
     properties[key] = {**properties.get(key, {}), "enum": list(tables)}
     needed = {"required": [key]} if required else {}
-    return {"type": "object", "properties": properties, **needed, "allOf": depends}
+    return {"type": "object", "properties": properties, **needed, **depends}
 
 
 def _protocol() -> dict[str, Any]:

@@ -71,7 +71,7 @@ def detect(
 
     With --benchmark the results match those of `cdtool benchmark`.
 
-    Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
+    Example: cdtool detect stiff/03.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
     from cdtool.base.files.writing import made_folder
     from cdtool.commands.detecting.prepared import prepared

@@ -63,7 +63,7 @@ def explain(
 
     With --benchmark the results match those of `cdtool benchmark`.
 
-    Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
+    Example: cdtool explain stiff/03.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
     from cdtool.commands.detecting.prepared import prepared
     from cdtool.commands.explain.explaining import explain_log

@@ -34,7 +34,7 @@ def info(
 ) -> None:
     """Show a log's channels, units, rates, duration, gaps, and warnings; with a machine file, also how late they are.
 
-    Example: cdtool info sample_logs/gate/stiff/01.csv --machine sample_logs/gate/machine.toml
+    Example: cdtool info sample_logs/gate/stiff/03.csv --machine sample_logs/gate/machine.toml
     """
     from cdtool.commands.judging.information import common_latencies
     from cdtool.commands.judging.information import info as survey

@@ -41,7 +41,8 @@ def threshold_of(
         raise below.fault(key, f"is {name!r}", nearest(str(name), known))
     if name == _DEFAULT:
         for other in table:
-            below.note(other, "is not a key of this table", "the signature's settings are in [signature]")
+            hint = "name its threshold with threshold.name; the signature's settings are in [signature]"
+            below.note(other, "is not a key of the threshold signature", hint)
         return name, signature, signature
     for own, problem in (("adaptive_level", "does not follow a run"), ("speed_range", "has no limits between speeds")):
         if getattr(signature, own):

@@ -12,6 +12,7 @@ from cdtool.base.files.bounded_loading import read_bytes, read_toml
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import Place, read, setting
 from cdtool.base.value_words import value_in_words
+from cdtool.commands.judging.named_logs import named_file
 from cdtool.commands.protocol.assessment.plan import MeasuringPoint, TestPlan
 from cdtool.truth.force.limits import ForceProfile, profile_of, read_force_limits
 
@@ -90,7 +91,7 @@ def read_protocol_file(path: str | Path) -> ProtocolFile:
         raise place.fault(TABLE, f"is {value_in_words(values[TABLE])}", f"add a table [{TABLE}]")
     if TABLE not in values:
         raise ConfigurationError(f"{file}: has no table [protocol]", "draft one: cdtool protocol init BENCHMARK")
-    is_benchmark = "machine" in values
+    is_benchmark = "machine" in values and not isinstance(values["machine"], dict)
     for name in values:
         if name != TABLE and not is_benchmark:
             place.note(name, "unknown key", f"known: {TABLE}")
@@ -100,7 +101,9 @@ def read_protocol_file(path: str | Path) -> ProtocolFile:
         place.finish()
     assert table is not None
     limits = joined(file.parent, table.limits) if table.limits else None
-    profiles: dict[str, ForceProfile] = place.tried({}, read_force_limits, limits)
+    profiles: dict[str, ForceProfile] = place.tried(
+        {}, lambda: read_force_limits(limits and named_file(below, "limits", limits))
+    )
     if is_benchmark and table.benchmark:
         below.note("benchmark", "is only for a file of its own", "remove the key")
     for number, point in enumerate(table.points, 1):

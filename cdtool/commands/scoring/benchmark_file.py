@@ -149,7 +149,10 @@ class BenchmarkTable(JudgingTable):
     holdout: Annotated[
         LogsTable | None, setting("impact-free logs for false alarms, none of which is learned from")
     ] = None
-    impacts: Annotated[dict[str, ImpactsTable], setting("groups of logs with impacts")] = field(default_factory=dict)
+    impacts: Annotated[
+        dict[str, ImpactsTable],
+        setting("groups of logs with impacts", hint="define groups of impact logs: [impacts.stiff] logs = [...]"),
+    ] = field(default_factory=dict)
     conditions: Annotated[dict[str, ConditionTable], setting("changed conditions of the machine")] = field(
         default_factory=dict
     )
@@ -159,9 +162,10 @@ class BenchmarkTable(JudgingTable):
     points: Annotated[dict[str, LogList], setting("tests at one point of the machine: their forces are averaged")] = (
         field(default_factory=dict)
     )
-    limits: Annotated[dict[str, Bounds], setting("what a pipeline checks: detector.group.metric")] = field(
-        default_factory=dict
-    )
+    limits: Annotated[
+        dict[str, Bounds],
+        setting("what a pipeline checks: detector.group.metric", hint="give { max = 50 }, { min = 1 } or both"),
+    ] = field(default_factory=dict)
     inject: Annotated[dict[str, Any] | None, setting("contacts that are put into impact-free logs")] = None
     protocol: Annotated[dict[str, Any] | None, setting("the test protocol of the benchmark")] = None
     tune: Annotated[dict[str, Any] | None, setting("what cdtool tune minimises and tries")] = None
@@ -371,12 +375,16 @@ def read_benchmark_file(
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
-    table = read(BenchmarkTable, apply_settings(values, settings or {}), place)
+    given, machine_file = apply_settings(values, settings or {}), None
+    table = read(BenchmarkTable, given, place)
+    if table is not None:
+        named = joined(file.parent, table.machine)
+        machine_file = place.tried(None, lambda: read_machine_file(named_file(place, "machine", named)))
+    else:  # perhaps only for want of a machine
+        table = read(BenchmarkTable, {**given, "machine": ""}, replace(place, mistakes=[], misspelt=[]))
     if table is None:
         place.finish()
     assert table is not None
-    path = joined(file.parent, table.machine)
-    machine_file = place.tried(None, lambda: read_machine_file(named_file(place, "machine", path)))
     stated = {key: value for key, value in (settings or {}).items() if key.partition(".")[0] != "execution"}
     wanted = _Wanted(learning, tuple(also_known), tuple(detectors), stated)
     if machine_file is None:  # the rest is checked with another one, but for what depends on its channels and model

@@ -8,8 +8,17 @@ import tracemalloc
 
 import pytest
 
-from cdtool.base.errors import ConfigurationError
-from cdtool.base.files.bounded_loading import MIB, MOST_TOML, ContentError, parse_own_json, parse_toml, read_text
+from cdtool.base.errors import ConfigurationError, MistakesError
+from cdtool.base.files.bounded_loading import (
+    MIB,
+    MOST_TOML,
+    ContentError,
+    parse_own_json,
+    parse_toml,
+    read_text,
+    read_toml,
+)
+from cdtool.base.settings import Place
 from cdtool.commands.inject.injected_logs import read_injected
 from tests.command import cdtool
 from tests.project.pages import ROOT
@@ -38,6 +47,29 @@ def test_the_mark_at_the_start_of_a_windows_text_is_no_part_of_it(tmp_path):
     assert read_text(file, ConfigurationError) == "[machine]\n"
 
 
+@pytest.mark.parametrize(
+    ("text", "lines", "rest"),
+    [
+        ('a = ["x"\nb = 1\n[t]\nc = 2\n', [1], {"b": 1, "t": {"c": 2}}),
+        ('a = [\n "x",\n "y",\n\n[t]\nc = 2 m\nd = 4\n', [1, 6], {"t": {"d": 4}}),
+        ('a = [\n "b=x"\n "y",\n]\nc = 1\n', [3], {"a": ["b=x"], "c": 1}),
+        ("a = 1,5\n[t]\nb = 2\nc = [\n", [1, 4], {"t": {"b": 2}}),
+    ],
+)
+def test_a_list_that_does_not_end_hides_nothing_behind_it(tmp_path, text, lines, rest):
+    file, place = tmp_path / "benchmark.toml", Place("benchmark.toml")
+    file.write_text(text, encoding="utf-8")
+    assert read_toml(file, "a benchmark file", place) == rest
+    assert all(f"at line {line}" in str(fault) for line, fault in zip(lines, place.mistakes, strict=True))
+
+
+def test_a_text_that_does_not_end_does_not_hide_the_broken_lines_before_it(tmp_path):
+    file = tmp_path / "benchmark.toml"
+    file.write_text('a = 1,5\nb = """c\nd = 3\n', encoding="utf-8")
+    with pytest.raises(MistakesError, match=r"at line 1(.|\n)*Unterminated string"):
+        read_toml(file, "a benchmark file", Place("benchmark.toml"))
+
+
 NESTED = "[" * 200_000
 # These texts are not from a file, or the reader of a message catches what deep nesting raises.
 PARSED_ELSEWHERE = {
@@ -45,7 +77,6 @@ PARSED_ELSEWHERE = {
     "cdtool/commands/console/console.py": "the result of a command, encoded two lines above",
     "cdtool/formats/messages/json_messages.py": "one message of a log, whose nesting is a reason",
     "cdtool/commands/protocol/document/words.py": "a file of the package",
-    "cdtool/commands/init/command.py": "one value of an option",
     "cdtool/base/findings/kinds.py": "a file of the package",
     "cdtool/commands/init/names/units_in_names.py": "the table of units that ships with cdtool",
     "cdtool/commands/init/names/words.py": "the table of words that ships with cdtool",

@@ -14,12 +14,16 @@ from cdtool.detectors import DETECTORS
 from cdtool.results.results import SCHEMA_VERSION
 from tests.command import FEW, cdtool, keys, one_line
 
+ROOT = Path(__file__).parents[3]
+
 
 @pytest.mark.parametrize("command", STATUSES_OF)
 def test_every_help_contains_an_example_and_exits_with_0(command):
     done = cdtool(*command.split(), "--help")
     assert done.status == 0
     assert "Example: cdtool" in one_line(done.out)
+    samples = re.findall(r"sample_logs/\S+", one_line(done.out))
+    assert not [path for path in samples if not list(ROOT.glob(path.strip("'")))]
 
 
 def test_the_version_is_shown():

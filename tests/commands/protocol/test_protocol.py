@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.base.errors import MistakesError
 from cdtool.commands.protocol.document.names import protocol_names
+from cdtool.commands.protocol.protocol_file import read_protocol_file
 from tests.command import Outcome, cdtool
 from tests.synthetic.force_rig import half_sine, write_protocol, write_rig
 
@@ -250,3 +252,13 @@ def test_check_as_json_lists_kinds_and_keys(rig):
     checked = json.loads(cdtool("protocol", "check", write_protocol(rig, valid_until="2026-01-20"), "--json").out)
     assert checked["complete"] is False and checked["recordings"] == {"edge": 3}
     assert [item["kind"] for item in checked["incomplete"]] == ["calibration_expired"]
+
+
+def test_a_protocol_file_names_the_key_of_a_missing_file_and_is_no_benchmark_for_a_table_machine(tmp_path):
+    text = '[protocol]\nbenchmark = "b.toml"\nlimits = "yard.toml"\n[machine]\ntype = "gate"\n'
+    point = "[[protocol.point]]\nrepetition = 4\nspeed_tolerance_percent = 30\n"
+    (tmp_path / "protocol.toml").write_text(text + point, encoding="utf-8")
+    with pytest.raises(MistakesError) as caught:
+        read_protocol_file(tmp_path / "protocol.toml")
+    keys = ["machine", "protocol.limits", "protocol.point[1].repetition", "protocol.point[1].speed_tolerance_percent"]
+    assert sorted(fault.key for fault in caught.value.mistakes) == keys

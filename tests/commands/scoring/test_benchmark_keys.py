@@ -160,6 +160,7 @@ def test_a_copy_of_a_learned_log_is_not_scored_under_another_name(gate):
         ('[force]\nprofil = "x"\n', "force.profil: unknown key"),
         ('[points.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/01.csv"]\n', "points.b.*also in 'a'"),
         ('[limits]\n"gm.stiff.p9_ms" = { max = 1 }\n', "limits.gm.stiff.p9_ms: unknown metric"),
+        ('[limits]\n"gm.stiff.p95_ms" = 50\n', "limits.gm.stiff.p95_ms: is 50 .give { max = 50 }, { min = 1 } or both"),
     ],
 )
 def test_a_wrong_key_is_one_line_that_names_it(gate, text, said):
@@ -261,3 +262,13 @@ def test_a_missing_machine_file_hides_no_other_mistake(gate):
     said = [line.split("b.toml: ")[1].split(" (")[0] for line in str(fault.value).splitlines()]
     assert [line.split(": ")[0] for line in said] == ["machine", "detectors", "threshold", "learn.logs"]
     assert "machin.toml: no such file" in said[0] and "unknown detector 'gmm'" in said[1]
+
+
+@pytest.mark.parametrize("machine", ["", "machine = 3\n", "machine = machine.toml\n"])
+def test_a_machine_that_is_not_named_hides_no_other_mistake(gate, machine):
+    wrong = HEAD.replace('machine = "machine.toml"\n', machine).replace('"gm"', '"gmm"') + 'threshold = "cusun"\n'
+    with pytest.raises(ConfigurationError) as fault:
+        run(gate, wrong, '[learn]\nlogs = ["fre/*.csv"]\n', STIFF)
+    first, *others = [line.split("b.toml: ")[1] for line in str(fault.value).splitlines()]
+    assert first.startswith("not valid TOML: Invalid value (at line 1" if machine.endswith("toml\n") else "machine: ")
+    assert [line.split(": ")[0] for line in others] == ["detectors", "threshold", "learn.logs"]

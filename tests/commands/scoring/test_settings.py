@@ -51,6 +51,8 @@ def test_results_state_the_settings_and_differ_in_their_digest(results):
         ("activation.debonce=3", "--set activation.debonce: unknown key (did you mean debounce?"),
         ("activaton.debounce=3", "--set activaton: unknown key (did you mean activation"),
         ("debounce", "--set is 'debounce' (give KEY=VALUE"),
+        ("learn.logs=free/*.csv, frei/*.csv", "--set learn.logs: no file matches 'frei/*.csv'"),
+        ("threshold.limit=400", "threshold.limit: is not a key of the threshold signature (name its threshold with"),
     ],
 )
 def test_a_wrong_setting_is_one_line_that_names_the_option(gate_folder, text, said):

@@ -120,8 +120,9 @@ class MeasuringPoint:
             raise FieldsError(("group", "logs"), f"is given with logs for '{self.name}'", "give one of them")
         check(self)
         if not 0.0 <= self.speed_tolerance <= MOST_SPEED_TOLERANCE:
-            raise UsageError(
-                f"speed_tolerance_percent of the measuring point '{self.name}' is {self.speed_tolerance_percent:g}",
+            raise FieldsError(
+                ("speed_tolerance_percent",),
+                f"is {self.speed_tolerance_percent:g}",
                 f"give at most {100.0 * MOST_SPEED_TOLERANCE:g}: a test at another speed is another test",
             )
 
