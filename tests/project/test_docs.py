@@ -66,7 +66,6 @@ COMMANDS = {
 }
 EXAMPLES = {
     "docs/python.md": 13,
-    "docs/comparing.md": 1,
     "docs/impact.md": 10,
     "docs/signature.md": 1,
     "docs/simulators.md": 2,
