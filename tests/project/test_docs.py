@@ -65,7 +65,6 @@ COMMANDS = {
 EXAMPLES = {
     "docs/python.md": 13,
     "docs/impact.md": 10,
-    "docs/signature.md": 1,
     "docs/simulators.md": 2,
     "docs/detectors/friction-ekf.md": 1,
 }
