@@ -1,4 +1,4 @@
-"""The edits of docs/first-log.md: python docs/examples/first_log_edits.py MACHINE_FILE
+"""The edits of docs/init.md: python docs/examples/first_log_edits.py MACHINE_FILE
 
 A person reads the list of columns beside the log and corrects three lines of the drafted machine file.
 """

@@ -16,6 +16,7 @@ DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 # A recipe that is installed for its tests adds its page.
 MACHINE_PAGES = [DOCS / "machine-file.md"]
+MACHINE_EXAMPLES = [DOCS / "examples" / "planar_arm.toml", DOCS / "examples" / "scara.toml"]
 FENCE = re.compile(
     r"^(?:<!-- exit (?P<status>\d) -->\n)?```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.MULTILINE | re.DOTALL
 )
@@ -31,11 +32,10 @@ def toml_blocks(page: Path) -> list[str]:
 
 
 def machine_files() -> Iterator[tuple[str, str]]:
-    """Each whole machine file that docs/machine-file.md shows: the machine's type and the text."""
-    for page in MACHINE_PAGES:
-        for text in toml_blocks(page):
-            if "[machine]" in text:
-                yield tomllib.loads(text)["machine"]["type"], text
+    """Each whole machine file that docs/machine-file.md shows or links: the machine's type and the text."""
+    shown = [text for page in MACHINE_PAGES for text in toml_blocks(page) if "[machine]" in text]
+    for text in [*shown, *(file.read_text(encoding="utf-8") for file in MACHINE_EXAMPLES)]:
+        yield tomllib.loads(text)["machine"]["type"], text
 
 
 def check_detector_page(detector: Mapping[str, Any], text: str) -> None:

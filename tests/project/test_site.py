@@ -68,7 +68,7 @@ def test_the_front_page_begins_as_the_readme():
         "evaluation.md#not-assessable",
         "choosing.md",  # which detector
         "ci.md#status-3-what-now",
-        "citing.md",
+        "index.md#how-to-cite",
     ],
 )
 def test_the_front_page_leads_to_what_people_come_for(page):

@@ -1,4 +1,4 @@
-"""A stranger's logs without header, free runs or model: from `init` to latencies (docs/first-log.md), reduced."""
+"""A stranger's logs without header, free runs or model: from `init` to latencies (docs/init.md), reduced."""
 
 from __future__ import annotations
 
