@@ -298,6 +298,14 @@ def _(table: Table) -> Content:
     return _with_cell(table, "N/A"), truth
 
 
+@_case("a number for a missing value, pinned: only as it is written", pins='missing = ["-999"]')
+def _(table: Table) -> Content:
+    table.a[5], table.a[7] = "-999", "-999.0"
+    truth = table.truth()
+    truth["a"][5] = math.nan
+    return table.text(), truth
+
+
 def _with_cell(table: Table, cell: str, row: int = 5) -> str:
     lines = table.text().splitlines()
     cells = lines[row + 1].split(",")

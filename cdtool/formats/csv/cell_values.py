@@ -73,7 +73,8 @@ class CellValues:
 
     def multiples(self, cells: Sequence[str]) -> Integers:
         """Return numbers without a sign or an exponent as `RequestedColumns.whole`; MISSING_STAMP for other cells."""
-        return np.array([_multiple(cell, self.requested.decimals) for cell in cells], dtype=np.int64)
+        known = ("" if cell in self.dialect.missing else cell for cell in cells)
+        return np.array([_multiple(cell, self.requested.decimals) for cell in known], dtype=np.int64)
 
     def _number(self, column: int, cell: str) -> float | None:
         """Return a number, or the code of a text in a column of categories; NaN if missing, None if unreadable.

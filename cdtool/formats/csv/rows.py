@@ -24,7 +24,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.csv.cell_values import CellValues, RequestedColumns
-from cdtool.formats.csv.cells import MISSING, kind, split_line
+from cdtool.formats.csv.cells import MISSING, kind, number, split_line
 from cdtool.formats.csv.stamps import Integers
 from cdtool.formats.csv.table_lines import TableLines
 from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
@@ -240,7 +240,10 @@ def _parsed(
     dtypes: Any = np.float64  # one type is quicker than one for each column
     if texts:
         dtypes = dict.fromkeys(columns, np.float64) | dict.fromkeys(texts, np.object_)
-    missing = [text.encode(dialect.text.stream_encoding, "replace").decode("latin-1") for text in dialect.missing]
+    # pandas would take each number that equals a pinned one as missing, in whatever digits.
+    pinned = {text: value for text in dialect.missing if (value := number(text, dialect.marks.decimal)) is not None}
+    words = [text for text in dialect.missing if text not in pinned]
+    missing = [text.encode(dialect.text.stream_encoding, "replace").decode("latin-1") for text in words]
     frame = pd.read_csv(
         io.BytesIO(block),
         sep=dialect.separator,
@@ -260,6 +263,8 @@ def _parsed(
         low_memory=False,
         **_EXACT,
     )
+    if np.isin(frame[[*numeric]], [*pinned.values()]).any():
+        raise ValueError("a number may be a missing value")
     cells = {column: [cell.strip(" \t") for cell in frame.pop(column).fillna("").tolist()] for column in texts}
     return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True)), cells
 
