@@ -16,6 +16,7 @@ from cdtool.commands.console.console import leave, plain, print_json, print_skip
 from cdtool.commands.console.options import (
     BudgetOption,
     ClusterOption,
+    DetectorsOption,
     ForceOption,
     JobsOption,
     JsonOption,
@@ -56,15 +57,7 @@ def benchmark(
             help="Protocol file for -o NAME.pdf or .html.",
         ),
     ] = None,
-    detectors: Annotated[
-        str | None,
-        typer.Option(
-            "--detectors",
-            "-d",
-            help="Detectors instead of the file's, or all.",
-            autocompletion=completions.detector_list,
-        ),
-    ] = None,
+    detectors: DetectorsOption = None,
     false_alarm_budget: BudgetOption = None,
     settings: SetOption = None,
     jobs: JobsOption = 1,

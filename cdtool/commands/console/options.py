@@ -21,6 +21,15 @@ MachineOption = Annotated[
         autocompletion=completions.files(".toml"),
     ),
 ]
+DetectorsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--detectors",
+        "-d",
+        help="Detectors instead of the file's, or all.",
+        autocompletion=completions.detector_list,
+    ),
+]
 MachineUnlessBenchmarkOption = Annotated[
     Place | None,
     typer.Option(

@@ -12,7 +12,7 @@ from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
-from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption, SetOption, listed
+from cdtool.commands.console.options import DetectorsOption, ForceOption, JsonOption, QuietOption, SetOption, listed
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -39,14 +39,7 @@ def tune(
     output: Annotated[
         Place, typer.Option("--output", "-o", parser=location, help="Folder for what is tuned, and for the search.")
     ],
-    detectors: Annotated[
-        str | None,
-        typer.Option(
-            "--detectors",
-            help="Detectors instead of the file's, as gm,feekf.",
-            autocompletion=completions.detector_list,
-        ),
-    ] = None,
+    detectors: DetectorsOption = None,
     settings: SetOption = None,
     force: ForceOption = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of candidates to measure in parallel.")] = 1,

@@ -298,7 +298,10 @@ def test_a_measurement_that_was_exported_again_is_no_repetition(name, tmp_path):
         ({"language": "fr"}, "protocol.language"),
         ({"more": "speed = 1"}, "protocol.point[1].speed: unknown key"),
         ({"more": "obstacle = 3"}, "protocol.point[1].obstacle"),
-        ({"more": '[[protocol.deviation]]\npoint = "x"\ntext = "a"\nreason = "b"'}, "a deviation names the point 'x'"),
+        (
+            {"more": '[[protocol.deviation]]\npoint = "x"\ntext = "a"\nreason = "b"'},
+            "deviation: names the measuring point 'x'",
+        ),
         ({"logs": 'group = "edge"\nlogs = ["a"]'}, "is given with logs"),
         ({"more": '[[protocol.point]]\nname = "b"\nprofile = "en_1"'}, "unknown force profile 'en_1'"),
         ({"more": '[[protocol.point]]\nname = "b"\ngroup = "edge"'}, "is also of the point 1"),

@@ -262,3 +262,11 @@ def test_a_protocol_file_names_the_key_of_a_missing_file_and_is_no_benchmark_for
         read_protocol_file(tmp_path / "protocol.toml")
     keys = ["machine", "protocol.limits", "protocol.point[1].repetition", "protocol.point[1].speed_tolerance_percent"]
     assert sorted(fault.key for fault in caught.value.mistakes) == keys
+
+
+def test_a_deviation_without_its_point_and_a_point_twice_are_named_in_one_run(tmp_path):
+    more = '[[protocol.point]]\nname = "edge"\n' * 2 + '[[protocol.deviation]]\ntext = "a"\npoint = "rear edge"\n'
+    (tmp_path / "protocol.toml").write_text("[protocol]\n" + more, encoding="utf-8")
+    with pytest.raises(MistakesError) as caught:
+        read_protocol_file(tmp_path / "protocol.toml")
+    assert [fault.key for fault in caught.value.mistakes] == ["protocol.deviation", "protocol.point"]

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
-from cdtool.base.errors import FieldsError, UsageError
+from cdtool.base.errors import FieldsError
 from cdtool.base.settings import CountFromZero, NotNegative, check, setting
 
 Due = Literal["before_test", "test_day", "never"]
@@ -160,7 +160,7 @@ class Exclusion:
 class TestPlan:
     """Everything that a person states about a test; measured values are in the recordings.
 
-    Raises UsageError for two points of one name, and for a deviation of a point that does not exist.
+    Raises FieldsError for two points of one name, and for a deviation of a point that does not exist.
     """
 
     number: Annotated[str, setting("number of the protocol")] = ""
@@ -176,12 +176,13 @@ class TestPlan:
 
     def __post_init__(self) -> None:
         names = [point.name for point in self.points if point.name]
-        for name in names:
-            if names.count(name) > 1:
-                raise UsageError(f"two measuring points are named '{name}'", "give each a name of its own")
         for item in self.deviations:
             if item.point and item.point not in names:
-                raise UsageError(f"a deviation names the point '{item.point}'", f"use one of {', '.join(names)}")
+                hint = f"use one of {', '.join(names)}"
+                raise FieldsError(("deviations",), f"names the measuring point '{item.point}'", hint)
+        for name in names:
+            if names.count(name) > 1:
+                raise FieldsError(("points",), f"has two measuring points '{name}'", "give each a name of its own")
 
     @property
     def force_instrument(self) -> Instrument | None:
