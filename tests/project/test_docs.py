@@ -50,7 +50,7 @@ COMMANDS = {
     "docs/signature.md": 7,
     "docs/simulators.md": 2,
     "docs/real-recordings.md": 10,
-    "docs/explain.md": 4,
+    "docs/explain.md": 3,
     "docs/reports.md": 2,
     "docs/ci.md": 3,
     "docs/own-detector.md": 1,

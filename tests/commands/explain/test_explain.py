@@ -235,7 +235,7 @@ def test_the_examples_on_the_page_are_what_the_commands_print(tmp_path, monkeypa
     (tmp_path / "sample_logs").symlink_to(root / "sample_logs")
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```(?:sh|text)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    assert len(blocks) == 6
+    assert len(blocks) == 4
     for commands, shown in zip(blocks[::2], blocks[1::2], strict=True):
         for line in commands.splitlines():
             words = [[*sorted(Path().glob(word))] if "*" in word else [word] for word in shlex.split(line)]
