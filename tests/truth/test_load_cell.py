@@ -9,6 +9,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.truth.doubts import truth_findings
 from cdtool.truth.onset import OnsetRule, find_contacts
+from cdtool.truth.rest_level import RunningRest
 
 GATE = OnsetRule(above=20.0, back_to=8.0)
 SPEED, STIFFNESS = 0.2, 22e3  # a soft impact of the gate: 4.4 N in the first millisecond
@@ -307,3 +308,12 @@ def test_the_offset_of_a_cell_that_is_not_tared_is_reported():
     assert finding.numbers["rest"] == pytest.approx(200.0, abs=0.5)
     tared = Recording("r", "r", ("axis",), {"force": Series(T, force - 195.0, "N")})
     assert truth_findings(tared, find_contacts(tared, GATE), GATE) == []
+
+
+def test_a_drift_is_not_continued_for_longer_than_a_second_without_rest():
+    time = np.arange(8000) * 1e-3
+    rest = RunningRest(time, 5.0 * time)
+    rest.exclude(2.0, 8.0)
+    assert rest.line(2.9).value(2.9) == pytest.approx(5.0 * 2.9, abs=0.1)
+    for later in (4.0, 7.9):
+        assert rest.line(later).value(later) == pytest.approx(5.0 * 2.0, abs=0.3)
