@@ -65,6 +65,12 @@ def test_a_resting_recording_has_no_direction_and_no_stroke():
         operations_of(log, "motion")
 
 
+def test_the_leading_joint_is_the_one_that_moves_most():
+    values = np.column_stack((0.01 * np.sin(TIME), np.sin(TIME)))
+    log = Recording("r", "r", ("a", "b"), {"speed": Series(TIME, values, "rad/s")})
+    assert motion_class(log).joint == 1
+
+
 def test_an_unknown_way_to_cut_names_the_known_ones():
     with pytest.raises(UsageError, match="motion"):
         operations_of(recording(np.zeros(len(TIME))), "motions")
@@ -73,9 +79,3 @@ def test_an_unknown_way_to_cut_names_the_known_ones():
 def test_a_missing_trigger_channel_is_named():
     with pytest.raises(RecordingError, match="trigger"):
         operations_of(recording(np.zeros(len(TIME))), "trigger")
-
-
-def test_the_leading_joint_is_the_one_that_moves_most():
-    values = np.column_stack((0.01 * np.sin(TIME), np.sin(TIME)))
-    log = Recording("r", "r", ("a", "b"), {"speed": Series(TIME, values, "rad/s")})
-    assert motion_class(log).joint == 1

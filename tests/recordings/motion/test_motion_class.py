@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from cdtool.commands.learning.grouping import by_class
 from cdtool.recordings.motion import measured_class, motion_class
-from cdtool.recordings.motion.motion_class import MotionClass
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
@@ -35,17 +34,6 @@ def jittered(speed: float, rate: float, seed: int) -> Recording:
 def test_a_speed_derived_from_jittering_stamps_is_not_overestimated(rate):
     for seed in range(5):
         assert measured_class(jittered(0.0698, rate, seed)).nominal_speed == pytest.approx(0.0698, rel=0.05)
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.03, 0.06])
-def test_noise_does_not_raise_the_nominal_speed(noise):
-    for seed in range(5):
-        assert measured_class(log((0.2, 4.0), noise=noise, seed=seed)).nominal_speed == pytest.approx(0.2, rel=0.03)
-
-
-def test_an_overshoot_is_not_the_nominal_speed():
-    recording = log((0.45, 1.3), (0.28, 3.0))
-    assert measured_class(recording).nominal_speed == pytest.approx(0.28, rel=0.02)
 
 
 def test_the_reference_names_a_run_and_the_measured_speed_is_what_is_learned():
@@ -86,20 +74,6 @@ def test_directions_and_speeds_are_classes_of_their_own_in_the_order_of_their_fi
     classes, odd = by_class([operation(log(part, seed=i), f"run{i}") for i, part in enumerate(runs)])
     assert [len(group) for group in classes] == [4, 4, 4] and not odd
     assert [group[0].name for group in classes] == ["run0", "run1", "run2"]
-
-
-def test_a_class_survives_json():
-    common = common_class([log((0.2, 4.0), seed=i) for i in range(6)])
-    loaded = MotionClass.from_dict(common.to_dict())
-    assert loaded == common and loaded.course is not None and common.course is not None
-    np.testing.assert_array_equal(loaded.course.by_travel.mean, common.course.by_travel.mean)
-    assert MotionClass.from_dict(common.without_course.to_dict()).course is None
-
-
-def test_there_and_back_alike_has_the_direction_of_its_first_motion():
-    for seed in range(8):
-        assert measured_class(log((0.3, 3.0), (-0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == 1
-        assert measured_class(log((-0.3, 3.0), (0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == -1
 
 
 def test_classes_that_lie_close_are_learned_and_no_class_is_refused_whole():
