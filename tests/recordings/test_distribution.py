@@ -35,15 +35,3 @@ def test_many_distinct_values_are_right_to_the_resolution_that_it_states(values,
     low, high = np.sort(values)[[(len(values) - 1) // 2, len(values) // 2]]
     slack = found.resolution * max(abs(low), abs(high))
     assert low - slack <= found.median <= high + slack
-
-
-def test_steps_of_a_jittering_clock_keep_five_digits_however_many_there_are():
-    steps = 1e-3 + 5e-5 * np.random.default_rng(3).normal(size=1_000_000)
-    found = fed(steps, 100, most=1 << 16)
-    assert 0.0 < found.resolution < 1e-5
-    assert found.median == pytest.approx(np.median(steps), rel=1e-5)
-    assert found.share(0.95e-3, 1.05e-3) == pytest.approx(np.mean(np.abs(steps - 1e-3) <= 5e-5), abs=1e-4)
-
-
-def test_without_values_there_is_no_median():
-    assert np.isnan(Distribution().median) and np.isnan(Distribution().percentile(5))

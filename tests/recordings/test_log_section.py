@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.recordings.log_section import LogSection, Mark
-from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.recordings.recording import Recording, Series
 
 
 def stroke(unit="m", position=True, n=1001):
@@ -104,17 +104,3 @@ def test_the_whole_log_is_the_same_object_and_an_end_before_the_begin_is_refused
     with pytest.raises(UsageError, match="the end, 1 s, is not after the begin, 1 s"):
         LogSection.parse("1s", "1000ms")
     assert LogSection.parse("1m", "1s"), "a time and a distance are compared in a log only"
-
-
-def test_a_log_is_not_cut_at_a_time_after_a_later_sample_is_known():
-    recording = stroke()
-    for cut in (1.0, 2.5, 5.0):
-        before = recording.between(-np.inf, cut)
-        whole = Mark(1.0, "m").time_in(recording)
-        assert Mark(1.0, "m").time_in(before) == (whole if whole <= cut else np.inf)
-
-
-def test_contacts_outside_are_dropped_and_one_that_began_before_is_in_progress():
-    contacts = [Contact(0.5, 0.8, 0.0), Contact(1.5, 2.5, 0.0), Contact(3.0, 3.5, 0.0), Contact(4.5, 5.0, 0.0)]
-    inside = LogSection.parse("2s", "4s").contacts_of(stroke(), contacts)
-    assert [(item.start, item.end, item.in_progress) for item in inside] == [(2.0, 2.5, True), (3.0, 3.5, False)]

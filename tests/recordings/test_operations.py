@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.recordings.motion import motion_class
-from cdtool.recordings.operations import _directions, operations_of
+from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Recording, Series
-from tests.bits import samples
 
 TIME = np.arange(12_000) * 1e-3
 
@@ -68,6 +65,12 @@ def test_a_resting_recording_has_no_direction_and_no_stroke():
         operations_of(log, "motion")
 
 
+def test_the_leading_joint_is_the_one_that_moves_most():
+    values = np.column_stack((0.01 * np.sin(TIME), np.sin(TIME)))
+    log = Recording("r", "r", ("a", "b"), {"speed": Series(TIME, values, "rad/s")})
+    assert motion_class(log).joint == 1
+
+
 def test_an_unknown_way_to_cut_names_the_known_ones():
     with pytest.raises(UsageError, match="motion"):
         operations_of(recording(np.zeros(len(TIME))), "motions")
@@ -76,24 +79,3 @@ def test_an_unknown_way_to_cut_names_the_known_ones():
 def test_a_missing_trigger_channel_is_named():
     with pytest.raises(RecordingError, match="trigger"):
         operations_of(recording(np.zeros(len(TIME))), "trigger")
-
-
-def test_the_leading_joint_is_the_one_that_moves_most():
-    values = np.column_stack((0.01 * np.sin(TIME), np.sin(TIME)))
-    log = Recording("r", "r", ("a", "b"), {"speed": Series(TIME, values, "rad/s")})
-    assert motion_class(log).joint == 1
-
-
-@settings(max_examples=300, deadline=None)
-@given(st.data(), st.sampled_from([1, 2, 3, 15, 16, 17, 60, 400]))
-def test_directions_are_those_of_numpy_alone(data, count):
-    if data.draw(st.booleans()):
-        speed = data.draw(samples(min(count, 60)))[:, 0]
-    else:
-        random = np.random.default_rng(data.draw(st.integers(0, 2**31)))
-        speed = 0.2 * np.sin(np.linspace(0.0, 7.0, count)) + random.normal(0.0, 0.01, count)
-        speed[random.uniform(size=count) < 0.1] = data.draw(st.sampled_from([np.nan, 0.0, np.inf]))
-    found = _directions(speed)
-    known = np.nan_to_num(speed)
-    rest = 0.05 * np.percentile(np.abs(known), 99.0)
-    np.testing.assert_array_equal(found, np.where(np.abs(known) <= rest, 0, np.sign(known)))

@@ -9,16 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 
 from cdtool.commands.judging.information import info
 from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.signature_store import read_signature
-from cdtool.recordings import plausible
-from cdtool.recordings.plausible import ChannelRange, PlausibleRanges
+from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.recordings.recording import MEASURED, Series
 from tests.command import cdtool
 from tests.data_folder import UR10E_LOGS
@@ -142,30 +139,6 @@ def test_a_spike_is_masked_in_a_run_to_learn_from_but_not_in_a_log_to_assess(run
         assert not masked(ranges, spiked)[channel].any()
 
 
-def test_no_unchanged_sample_of_a_run_to_learn_from_is_a_spike(runs):
-    free, ranges = runs
-    for log in free:
-        made = ranges.masked(log.recording, log.factors, to_learn=(-np.inf, np.inf))
-        assert made.findings == log.recording.findings
-
-
-def test_a_log_that_rests_most_of_its_time_has_no_spikes_where_it_moves():
-    free = logged(FOLDERS[0], "free")[0]
-    rng = np.random.default_rng(2)
-
-    def log(seconds: float) -> LoggedRecording:
-        moving = np.concatenate((np.zeros(round(seconds * 100.0)), 3.0 * np.sin(np.linspace(0.0, np.pi, 150))))
-        values = moving + 1e-4 * rng.standard_normal(len(moving))
-        series = Series(0.01 * np.arange(len(values)), values[:, np.newaxis], "N m")
-        return replace(free, recording=replace(free.recording, channels={"torque": series}), factors={"torque": (1.0,)})
-
-    logs = [log(600.0) for _ in range(12)]
-    ranges = learned_of(logs)
-    for item in logs:
-        made = ranges.masked(item.recording, item.factors, to_learn=(-np.inf, np.inf))
-        assert np.isfinite(made["torque"].values).all()
-
-
 def strokes(*starts: float, stuck: slice | None = None) -> Series:
     """Consecutive strokes of 20 rad, each from its own start, with rests; constant at 0 on request."""
     shape = np.concatenate((np.zeros(50), np.linspace(0.0, 20.0, 400), np.full(50, 20.0)))
@@ -206,15 +179,6 @@ def test_a_failed_position_is_masked_until_it_is_back():
     assert "20 values" in words and "1 leap " in words and "new zero" not in words
 
 
-def test_a_repeatedly_leaping_position_is_masked():
-    free = logged(FOLDERS[0], "free")[0]
-    series = strokes(0.0, 0.0)
-    values = series.values.copy()
-    values[500:] = np.where(np.arange(500) % 2, 0.0, 21.0)[:, np.newaxis]
-    found, _ = masked_position(free, Series(series.time, values, "rad"))
-    assert found[501::2].all()
-
-
 def test_masking_does_not_depend_on_later_samples(runs):
     free, ranges = runs
     rng = np.random.default_rng(3)
@@ -228,13 +192,6 @@ def test_masking_does_not_depend_on_later_samples(runs):
         part = replace(log, recording=log.recording.between(-np.inf, end))
         for name, mask in masked(ranges, part).items():
             assert np.array_equal(mask, whole[name][: len(mask)]), name
-
-
-def test_a_fifth_of_the_runs_may_be_wrong_without_moving_the_range(runs):
-    free, ranges = runs
-    broken = [with_values(item, "torque", slice(None), 1e7) if i < 2 else item for i, item in enumerate(free)]
-    moved = learned_of(broken).channels["torque"]
-    assert moved.reach < 2.0 * ranges.channels["torque"].reach
 
 
 def test_ranges_survive_json_and_refuse_invalid_values(runs):
@@ -320,26 +277,8 @@ def test_an_empty_range_is_refused(gate, keys, told):
     assert done.status == 2 and told in done.err
 
 
-PLACES = (0.0, -0.0, 1.0, 2.0, 10.0, 10.1, 20.0, 20.1, 1e3, 1.1e3, 32767.0, 65535.0, -327.68, np.nan, np.inf, -np.inf)
-FACTORS = ((), (1.0, 0.01), (-1.0, 0.0), (1e4, 1e-3), (1e-9, 1e-9))
-
-
-@given(
-    st.lists(st.tuples(st.sampled_from(PLACES), st.sampled_from(PLACES)), max_size=8),
-    st.sampled_from([0.5, 1.0, 1e4]),
-    st.sampled_from([0.0, 1.0, 10.0]),
-    st.sampled_from([0.0, 200.0]),
-    st.sampled_from(FACTORS),
-)
-@example([(0.0, 0.0), (np.nan, 0.0), (10.0, 0.0)], 0.5, 1.0, 0.0, ())
-@example([(32767.0, 0.0)], 1e4, 0.0, 0.0, (1.0, 0.01))
-def test_no_implausible_value_and_no_leap_is_overlooked_by_the_quick_look(rows, reach, rate, extreme, factors):
-    series = Series(np.arange(len(rows)) * 0.5, np.array(rows, dtype=np.float64).reshape(-1, 2), "m")
-    known = ChannelRange("m", (0.0, 1.0), reach, rate, extreme)
-    wrong = plausible._implausible(series, known, 10.0, factors)
-    values = np.where(wrong, np.nan, series.values)
-    masked_later = [
-        plausible._leapt(series.time, values[:, j], known, known.centre[j], factors[j] if factors else 0.0)[0].any()
-        for j in range(2)
-    ]
-    assert not (plausible._is_usual(series, known, 10.0) and (wrong.any() or any(masked_later)))
+def test_a_fifth_of_the_runs_may_be_wrong_without_moving_the_range(runs):
+    free, ranges = runs
+    broken = [with_values(item, "torque", slice(None), 1e7) if i < 2 else item for i, item in enumerate(free)]
+    moved = learned_of(broken).channels["torque"]
+    assert moved.reach < 2.0 * ranges.channels["torque"].reach

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from cdtool.base.errors import SignatureError, UsageError
 from cdtool.detectors.detection import Signal, Status
+from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.recording import Recording, Series
+from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.signature_curve import Curve
 from tests.thresholds import strokes
@@ -192,3 +194,31 @@ def test_too_few_runs_are_reported_with_how_many_are_missing(force, runs, said):
     with pytest.raises(SignatureError, match=said) as fault:
         Signature(force=force).fit([(None, None)] * runs)
     assert ("signature.force = true" in fault.value.hint) is not force
+
+
+def flat_signature(joints: tuple[str, ...] = ("axis",)) -> FittedSignature:
+    """Limits that rise by 9 over 2 m of travel, 1 above and below the mean."""
+    mean = np.linspace(0.0, 9.0, 21)[:, np.newaxis]
+    curve = Curve(0.1, 0.1, np.full((21, 1), 10.0), mean, np.ones((21, 1)))
+    return FittedSignature(MotionClass(1, 0.2), "position", "thesis", "two", 1.0, True, joints, curve, curve)
+
+
+def test_signatures_with_other_grids_on_the_same_motion_have_their_own_limits():
+    first, motion = flat_signature(), stroke()
+    coarse = replace(first, by_position=replace(first.by_position, step=0.2))
+    for signature in (first, coarse, replace(first, alignment="time")):
+        _, band = signature.evaluate(motion, signal(np.zeros(N)))
+        _, alone = signature.evaluate(stroke(), signal(np.zeros(N)))
+        np.testing.assert_array_equal(band.upper, alone.upper)
+        np.testing.assert_array_equal(band.lower, alone.lower)
+    travel = motion["position"].values[2000, 0]
+    for signature, slope in ((first, 4.5), (coarse, 2.25)):
+        upper = signature.evaluate(motion, signal(np.zeros(N)))[1].upper[2000, 0]
+        spread = 0.5 * (upper - signature.evaluate(motion, signal(np.zeros(N)))[1].lower[2000, 0])
+        assert upper - spread == pytest.approx(slope * travel, rel=0.02)
+
+
+def test_a_signal_with_more_columns_than_were_learned_is_refused():
+    two = Signal(np.arange(3.0), np.zeros((3, 2)), np.zeros((3, 2), dtype=np.uint8), "N")
+    with pytest.raises(SignatureError, match="learned for 1 joints, not for 2"):
+        flat_signature(()).evaluate(Recording("run", "", ("x",), {}), two)

@@ -13,12 +13,10 @@ from scipy import stats
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.recordings.recording import Contact, Recording, Series
-from cdtool.truth.doubts import truth_findings
 from cdtool.truth.force.curve import force_time_curve
-from cdtool.truth.force_vector import ForceMagnitude, force_magnitude, quiet_level, with_scalar_force
+from cdtool.truth.force_vector import force_magnitude, quiet_level, with_scalar_force
 from cdtool.truth.missing_samples import cell_samples
 from cdtool.truth.onset import OnsetRule, find_contacts
-from tests.base.findings.facts import fact_of
 
 GATE = OnsetRule(above=20.0, back_to=8.0)
 RULES = {"levels by hand": GATE, "levels from the noise": OnsetRule()}
@@ -66,17 +64,6 @@ def test_the_onset_on_a_slow_and_jittered_clock_is_within_its_uncertainty(time, 
     assert found.start - found.uncertainty <= 3.0 + 0.005 and found.start >= 3.0
 
 
-@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
-def test_each_axis_may_drift_by_itself(rule):
-    time = clock()
-    drift = np.outer(time, [3.0, -3.0, 1.0])
-    still = find_contacts(recording(time, REST + np.outer(pulse(time, 6.0), OBLIQUE) + noise(time, 0.3)), rule)
-    found = find_contacts(recording(time, REST + drift + np.outer(pulse(time, 6.0), OBLIQUE) + noise(time, 0.3)), rule)
-    assert [item.start for item in found] == pytest.approx([item.start for item in still], abs=2.01e-3)
-    assert found[0].shift == pytest.approx(6.0 * math.hypot(3.0, 3.0, 1.0), abs=1.0)
-    assert found[0].peak_force == pytest.approx(100.0, abs=1.5)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_the_mounting_of_the_sensor_does_not_matter(seed):
     time = clock(length=5.0)
@@ -85,28 +72,6 @@ def test_the_mounting_of_the_sensor_does_not_matter(seed):
     (straight,), (turned,) = (find_contacts(recording(time, REST + axes), GATE) for axes in (force, force @ rotation))
     assert turned.start == pytest.approx(straight.start, abs=1.01e-3)
     assert turned.peak_force == pytest.approx(straight.peak_force, abs=0.3)
-
-
-@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
-def test_a_long_push_on_one_axis_keeps_the_rest_levels_of_all(rule):
-    time = clock()
-    pushed = ((time >= 2.0) & (time < 7.0)).astype(float)
-    vector = REST + np.outer(pushed, [30.0, 1.0, 0.0]) + noise(time, 0.2)
-    (found,) = find_contacts(recording(time, vector), rule)
-    assert (found.start, found.end) == pytest.approx((2.0, 7.0), abs=3e-3)
-    magnitude = force_magnitude(Series(time, vector, "N"), rule)
-    assert magnitude.axes[6000:6900].mean(axis=0) == pytest.approx([30.0, 1.0, 0.0], abs=0.1)
-
-
-@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
-def test_a_contact_in_progress_at_the_start_has_no_onset(rule):
-    time = clock()
-    pushed = (time < 1.5).astype(float)
-    vector = np.outer(pushed, [30.0, -20.0, 80.0]) + np.outer(pulse(time, 5.0), OBLIQUE) + noise(time, 0.2)
-    first, second = find_contacts(recording(time, vector), rule)
-    assert first.in_progress and first.end == pytest.approx(1.5, abs=0.01)
-    assert first.peak_force == pytest.approx(math.hypot(30.0, -20.0, 80.0), abs=1.0)
-    assert not second.in_progress and second.start == pytest.approx(5.0, abs=0.02)
 
 
 @pytest.mark.parametrize("axes", [2, 3])
@@ -124,15 +89,6 @@ def test_the_level_of_a_magnitude_is_exceeded_as_rarely_as_that_of_a_reading(sig
     assert stats.chi(axes).sf(level) == pytest.approx(2.0 * stats.norm.sf(sigmas), rel=1e-6)
 
 
-def test_bursts_of_noise_to_both_sides_are_no_contact():
-    time = clock()
-    spikes = np.where((time >= 3.0) & (time < 3.02), 80.0 * np.where(np.arange(len(time)) % 4 < 2, 1.0, -1.0), 0.0)
-    vector = REST + np.outer(spikes, OBLIQUE) + noise(time, 0.3)
-    assert find_contacts(recording(time, vector), GATE) == []
-    one_sided = REST + np.outer(np.abs(spikes), OBLIQUE) + noise(time, 0.3)
-    assert len(find_contacts(recording(time, one_sided), GATE)) == 1
-
-
 def test_a_sample_without_one_axis_is_missing():
     time = clock()
     vector = REST + np.outer(pulse(time, 3.0), OBLIQUE)
@@ -142,13 +98,6 @@ def test_a_sample_without_one_axis_is_missing():
     assert np.flatnonzero(np.isnan(reduced["force"].values[:, 0])).tolist() == list(range(3050, 3150))
     curve = force_time_curve(reduced, found)
     assert curve.longest_hole() == pytest.approx(0.101, abs=2e-3)
-
-
-def test_a_vector_without_any_complete_sample_has_no_contact():
-    vector = np.full((100, 3), np.nan)
-    vector[::2, 0], vector[1::2, 1] = 1.0, 2.0
-    assert find_contacts(recording(np.arange(100) * 1e-3, vector), GATE) == []
-    assert np.isnan(force_magnitude(Series(np.arange(100) * 1e-3, vector, "N"), GATE).values).all()
 
 
 def test_the_force_over_time_of_a_labelled_contact_counts_from_zero():
@@ -171,24 +120,9 @@ def test_an_axis_at_its_stop_is_seen_although_the_magnitude_changes():
     assert curves[1].time[curves[1].clipped].min() == pytest.approx(0.09, abs=0.03)
 
 
-def test_the_rest_level_of_every_axis_is_reported():
-    time = clock()
-    reduced = with_scalar_force(recording(time, REST + np.outer(pulse(time, 3.0), OBLIQUE)), GATE)
-    facts = [fact_of(item) for item in truth_findings(reduced, find_contacts(reduced, GATE), GATE)]
-    assert [item.numbers["rest"] for item in facts if item.kind == "force_magnitude_used"] == [pytest.approx(REST)]
-
-
 def test_a_single_load_cell_is_left_as_it_is():
     single = recording(clock(), np.zeros((8000, 1)))
     assert with_scalar_force(single, GATE) is single
-
-
-def test_a_magnitude_in_a_part_of_a_recording_is_that_of_the_whole():
-    time = clock()
-    reduced = with_scalar_force(recording(time, REST + np.outer(pulse(time, 3.0), OBLIQUE)), GATE)
-    whole, part = reduced["force"], reduced.section(3.1, 3.2)["force"]
-    assert isinstance(whole, ForceMagnitude)
-    assert part.values.tolist() == whole.values[(time >= 3.1) & (time <= 3.2)].tolist()
 
 
 def test_a_vector_is_never_mistaken_for_its_first_axis():
@@ -200,3 +134,21 @@ def test_no_detector_sees_the_magnitude():
     time = clock()
     reduced = with_scalar_force(recording(time, REST + np.outer(pulse(time, 3.0), OBLIQUE)), GATE)
     assert "force" not in reduced.without_ground_truth()
+
+
+def test_a_vector_without_any_complete_sample_has_no_contact():
+    vector = np.full((100, 3), np.nan)
+    vector[::2, 0], vector[1::2, 1] = 1.0, 2.0
+    assert find_contacts(recording(np.arange(100) * 1e-3, vector), GATE) == []
+    assert np.isnan(force_magnitude(Series(np.arange(100) * 1e-3, vector, "N"), GATE).values).all()
+
+
+@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
+def test_each_axis_may_drift_by_itself(rule):
+    time = clock()
+    drift = np.outer(time, [3.0, -3.0, 1.0])
+    still = find_contacts(recording(time, REST + np.outer(pulse(time, 6.0), OBLIQUE) + noise(time, 0.3)), rule)
+    found = find_contacts(recording(time, REST + drift + np.outer(pulse(time, 6.0), OBLIQUE) + noise(time, 0.3)), rule)
+    assert [item.start for item in found] == pytest.approx([item.start for item in still], abs=2.01e-3)
+    assert found[0].shift == pytest.approx(6.0 * math.hypot(3.0, 3.0, 1.0), abs=1.0)
+    assert found[0].peak_force == pytest.approx(100.0, abs=1.5)

@@ -9,7 +9,6 @@ import pytest
 
 from cdtool.base.errors import RecordingError
 from cdtool.recordings.recording import Recording, Series
-from cdtool.truth.load_cell import reading_step
 from cdtool.truth.onset import OnsetRule, find_contacts
 
 TIME = np.arange(4000) * 1e-3
@@ -70,21 +69,6 @@ def test_without_noise_a_contact_begins_above_eight_deviations_of_the_rounding(s
     assert contact.peak_force == pytest.approx(50 * step)
 
 
-def test_steps_finer_than_the_noise_change_nothing():
-    force = ramp(2.0, 5000.0, noise=1.0)
-    (smooth,) = find_contacts(recording(force), OnsetRule())
-    (stepped,) = find_contacts(recording(np.round(force / 0.01) * 0.01), OnsetRule())
-    assert (stepped.start, stepped.end) == (smooth.start, smooth.end)
-
-
-def test_rounding_errors_are_not_steps_of_the_load_cell():
-    reading = np.zeros(4000)
-    reading[2000:2010] = 3.0
-    reading[3000:3010] = 3.0 * (1.0 + 1e-15)
-    assert reading_step(reading) == 3.0
-    assert reading_step(np.zeros(5)) == 0.0
-
-
 def test_a_rebound_is_the_same_contact_and_a_later_touch_another():
     force = np.where(
         (TIME > 1.0) & (TIME < 1.2) | (TIME > 1.7) & (TIME < 1.8) | (TIME > 3.0) & (TIME < 3.1), 100.0, 0.0
@@ -122,20 +106,6 @@ def test_without_any_ground_truth_the_error_says_what_to_map():
         find_contacts(Recording("r", "r", ("a",), {"speed": Series(TIME, TIME, "m/s")}), GATE_RULE)
 
 
-def test_missing_load_cell_samples_are_skipped():
-    force = ramp(2.0, 1000.0)
-    force[1000:1500] = np.nan
-    (contact,) = find_contacts(recording(force), GATE_RULE)
-    assert contact.start == pytest.approx(2.0085, abs=6e-4)
-
-
-def test_a_hole_in_the_load_cell_before_the_onset_is_in_its_uncertainty():
-    force = ramp(2.0, 5000.0)
-    force[(TIME > 1.99) & (TIME < 2.05)] = np.nan
-    (contact,) = find_contacts(recording(force), GATE_RULE)
-    assert contact.start - contact.uncertainty <= 2.0 < contact.start
-
-
 def test_a_missing_label_does_not_split_a_contact():
     label = ((TIME > 1.0) & (TIME <= 1.5)).astype(float)
     label[1200] = np.nan
@@ -151,16 +121,6 @@ def kinds_of(values: np.ndarray) -> list[tuple[str, float, bool]]:
 def test_a_label_with_kinds_has_a_contact_for_each_stay_at_one_of_its_values():
     values = np.select([(TIME > 1.0) & (TIME <= 1.2), (TIME > 1.2) & (TIME <= 1.4), TIME > 2.0], [1.0, 2.5, 3.0], 0.0)
     assert kinds_of(values) == [("hard", 1.001, False), ("soft", 1.201, False)]
-
-
-def test_a_label_with_kinds_may_begin_and_end_in_a_contact_and_lose_samples():
-    values = np.where(TIME < 0.5, 2.5, np.where(TIME > 2.0, 1.0, 0.0))
-    values[(TIME > 0.2) & (TIME < 0.3)] = np.nan
-    assert kinds_of(values) == [("soft", 0.0, True), ("hard", 2.001, False)]
-
-
-def test_a_label_whose_values_are_all_no_contact_has_none():
-    assert kinds_of(np.full(len(TIME), 7.0)) == [] == kinds_of(np.full(len(TIME), np.nan))
 
 
 @pytest.mark.parametrize(
@@ -191,16 +151,3 @@ def test_behind_many_missing_labels_another_contact_may_have_begun_at_any_time()
     assert (first.start, first.end, second.start) == pytest.approx((1.0, 1.299, 2.0))
     assert first.uncertainty == pytest.approx(1.0) and second.uncertainty == pytest.approx(0.701)
     assert not first.in_progress and (first.hole, second.hole) == pytest.approx((1.0, 0.701))
-
-
-def test_a_label_that_is_logged_less_often_than_the_rest_has_the_same_contacts():
-    values = np.where(((TIME >= 1.0) & (TIME < 1.3)) | ((TIME >= 2.0) & (TIME < 2.3)), 1.0, np.nan)
-    values[np.arange(len(TIME)) % 10 > 0] = np.nan
-    assert [item.start for item in find_contacts(recording(values, "label"), GATE_RULE)] == pytest.approx([1.0, 2.0])
-
-
-def test_missing_labels_do_not_end_a_contact_in_a_log_with_others():
-    values = ((TIME >= 1.0) & (TIME < 1.3)).astype(float)
-    values[1100:1150] = np.nan
-    (contact,) = find_contacts(recording(values, "label"), GATE_RULE)
-    assert (contact.start, contact.end) == pytest.approx((1.0, 1.299)) and contact.uncertainty < 0.001

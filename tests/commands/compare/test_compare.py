@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import cdtool as api
 from cdtool.results.files.results_file import to_json
 from cdtool.results.results import Results
 from tests.command import cdtool
@@ -171,47 +170,6 @@ def test_a_stricter_level_is_applied(written):
     assert [cdtool("compare", old, new, "--level", level).status for level in (0.2, 0.0005)] == [1, 0]
 
 
-def test_python_returns_the_same_as_the_command(written):
-    old, new = written("old.json", build_results(OLD)), written("new.json", build_results(SLOWER))
-    found = api.compare(old, new)
-    assert found.words == cdtool("compare", old, new).out.splitlines()[-1]
-    assert [row.words for row in found.rows] == [row.words for row in api.compare(build_results(OLD), str(new)).rows]
-
-
-def test_the_default_debounce_is_shown_in_milliseconds(written):
-    old = written("old.json", build_results(OLD, debounce_samples=None))
-    done = cdtool("compare", old, written("new.json", build_results(OLD, debounce_samples=14)))
-    assert "differs: debounce_samples: default (9 ms), now 14" in done.out
-
-
-def test_every_detected_contact_now_missed_exits_with_1_and_its_probability(written):
-    old = written("old.json", build_results({("momentum", "stiff"): LATENCIES[:4]}))
-    done = cdtool("compare", old, written("new.json", build_results({("momentum", "stiff"): [MISSED] * 4})))
-    assert done.status == 1
-    words = " ".join(done.out.split())
-    assert "misses every contact: 4 of 4, before 0 of 4 (probability by chance 0.0625)" in words
-
-
-@pytest.mark.parametrize(("option", "status"), [((), 0), (("--require-power",), 4)])
-def test_too_few_misses_are_inconclusive(written, option, status):
-    old = written("old.json", build_results({("momentum", "stiff"): [*LATENCIES[:5], *[MISSED] * 20]}))
-    new = written("new.json", build_results({("momentum", "stiff"): [*[MISSED] * 4, LATENCIES[4], *[MISSED] * 20]}))
-    done = cdtool("compare", old, new, *option)
-    assert done.status == status
-    words = " ".join(done.out.split())
-    assert "missed 20 to 24, up to 33 % more not ruled out" in words and "no change" not in words
-
-
-def test_latencies_four_times_as_long_of_four_contacts_are_inconclusive(written):
-    old = written("old.json", build_results({("momentum", "stiff"): LATENCIES[:4]}))
-    new = written("new.json", build_results({("momentum", "stiff"): [4.0 * x for x in LATENCIES[:4]]}))
-    assert [cdtool("compare", old, new, *option).status for option in ((), ("--require-power",))] == [0, 4]
-    done = cdtool("compare", old, new, "--require-power", "--json")
-    assert json.loads(done.out)["verdict"] == "inconclusive" and done.status == 4
-    words = " ".join(cdtool("compare", old, new).out.split())
-    assert words.endswith("about other recordings inconclusive: this sample is too small to detect any change")
-
-
 def test_a_better_build_with_an_open_question_exits_with_4_if_power_is_required(written):
     values = {("momentum", "stiff"): LATENCIES, ("momentum", "soft"): LATENCIES[:3]}
     faster = {key: [x - 5.0 for x in items] for key, items in values.items()}
@@ -223,19 +181,6 @@ def test_a_better_build_with_an_open_question_exits_with_4_if_power_is_required(
     )
 
 
-def test_worse_comes_before_inconclusive(written):
-    old = written("old.json", build_results({**OLD, ("momentum", "soft"): LATENCIES[:3]}))
-    new = written("new.json", build_results({**SLOWER, ("momentum", "soft"): LATENCIES[1:4]}))
-    assert cdtool("compare", old, new, "--require-power").status == 1
-
-
-@pytest.mark.parametrize(("option", "status"), [((), 0), (("--require-power",), 4)])
-def test_a_missing_detector_is_incomplete_if_power_is_required(written, option, status):
-    old = written("old.json", build_results(OLD))
-    new = written("new.json", build_results({("momentum", "stiff"): LATENCIES}))
-    assert cdtool("compare", old, new, *option).status == status
-
-
 def test_a_missing_detector_is_named_at_the_top_and_in_the_verdict(written, tmp_path):
     old = written("old.json", build_results(OLD))
     new = written("new.json", build_results({("momentum", "stiff"): LATENCIES}))
@@ -244,12 +189,3 @@ def test_a_missing_detector_is_named_at_the_top_and_in_the_verdict(written, tmp_
     words = "only in old: detector pure_torque"
     assert words in " ".join(done.out.split()).rpartition("no change shown")[2]
     assert words in (tmp_path / "c.md").read_text(encoding="utf-8").replace("\\", "").splitlines()[0]
-
-
-def test_detectors_of_a_group_with_the_same_words_share_a_sentence(written):
-    names = ("momentum", "pure_torque", "direct")
-    same = {(name, group): LATENCIES for name in names for group in ("stiff", "soft")}
-    done = cdtool("compare", written("old.json", build_results(same)), written("new.json", build_results(same)))
-    lines = " ".join(done.out.split())
-    assert "stiff, momentum, pure_torque, direct: no change shown: both files contain the same results" in lines
-    assert lines.count("direct: no change shown") == 2

@@ -15,8 +15,7 @@ from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.with_injected import Refusal, refusal
 from cdtool.commands.simulate.gate_model import GateRun, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
-from cdtool.machines.axis_model.axis_run import USED, AxisRun, axis_run
-from cdtool.machines.axis_model.obstacle import Obstacle
+from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Sensors
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.recordings.recording import Recording, Series
@@ -65,16 +64,6 @@ def test_every_channel_changes_as_in_the_true_contact(kind: str, references: boo
         assert np.max(np.abs(found - expected)[within]) < share * size, channel
 
 
-def test_samples_before_the_contact_are_not_touched() -> None:
-    free, _, _ = twins("stiff", 6)
-    injected = put(free, contact_in(free, 4.0005))
-    for name, series in injected.channels.items():
-        before = series.time <= 4.0005
-        np.testing.assert_array_equal(series.values[before], free[name].values[: len(series)][before], err_msg=name)
-    assert injected.end == pytest.approx(5.0, abs=0.01)
-    assert "injected" in str(injected.findings[-1])
-
-
 def test_the_contact_is_where_the_log_reaches_it_to_a_fraction_of_a_sample() -> None:
     free, _, _ = twins("stiff", 7)
     for at in (4.0, 4.00031, 4.00077):
@@ -107,24 +96,6 @@ def test_missing_samples_stay_missing() -> None:
     assert np.isfinite(injected["speed"].values[4120:]).all()
 
 
-def test_a_log_without_a_load_cell_gets_one_without_noise() -> None:
-    free, _, _ = twins("stiff", 10)
-    injected = put(without(free, "force"), contact_in(free, 4.0))
-    force = injected["force"]
-    assert not np.any(force.values[force.time <= 4.0])
-    assert np.max(force.values) > 3000.0
-
-
-def test_torque_and_speed_alone_are_enough() -> None:
-    free, _, hit = twins("stiff", 11)
-    assert hit.contact_start is not None
-    bare = without(free, "position", "acceleration", "force", "reference_speed", "reference_torque")
-    whole = contact_in(free, hit.contact_start)
-    contact = contact_in(bare, hit.contact_start)
-    assert contact.peak_force == pytest.approx(whole.peak_force, rel=0.02)
-    assert set(put(bare, contact).channels) == {"torque", "speed", "force"}
-
-
 def test_the_brackets_of_an_unknown_controller_contain_the_known_one() -> None:
     free, _, _ = twins("stiff", 12)
     unknown = replace(MODEL, controller=None)
@@ -153,14 +124,6 @@ def test_a_rigid_drive_in_the_place_of_an_elastic_one_is_flagged_and_shows_the_c
         speed = contact.changes["speed"]
         slowed.append(float(speed.time[np.argmax(speed.values[:, 0] < -0.02)]))
     assert slowed[1] - slowed[0] > 0.010
-
-
-def test_separation_and_wind_up_beyond_the_free_run_are_flagged() -> None:
-    free, _, _ = twins("stiff", 14)
-    contact = contact_in(free, 4.0)
-    assert {Doubt.SEPARATION, Doubt.WIND_UP_BEYOND_FREE_RUNS} <= set(contact.doubts)
-    assert contact.reliable_until == contact.separation < 4.2
-    assert contact.wind_up > contact.free_wind_up
 
 
 def value_at(contact: InjectedContact, channel: str, time: float) -> float:
@@ -194,12 +157,6 @@ def test_the_brackets_of_a_drive_beyond_its_known_wind_up_contain_the_true_torqu
     for after in (0.06, 0.07, 0.08):
         slowed = [value_at(item, "speed", 4.0 + after) for item in (least, true, most)]
         assert slowed[0] > slowed[1] > slowed[2]
-
-
-def test_a_drive_without_doubt_has_no_bracket() -> None:
-    assert assumptions_of(MODEL) == (Assumption(),)
-    rigid = replace(MODEL, drive=ElasticDrive(load_mass=600.0, motor_mass=500.0, observed_wind_up=1e-3))
-    assert assumptions_of(rigid) == (Assumption(),)
 
 
 def test_the_rigid_end_of_a_drive_is_where_the_contact_winds_it_up_in_either_direction() -> None:
@@ -256,15 +213,6 @@ def test_a_model_that_does_not_follow_the_log_is_refused() -> None:
         axis_contact(with_values(run, torque=-run.torque), MODEL, OBSTACLES["stiff"], 4.0)
 
 
-def test_a_model_that_is_a_little_slower_than_the_log_is_flagged() -> None:
-    free, _, _ = twins("stiff", 22)
-    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
-    assert run.reference_speed is not None
-    slower = with_values(run, reference_speed=0.9 * run.reference_speed)
-    assert Doubt.APPROACH_SPEED in axis_contact(slower, MODEL, OBSTACLES["stiff"], 4.0).doubts
-    assert Doubt.APPROACH_SPEED not in contact_in(free, 4.0).doubts
-
-
 @pytest.mark.parametrize(
     ("samples", "message"), [(slice(3990, 4010), "a gap at 4.000 s"), (slice(None), "speed and position have no value")]
 )
@@ -276,39 +224,6 @@ def test_a_contact_in_a_gap_or_without_speed_is_refused(samples: slice, message:
     speed[samples] = math.nan
     with pytest.raises(RecordingError, match=message):
         axis_contact(with_values(run, speed=speed, position=None), MODEL, OBSTACLES["stiff"], 4.0)
-
-
-def test_the_stiff_bracket_does_not_depend_on_the_sampling_of_the_log() -> None:
-    free, _, _ = twins("stiff", 24)
-    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
-    tenth = {name: getattr(run, name)[::10] for name in USED if getattr(run, name) is not None}
-    slow = with_values(run, period=10.0 * run.period, **tenth)
-    model = replace(MODEL, controller=None)
-    stiff = Assumption(ControllerReaction.STIFF)
-    both = [axis_contact(item, model, OBSTACLES["stiff"], 4.0, 0.3, stiff) for item in (run, slow)]
-    torques = [value_at(item, "torque", 4.1) for item in both]
-    assert torques[1] == pytest.approx(torques[0], rel=0.05)
-
-
-def test_a_drive_takes_up_in_the_direction_of_the_contact() -> None:
-    free, _, _ = twins("stiff", 25)
-    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
-    mirrored = with_values(run, **{name: -getattr(run, name) for name in USED if getattr(run, name) is not None})
-    forward, backward = (axis_contact(item, MODEL, OBSTACLES["stiff"], 4.0, 0.2) for item in (run, mirrored))
-    assert -backward.changes["speed"].values == pytest.approx(forward.changes["speed"].values, abs=1e-9)
-
-
-def test_without_a_controller_there_is_no_known_reaction() -> None:
-    free, _, _ = twins("stiff", 16)
-    with pytest.raises(RecordingError, match="no controller"):
-        contact_in(free, 4.0, "stiff", replace(MODEL, controller=None))
-
-
-def test_an_obstacle_that_never_acts_is_an_error() -> None:
-    free, _, _ = twins("stiff", 17)
-    soft = Obstacle((0.0, 10.0, 11.0), (0.0, 1e-300, 1.0))
-    with pytest.raises(RecordingError, match="changes nothing"):
-        axis_contact(axis_run(ON_LOAD_SIDE.referred_to_load(free)), MODEL, soft, 4.0, 0.0)
 
 
 UNKNOWN_DRIVE = replace(MODEL, drive=ElasticDrive(load_mass=1154.0))

@@ -75,32 +75,6 @@ def test_positions_of_two_units_make_no_map(gate: Path) -> None:
         cdtool.coverage(path)
 
 
-def test_another_suffix_is_refused_before_anything_is_computed(gate: Path) -> None:
-    done = command("inject", gate / "coverage.toml", "-o", gate / "map.docx")
-    assert done.status == 2
-    both = command("inject", gate / "coverage.toml", "-o", gate / "logs", "-o", gate / "map.png")
-    assert both.status == 2 and "give one folder, or the files of a map" in both.err
-    assert not (gate / "injected_coverage").exists()
-
-
-@pytest.mark.parametrize("name", ["map.html", "map.json", "map.png"])
-def test_a_file_of_another_program_is_kept(gate: Path, name: str) -> None:
-    (gate / name).write_text("mine", encoding="utf-8")
-    done = command("inject", gate / "coverage.toml", "-o", gate / name)
-    assert done.status == 2
-    assert "--force" in done.err
-    assert (gate / name).read_text(encoding="utf-8") == "mine"
-    assert not (gate / "injected_coverage").exists()
-
-
-def test_the_file_that_is_read_is_never_overwritten(gate: Path) -> None:
-    path = gate / "coverage.json"
-    path.write_text((gate / "coverage.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    done = command("inject", path, "-o", path, "--force")
-    assert done.status == 2
-    assert "is read by this command" in done.err
-
-
 def test_the_worst_contact_of_each_cell_has_a_trigger_plot(gate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Few traces are kept of the whole: the others are made.
     for name in ("MOST_STRIKING", "MOST_SLOW", "MOST_SAMPLED"):
@@ -128,14 +102,6 @@ def test_logs_of_clearly_different_speed_split_the_map(gate: Path, monkeypatch: 
     assert lines[:2] == [["5", "0.1", "2", "0"], ["5", "0.2", "2", "0"]]
 
 
-def test_two_obstacles_that_begin_alike_make_no_map(gate: Path) -> None:
-    path = gate / "coverage.toml"
-    bumper = "[inject.obstacles.bumper]\ndeflection_mm = [0, 10, 60]\nforce_n = [0, 500, 510]\n"
-    path.write_text(f"{path.read_text(encoding='utf-8')}{bumper}", encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="bumper and 50_n_per_mm both begin with 50 N/mm"):
-        cdtool.coverage(path)
-
-
 def test_a_cell_and_the_table_have_the_range_of_the_brackets(gate: Path) -> None:
     text = (gate / "model.toml").read_text(encoding="utf-8")
     (gate / "model.toml").write_text(text.partition("[model.controller]")[0], encoding="utf-8")
@@ -146,3 +112,21 @@ def test_a_cell_and_the_table_have_the_range_of_the_brackets(gate: Path) -> None
     line = next(line for line in printed.splitlines() if line.startswith("momentum") and " 5 " in line)
     highest = max(done.map.cells["momentum"][CellKey(position, 5e3)].range_ms[1] for position in (0.3, 1.2))
     assert f"to {highest:.3g}" in line
+
+
+@pytest.mark.parametrize("name", ["map.html", "map.json", "map.png"])
+def test_a_file_of_another_program_is_kept(gate: Path, name: str) -> None:
+    (gate / name).write_text("mine", encoding="utf-8")
+    done = command("inject", gate / "coverage.toml", "-o", gate / name)
+    assert done.status == 2
+    assert "--force" in done.err
+    assert (gate / name).read_text(encoding="utf-8") == "mine"
+    assert not (gate / "injected_coverage").exists()
+
+
+def test_the_file_that_is_read_is_never_overwritten(gate: Path) -> None:
+    path = gate / "coverage.json"
+    path.write_text((gate / "coverage.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    done = command("inject", path, "-o", path, "--force")
+    assert done.status == 2
+    assert "is read by this command" in done.err

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from cdtool.commands.inject.axis_contact import axis_contact
 from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.with_injected import refusal
 from cdtool.detectors.momentum import Momentum
-from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import MachineFile
 from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.machines.axis_model.obstacle import Obstacle
@@ -60,26 +58,6 @@ def test_the_displacement_is_within_six_percent_of_the_recorded_one(axes: Any) -
 
 
 @needs_data(*RECORDINGS)
-def test_nothing_changes_before_the_first_pulse(axes: Any) -> None:
-    first = axes.sections[0].start
-    for channel in ("position", "torque", "speed"):
-        injected = axes.injected[channel].values[:, 0]
-        change = injected - axes.free[channel].values[: len(injected), 0]
-        assert not np.any(change[1 : first + 1])  # the first sample has no derived speed
-        assert np.all(change[first + 1 : first + 4])
-
-
-@needs_data(*RECORDINGS)
-def test_the_pulses_are_known_to_the_sample(axes: Any) -> None:
-    """The recorded torque jumps by the whole pulse in its first sample, and the pulse is taken out of it again."""
-    logged = read_as_logged(data("emps") / emps_pulses.PULSES, emps_pulses.read_machine_file(emps_pulses.MACHINE))
-    with_pulse, without = (item["torque"].values[:, 0] for item in (logged.recording, axes.recorded))
-    for part in axes.sections:
-        assert with_pulse[part.start] - with_pulse[part.start - 1] > 170.0
-        assert abs(without[part.start] - without[part.start - 1]) < 8.0
-
-
-@needs_data(*RECORDINGS)
 @pytest.mark.parametrize("wrong", ["soft controller", "heavy load"])
 def test_a_wrong_model_does_not_meet_the_limits(identified: tuple[MachineFile, AxisModel], wrong: str) -> None:
     machine_file, model = identified
@@ -92,33 +70,6 @@ def test_a_wrong_model_does_not_meet_the_limits(identified: tuple[MachineFile, A
     times, displaced = emps_pulses.crossing_times(axes), list(emps_pulses.displacements(axes))
     assert max(item.error for item in displaced) > emps_pulses.LARGEST_DISPLACEMENT
     assert wrong == "soft controller" or not all(item.is_met for item in times)
-
-
-@needs_data(*RECORDINGS)
-def test_an_onset_that_is_three_samples_late_does_not_meet_the_limits(
-    identified: tuple[MachineFile, AxisModel], axes: Any
-) -> None:
-    shifted = emps_pulses.with_force(
-        read_as_logged(data("emps") / emps_pulses.FREE, identified[0]),
-        axes.machine,
-        identified[1],
-        np.roll(axes.pulses, 3),
-    )
-    late = replace(axes, injected=axes.machine.referred_to_load(shifted))
-    assert not any(item.is_met for item in emps_pulses.crossing_times(late))
-
-
-@needs_data(*RECORDINGS)
-def test_recordings_of_different_references_are_not_compared(
-    identified: tuple[MachineFile, AxisModel], tmp_path: Path
-) -> None:
-    from scipy.io import loadmat, savemat
-
-    for name, shift in ((emps_pulses.FREE, 0.0), (emps_pulses.PULSES, 1e-4)):
-        values = {key: item for key, item in loadmat(data("emps") / name).items() if not key.startswith("__")}
-        savemat(tmp_path / name, {**values, "qg": values["qg"] + shift})
-    with pytest.raises(ValueError, match="different references"):
-        emps_pulses.compared(tmp_path, *identified)
 
 
 @needs_data(*RECORDINGS)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.base.errors import RecordingError, UsageError
+from cdtool.base.errors import UsageError
 from cdtool.commands.inject.inject_section import JointMark
 from cdtool.recordings.recording import Recording, Series
 from tests.machines.robot_model.test_chain import planar_arm
@@ -34,15 +34,6 @@ def recording() -> Recording:
 def test_the_position_is_passed_from_either_side(text: str, time: float) -> None:
     mark = JointMark.of_machine(text, planar_arm())
     assert mark.time_in(recording()) == pytest.approx(time, abs=0.011)
-
-
-def test_missing_samples_do_not_matter() -> None:
-    values = POSITION.copy()
-    values[60:71, 1] = np.nan
-    holes = Recording("log", "log", ("arm", "forearm"), {"position": Series(TIME, values, "rad")})
-    assert JointMark.of_machine("forearm = 0.35rad", planar_arm()).time_in(holes) == pytest.approx(0.71)
-    with pytest.raises(RecordingError, match="no position"):
-        JointMark.of_machine("arm = 1deg", planar_arm()).time_in(Recording("log", "log", ("arm", "forearm"), {}))
 
 
 @pytest.mark.parametrize(

@@ -12,14 +12,13 @@ from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, DriveBeyond
 from cdtool.commands.inject.axis_contact import Doubt, InjectedContact
 from cdtool.commands.inject.injected_logs import injected_recording
-from cdtool.commands.inject.robot_contact import RobotLog, StruckPoint, least_known_joint, robot_contact
+from cdtool.commands.inject.robot_contact import RobotLog, StruckPoint, robot_contact
 from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
 from cdtool.commands.simulate.arm_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.machines.axis_model.model_table import ModelTable
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import Sensors
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.robot_model.parameters import RobotModel, robot_model
 from cdtool.machines.urdf_robot import UrdfRobot
@@ -205,49 +204,10 @@ def test_an_elastic_joint_hides_the_contact_from_the_motor_at_first(robot: UrdfR
     assert np.max(np.abs(at(beyond, "speed", 5e-3))) > 1.2 * early[0]
 
 
-def test_the_direction_is_a_plane_whatever_its_sign(robot: UrdfRobot, recording: Recording) -> None:
-    _, _, motion = motion_at_contact(robot, recording)
-    model = robot_model(robot, None)
-    plain = struck(recording, model, FROZEN)
-    given = [
-        struck(recording, model, FROZEN, point=replace(POINT, direction=tuple(sign * 3.0 * motion))) for sign in (1, -1)
-    ]
-    for contact in given:
-        np.testing.assert_allclose(contact.force.values, plain.force.values, rtol=1e-2, atol=0.1)
-    across = np.cross(motion, [0.3, 0.5, 0.7])
-    with pytest.raises(RecordingError, match="moves along the obstacle"):
-        struck(recording, model, FROZEN, point=replace(POINT, direction=tuple(across)))
-
-
 @pytest.mark.parametrize(("time", "message"), [(99.0, "outside the log"), (0.1, "at rest")])
 def test_a_contact_that_cannot_be_is_refused(robot: UrdfRobot, recording: Recording, time: float, message: str) -> None:
     with pytest.raises(RecordingError, match=message):
         robot_contact(log_of(recording), robot_model(robot, None), POINT, Obstacle.spring(1e4), time, assumption=FROZEN)
-
-
-def test_a_log_without_positions_is_refused(recording: Recording) -> None:
-    channels = {name: series for name, series in recording.channels.items() if name != "position"}
-    with pytest.raises(RecordingError, match="no position"):
-        log_of(replace(recording, channels=channels))
-
-
-def test_gaps_noise_and_a_clock_of_its_own_change_the_force_little(robot: UrdfRobot) -> None:
-    clean, noisy = (robot_recording(robot, TRAVEL, noise=noise) for noise in (0.0, 1.0))
-    values = noisy["speed"].values.copy()
-    values[500:540] = np.nan
-    slow = replace(noisy["torque"], time=noisy["torque"].time + 3e-4)
-    channels = {**noisy.channels, "speed": noisy["speed"].with_values(values, "SI"), "torque": slow}
-    model = robot_model(robot, None)
-    peaks = [struck(item, model, FROZEN, 1e3).peak_force for item in (clean, replace(noisy, channels=channels))]
-    assert peaks[1] == pytest.approx(peaks[0], rel=0.03)
-
-
-def test_a_log_that_begins_in_motion_is_followed_from_its_first_sample(robot: UrdfRobot, recording: Recording) -> None:
-    channels = {name: series.between(1.2, 9.0) for name, series in recording.channels.items()}
-    model = robot_model(robot, None)
-    whole, part = (struck(item, model, FROZEN, 1e3) for item in (recording, replace(recording, channels=channels)))
-    assert part.speed == pytest.approx(whole.speed, rel=0.02)
-    assert part.peak_force == pytest.approx(whole.peak_force, rel=0.05)
 
 
 UR10E = ("joint1", "joint2", "joint3", "joint4", "joint5", "joint6")
@@ -273,10 +233,3 @@ def test_a_point_that_was_beyond_the_obstacle_before_meets_it_at_the_contact_onl
         assert not np.any(change.values[before])
     # 1/2 m v^2 = F^2 / 2 k with the mass that the point moves, a few kg.
     assert 1.0 < (contact.peak_force / contact.speed) ** 2 / 25e3 < 20.0
-
-
-def test_the_least_known_joint_decides(robot: UrdfRobot) -> None:
-    model = robot_model(robot, None)
-    known = replace(model.axes[0], sensors=Sensors(accelerometer_hz=80.0))
-    mixed = replace(model, axes=(known,) * 3 + model.axes[3:4] + (known,) * 2)
-    assert least_known_joint(mixed).sensors.accelerometer_hz == 0.0

@@ -167,12 +167,6 @@ def test_an_unknown_link_is_one_line(six: Path, old: str, new: str, message: str
     assert not (six / "out").exists()
 
 
-def test_the_link_may_be_the_index_of_its_joint(six: Path) -> None:
-    by_name = cdtool.inject(write(six), six / "one").logs.cases
-    by_index = cdtool.inject(write(six, INJECT.replace('"link6"', "5")), six / "two").logs.cases
-    assert [case.peak_force for case in by_index] == [case.peak_force for case in by_name]
-
-
 def test_a_link_is_no_key_of_an_axis(tmp_path: Path) -> None:
     gate = Path(__file__).parents[3] / "sample_logs" / "gate"
     text = (gate / "inject.toml").read_text(encoding="utf-8").replace("[inject]", '[inject]\nlink = "leaf"')

@@ -86,20 +86,6 @@ def test_every_file_is_named_with_its_hash_and_one_hash_stands_for_all(rig, made
     assert changed.data_sha256 != made.data_sha256
 
 
-def test_without_detectors_the_protocol_is_the_same_but_for_latencies(rig, made):
-    own = cdtool.protocol(rig / "protocol.toml")
-    assert (own.verdict, own.files, own.detectors) == (made.verdict, made.files, ())
-    for one, other in zip(own.points[0].repetitions, made.points[0].repetitions, strict=True):
-        assert one.latencies_ms == {} and one.verdict == other.verdict and one.curve.peak == other.curve.peak
-
-
-def test_a_recording_that_cannot_be_read_has_its_hash_too(tmp_path):
-    write_rig(tmp_path, FORCES)
-    (tmp_path / "edge" / "04.csv").write_text("no table\n", encoding="utf-8")
-    files = {item.name: (item.sha256, item.role) for item in cdtool.protocol(write_protocol(tmp_path)).files}
-    assert files["edge/04.csv"] == (hashlib.sha256(b"no table\n").hexdigest(), "measured")
-
-
 def test_every_file_that_a_figure_depends_on_has_its_hash(tmp_path):
     write_rig(tmp_path, FORCES)
     (tmp_path / "yard.toml").write_bytes(Path("cdtool/truth/force/limits.toml").read_bytes())
@@ -154,11 +140,6 @@ def test_a_contact_without_a_force_or_that_cannot_be_read_is_a_reason(tmp_path):
     protocol = cdtool.protocol(write_protocol(tmp_path))
     assert protocol.verdict.outcome == "incomplete"
     assert kinds(protocol) == ["too_few_repetitions", "unreadable"]
-
-
-def test_a_point_names_its_logs_by_patterns(tmp_path):
-    write_rig(tmp_path, FORCES)
-    assert cdtool.protocol(write_protocol(tmp_path, logs='logs = ["edge/0[12].csv"]')).verdict.outcome == "incomplete"
 
 
 @pytest.mark.parametrize(("slope", "reading"), [(150.0, 156.0), (400.0, 165.0)])
@@ -243,13 +224,6 @@ def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
     assert "too_many_repetitions" in kinds(protocol) and protocol.verdict.outcome == "incomplete"
     many = next(reason for reason in protocol.verdict.reasons if reason.kind == "too_many_repetitions")
     assert many.values == {"point": "edge", "present": 4, "planned": 3}
-
-
-def test_a_file_that_two_patterns_of_a_point_name_is_one_repetition(tmp_path):
-    write_rig(tmp_path, FORCES[:1])
-    logs = 'logs = ["edge/*.csv", "edge/01.csv", "edge/../edge/01.csv"]'
-    protocol = cdtool.protocol(write_protocol(tmp_path, logs=logs))
-    assert (kinds(protocol), len(protocol.points[0].repetitions)) == (["too_few_repetitions"], 1)
 
 
 def test_a_copy_of_a_recording_at_another_point_is_no_measurement_of_it(tmp_path):

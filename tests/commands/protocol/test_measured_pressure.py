@@ -67,13 +67,6 @@ def test_a_record_is_compared_with_both_limits(tmp_path, pressure, outcome, kind
     assert result(made(tmp_path, Run(pressure))) == (outcome, kinds)
 
 
-def test_the_reason_counts_the_repetitions_and_names_the_area(tmp_path):
-    protocol = made(tmp_path, *[Run(half_sine(peak)) for peak in (250.0, 260.0, 200.0)])
-    assert words_of("en").reasons(protocol.verdict, "fail") == [
-        "edge, pressure, transient: 2 of 3 repetitions above the limit, up to 260 N/cm², limit 240 N/cm² (sternum)"
-    ]
-
-
 def test_an_area_of_the_plan_has_its_own_limit_and_an_unknown_one_is_refused(tmp_path):
     area = 'body_area = "pectoral muscle"'
     assert result(made(tmp_path / "a", Run(half_sine(260.0)), point=area)) == ("pass", [])
@@ -110,21 +103,6 @@ def test_a_profile_without_pressure_limits_shows_the_pressure_and_says_so(tmp_pa
     protocol = made(tmp_path, *runs, profile="en_12453_wide_gap", instrument=False)
     assert [kind for kind in result(protocol)[1] if "pressure" in kind] == []
     assert "the profile en_12453_wide_gap does not limit the pressure" in page_of(protocol)
-
-
-@pytest.mark.parametrize(
-    ("entered", "outcome", "kinds"),
-    [
-        (90.0, "pass", []),  # below the quasi-static limit it is below both
-        (120.0, "pass", []),
-        (121.0, "incomplete", ["pressure_time_unknown"]),  # it may have lasted
-        (240.0, "incomplete", ["pressure_time_unknown"]),
-        (241.0, "fail", ["pressure_exceeds"]),
-        (0.0, "incomplete", ["pressure_not_measured"]),  # a contact without pressure was not measured
-    ],
-)
-def test_a_peak_entered_by_hand_is_compared_with_what_it_can_show(tmp_path, entered, outcome, kinds):
-    assert result(made(tmp_path, Run(None), point=f"peak_pressures_n_per_cm2 = [{entered}]")) == (outcome, kinds)
 
 
 def test_both_peaks_are_compared_and_a_difference_is_a_deviation(tmp_path):
@@ -214,13 +192,3 @@ def test_a_film_reader_may_have_a_file_and_a_clock_of_its_own(tmp_path):
     assert [item.role for item in protocol.files].count("measured") == 2
     (tmp_path / "films" / "01.csv").unlink()
     assert result(cdtool.protocol(path)) == ("incomplete", ["pressure_not_measured"])
-
-
-def test_a_check_before_the_test_says_that_a_pressure_will_be_missing(tmp_path):
-    path = write_pressure_rig(tmp_path, [Run()])
-    assert check_protocol(path).verdict.outcome == "pass"
-    machine = tmp_path / "machine.toml"
-    lines = [line for line in machine.read_text(encoding="utf-8").splitlines() if "contact_pressure" not in line]
-    machine.write_text("\n".join(lines), encoding="utf-8")
-    reasons = check_protocol(path).verdict.reasons
-    assert [(reason.kind, reason.due) for reason in reasons] == [("pressure_not_measured", "test_day")]

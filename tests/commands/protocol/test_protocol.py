@@ -153,18 +153,6 @@ def test_a_failed_protocol_is_the_first_sentence_everywhere_and_exits_with_1(tmp
     assert (again.status, again.out.splitlines()[0]) == (1, made.out.splitlines()[0])
 
 
-def test_a_protocol_and_other_reports_are_written_together_and_only_their_own_files_replaced(rig, tmp_path):
-    path = write_protocol(rig)
-    targets = [word for name in ("gate-protocol.html", "report.html", "r.json") for word in ("-o", tmp_path / name)]
-    for _ in range(2):
-        assert cdtool("benchmark", rig / "benchmark.toml", "-p", path, *targets).status == 0
-    assert "<title>Test protocol" in (tmp_path / "gate-protocol.html").read_text(encoding="utf-8")
-    assert "<title>Collision detection" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    (tmp_path / "gate-protocol.html").write_text("written by hand", encoding="utf-8")
-    refused = cdtool("benchmark", rig / "benchmark.toml", "-p", path, *targets)
-    assert refused.status == 2 and "contains no test protocol of cdtool" in refused.err
-
-
 @pytest.mark.parametrize(
     ("file", "removed", "named"),
     [
@@ -198,12 +186,6 @@ def test_with_p_every_pdf_or_html_is_the_protocol_unless_one_has_its_name(names,
     assert [path.name for path in documents] == protocols
     assert [path.name for path in others] == [name for name in names if name not in protocols]
     assert protocol_names([Path("prot.pdf")], is_wanted=False)[0] == []
-
-
-def test_with_p_the_protocol_may_have_any_name(rig, tmp_path):
-    made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "prot.html")
-    assert (made.status, "written: " in made.out) == (0, True)
-    assert "<title>Test protocol" in (tmp_path / "prot.html").read_text(encoding="utf-8")
 
 
 def test_a_protocol_without_its_file_and_a_file_without_a_protocol_name_the_next_step(rig, tmp_path):
@@ -246,12 +228,6 @@ def test_a_pdf_has_every_number_of_the_results_that_the_protocol_shows(rig, tmp_
     assert len(numbers) == 12
     assert [value for value in numbers if f"{value:.4g}" not in words] == []
     assert all(row["sha256"] in shown for row in results["recordings"])
-
-
-def test_check_as_json_lists_kinds_and_keys(rig):
-    checked = json.loads(cdtool("protocol", "check", write_protocol(rig, valid_until="2026-01-20"), "--json").out)
-    assert checked["complete"] is False and checked["recordings"] == {"edge": 3}
-    assert [item["kind"] for item in checked["incomplete"]] == ["calibration_expired"]
 
 
 def test_a_protocol_file_names_the_key_of_a_missing_file_and_is_no_benchmark_for_a_table_machine(tmp_path):

@@ -89,11 +89,6 @@ def test_the_unchanged_machine_has_the_same_results_as_without_conditions(gate, 
     ]
 
 
-def test_one_operation_of_each_changed_group_is_plotted(both):
-    groups = [trace.group for trace in both.traces]
-    assert groups.count(FREE) == groups.count(STRUCK) == 1 and groups.count("stiff") == 2
-
-
 def test_a_group_has_the_window_of_its_counterpart_and_a_section_of_its_own(read):
     setup = read(WINTER)
     assert setup.groups == ("stiff", "holdout") and setup.groups_of_impacts == ("stiff",)
@@ -129,11 +124,6 @@ def test_the_store_has_them(gate, tmp_path):
 def test_what_is_wrong_is_named(read, tables, message):
     with pytest.raises(ConfigurationError, match=re.escape(message)):
         read(f"[conditions.cold]\n{tables}\n")
-
-
-def test_a_condition_has_no_name_of_a_group(read):
-    with pytest.raises(ConfigurationError, match=r"conditions\.stiff: stiff is the name of another group"):
-        read('[conditions.stiff]\nholdout.logs = ["winter/holdout/*.csv"]\n')
 
 
 def test_a_tuned_benchmark_file_has_them_in_its_own_folder(gate, tmp_path):

@@ -1,6 +1,5 @@
 """A benchmark in several processes: everything that goes to a worker and back, and the same bytes for any number."""
 
-import pickle
 import sys
 import threading
 from collections.abc import Callable
@@ -10,14 +9,11 @@ from pathlib import Path
 import pytest
 
 import cdtool
-from cdtool.commands.judging import runs
-from cdtool.commands.scoring import learned_thresholds, scored_logs
-from cdtool.execution.workers import Workers, in_order
+from cdtool.commands.scoring import learned_thresholds
+from cdtool.execution.workers import in_order
 from cdtool.results.files.results_file import to_json
 from cdtool.results.traces.file import encode_traces
-from cdtool.thresholds import THRESHOLDS
 
-SAMPLES = Path(__file__).parents[3] / "sample_logs" / "gate"
 FILE = """machine = "machine.toml"
 threshold = "{threshold}"
 
@@ -62,24 +58,6 @@ def by_one(gate) -> Callable[[str], bytes]:
     return cache(partial(run, gate))
 
 
-@pytest.mark.parametrize("threshold", THRESHOLDS.names())
-def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, by_one, threshold, monkeypatch):
-    alone = by_one(threshold)
-    sent = []
-
-    def by_pickles(work, items, *_, **__):
-        work = pickle.loads(pickle.dumps(work))
-        for item in items:
-            result = pickle.dumps(work(pickle.loads(pickle.dumps(item))))
-            sent.append(len(result))
-            yield pickle.loads(result)
-
-    monkeypatch.setattr(scored_logs, "in_order", by_pickles)
-    monkeypatch.setattr(runs, "in_order", by_pickles)
-    assert run(gate, threshold) == alone
-    assert len(sent) == 14
-
-
 def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
     """Of 60 logs, pieces have up to 3 in two processes."""
     for name in ("free", "holdout", "machine.toml"):
@@ -118,27 +96,6 @@ def test_results_and_traces_are_the_same_bytes_for_any_number_of_jobs(gate, by_o
         assert run(gate, "signature", jobs) == alone
     finally:
         stop.set()
-
-
-def bits(log: Path) -> bytes:
-    recording = cdtool.read(log, log.parents[1] / "machine.toml")
-    series = [recording[channel] for channel in sorted(recording.channels)]
-    return b"".join(array.tobytes() for each in series for array in (each.time, each.values))
-
-
-@pytest.mark.parametrize("file_format", ["csv", "mcap"])
-def test_workers_that_read_at_the_same_time_read_the_same_bits(tmp_path, file_format):
-    if file_format == "csv":
-        cdtool.simulate_gate(tmp_path, {"holdout": 2, "stiff": 2}, seed=17)
-    folder = tmp_path if file_format == "csv" else SAMPLES  # MCAP files take seconds to write
-    logs = 9 * sorted(folder.glob(f"*/*.{file_format}"))[:4]
-    alone = [bits(log) for log in logs]
-    assert len(set(alone)) == 4
-    for _ in range(3):
-        differing = [
-            log for log, one, many in zip(logs, alone, in_order(bits, logs, 36, Workers(4)), strict=True) if one != many
-        ]
-        assert not differing
 
 
 @pytest.fixture(scope="module")

@@ -66,12 +66,6 @@ def test_all_contacts_are_detected_and_nothing_before_them_is_an_alarm(results):
     assert sorted(provenance["scored_without_own_part"]) == sorted(provenance["learned_runs"])
 
 
-def test_the_screen_states_how_it_was_learned(gate):
-    done = command("benchmark", setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
-    assert "learned from each log until 0.2 s before the first contact of each log" in one_line(done.out)
-    assert "7 recordings scored with thresholds learned from the other recordings" in one_line(done.out)
-
-
 def test_what_is_learned_ends_before_the_onset_by_the_guard(gate, results):
     onsets = {row.recording: row.onset_s for row in results.contacts}
     for guard in (0.0, 0.2, 1.5):
@@ -157,20 +151,6 @@ def test_sections_limit_what_is_learned_and_what_is_scored(gate):
     assert done.provenance["learned_sections"]["soft/01.csv"] == "from 0.5 s to 0.5 m of travel"
 
 
-def test_a_section_without_the_contact_leaves_the_log_out_by_name(gate):
-    groups = '[impacts.stiff]\nlogs = ["stiff/01.csv", { path = "stiff/02.csv", to = "3s" }]\n'
-    done = benchmark(setup_of(gate, HEAD, LEARN, ONSET, groups)).results
-    assert [(item.recording, item.reason) for item in done.skipped] == [
-        ("stiff/02.csv", "no contact to 3 s (change from and to, or move it to [holdout])")
-    ]
-
-
-def test_a_log_learned_from_up_to_a_mark_may_be_scored_as_well(gate):
-    learn = '[learn]\nlogs = ["free/*.csv", { path = "stiff/*.csv", to = "4s" }]\n'
-    setup = setup_of(gate, HEAD, learn, ONSET, '[impacts.stiff]\nlogs = ["stiff/*.csv"]\n')
-    assert len(setup.both) == 4 and {row.outcome for row in benchmark(setup).results.contacts} == {"detected"}
-
-
 def test_logs_that_are_cut_into_strokes_are_scored_without_their_own_strokes(gate):
     done = benchmark(setup_of(gate, HEAD, 'operations = "motion"\n', LEARN, ONSET, GROUPS)).results
     assert [row.outcome for row in done.contacts] == ["detected"] * 7 and not done.false_alarms
@@ -217,25 +197,6 @@ def test_the_label_file_keeps_a_contact_out_of_a_part_that_is_learned_from(gate,
     assert [item.recording for item in runs.skipped] == [f"stiff/0{i}.csv" for i in range(1, 5)]
     assert all("shows a contact" in item.reason for item in runs.skipped)
     assert {row.outcome for row in benchmark(setup).results.contacts} == {"detected"}
-
-
-def test_the_load_cells_synchronisation_is_part_of_the_guard(gate):
-    plain, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
-    late, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, "synchronisation_s = 0.5\n", GROUPS))
-    for before, after in zip(plain.operations, late.operations, strict=True):
-        assert before.recording.end - after.recording.end == pytest.approx(0.5, abs=0.002)
-
-
-def test_a_copy_of_a_log_is_said_to_have_been_learned_from(gate, prepared, tmp_path):
-    assert not prepared.detect(gate / "stiff" / "01.csv").runs[0].learned
-    shutil.copy(gate / "stiff" / "01.csv", tmp_path / "copy.csv")
-    assert prepared.detect(tmp_path / "copy.csv").runs[0].learned
-
-
-def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):
-    log = prepared.score(gate / "stiff" / "01.csv")[0].recording
-    assert log is not None and prepared.normals.motions[0].runs == 7
-    assert prepared.normals_for(log).motions[0].runs == 6
 
 
 @pytest.mark.parametrize(
@@ -297,18 +258,6 @@ def changed(log, rows, factor, column="i_motor"):
     log.write_text("\n".join([header, *lines]), encoding="utf-8")
 
 
-def test_plausible_ranges_are_those_of_what_is_before_the_contacts(gate, results):
-    plain, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
-    folder = gate.parent / "after"
-    shutil.copytree(gate, folder, dirs_exist_ok=True)
-    onsets = {row.recording: row.onset_s for row in results.contacts}
-    for name, onset in onsets.items():
-        rows = len((folder / name).read_text(encoding="utf-8").splitlines()) - 1
-        changed(folder / name, range(int(onset * 1000.0), rows), 30.0)
-    after, _ = learned_of(setup_of(folder, HEAD, LEARN, ONSET, GROUPS))
-    assert after.ranges.all == plain.ranges.all
-
-
 def test_plausible_ranges_of_a_log_are_those_of_the_others(gate):
     folder = gate.parent / "own"
     shutil.copytree(gate, folder, dirs_exist_ok=True)
@@ -345,14 +294,6 @@ def test_no_log_judges_itself_whatever_its_path_is_written(gate, how):
     assert own["momentum"] != learned.thresholds["momentum"]
 
 
-def test_a_log_that_is_too_short_is_not_before_a_contact_at_infinity(gate):
-    part = '[learn]\nuntil = "onset"\nlogs = [{ path = "free/01.csv", from = "2s", to = "2.01s" }, "stiff/01.csv"]\n'
-    setup = setup_of(gate, HEAD, part, ONSET, GROUPS)
-    (skipped,) = load_runs(setup.learn, setup.machine_file, setup.run_reading()).skipped
-    assert skipped.recording == "free/01.csv"
-    assert skipped.reason.startswith("0.01 s to learn from: at least ")
-
-
 @pytest.mark.parametrize("threshold", ["signature", "cusum", "glr", "innovation"])
 @pytest.mark.parametrize("option", [[], ["--dry-run"]])
 def test_limits_by_location_learned_up_to_the_onset_only_are_refused(gate, threshold, option):
@@ -363,3 +304,10 @@ def test_limits_by_location_learned_up_to_the_onset_only_are_refused(gate, thres
     assert done.status == 2 and f"the threshold {threshold} would know no limit where" in one_line(done.err)
     assert 'set threshold = "limit"' in one_line(done.err) and not done.out
     setup_of(gate, head, LEARN.replace('["stiff', '["free/*.csv", "stiff'), ONSET, GROUPS)
+
+
+def test_the_load_cells_synchronisation_is_part_of_the_guard(gate):
+    plain, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
+    late, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, "synchronisation_s = 0.5\n", GROUPS))
+    for before, after in zip(plain.operations, late.operations, strict=True):
+        assert before.recording.end - after.recording.end == pytest.approx(0.5, abs=0.002)

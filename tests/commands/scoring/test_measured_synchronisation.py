@@ -13,7 +13,6 @@ from cdtool.base.errors import ConfigurationError
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
-from cdtool.results.files.results_file import to_json
 from cdtool.results.results import Results
 
 FILE = """
@@ -73,10 +72,6 @@ def test_the_measured_offset_is_part_of_every_latencys_resolution_and_is_reporte
         assert ours.resolution_ms == pytest.approx(theirs.resolution_ms + 1e3 * synchronisation)
         assert ours.latency_ms == theirs.latency_ms
     assert measured.provenance["synchronisation_s"] == "measured"
-
-
-def test_the_results_do_not_depend_on_the_number_of_jobs(setup, measured):
-    assert to_json(benchmark(setup, jobs=2).results) == to_json(measured)
 
 
 def test_a_late_load_cell_makes_the_resolution_coarser(gate, synchronisation, tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.base.errors import ConfigurationError
 from cdtool.base.settings import Place, read
 from cdtool.commands.judging.named_logs import OnsetTable
 from cdtool.truth.onset_rule import OnsetRule
@@ -34,8 +34,3 @@ def test_the_default_is_three_milliseconds_and_is_stated_in_time():
 def test_a_wrong_setting_is_named(values, said):
     with pytest.raises(ConfigurationError, match=said):
         rule(**values)
-
-
-def test_a_rule_made_in_python_is_checked_as_well():
-    with pytest.raises(UsageError, match="hold is nan"):
-        OnsetRule(hold=float("nan"))

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import cdtool
-from cdtool.base.errors import ConfigurationError, OutputError, RecordingError
+from cdtool.base.errors import OutputError, RecordingError
 from cdtool.commands.scoring import pieces
-from cdtool.commands.scoring.benchmark_file import read_benchmark_file, with_detectors
+from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.commands.scoring.dry_run import dry_run
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.store.determinants import Determinants
@@ -121,12 +121,6 @@ def test_a_second_run_computes_nothing_and_writes_the_same_bytes(gate, threshold
     assert run(gate, tmp_path / "s") == (expected, 6)
     assert run(gate, tmp_path / "s") == (expected, 0)
     assert run(gate, tmp_path / "s", trust_times=True, jobs=2) == (expected, 0)
-
-
-def test_several_processes_fill_the_store_with_the_same(gate, tmp_path):
-    expected = alone(gate)
-    assert run(gate, tmp_path / "s", jobs=2) == (expected, 6)
-    assert run(gate, tmp_path / "s") == (expected, 0)
 
 
 def test_of_one_recording_more_only_that_is_computed(gate, tmp_path):
@@ -286,27 +280,6 @@ def test_a_log_that_changes_before_another_detector_runs_is_computed_whole(gate,
     assert found == (alone(gate), 6)
 
 
-def test_a_trace_of_a_log_that_has_changed_since_is_left_out(gate, filled, monkeypatch):
-    """The rows are stored; the trace is made again, since another gain changes it, when the log has another content."""
-    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
-        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
-    log = gate / "stiff" / "03.csv"
-    text, call = log.read_bytes(), pieces.PieceScoring.__call__
-
-    def after_a_change(self, piece):
-        if piece.path == log and piece.operations:
-            log.write_bytes(text.replace(b"-0.00093", b"-0.00094", 1) + b"\n")
-        return call(self, piece)
-
-    monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
-    done = cdtool.benchmark(gate / "b.toml", store=Store(filled))
-    assert log.read_bytes() != text
-    assert "stiff/03.csv" not in {item.recording for item in done.traces}
-    log.write_bytes(text)
-    monkeypatch.undo()
-    assert run(gate, filled) == (alone(gate), 0)
-
-
 def test_logs_that_are_learned_from_and_scored_depend_on_all_others(gate, tmp_path):
     write(gate, learn=', "stiff/*.csv"', until='until = "onset"')
     expected = alone(gate)
@@ -320,19 +293,6 @@ def test_logs_that_are_learned_from_and_scored_depend_on_all_others(gate, tmp_pa
     text = (gate / "free" / "other.csv").read_text(encoding="utf-8")
     (gate / "free" / "other.csv").write_text(text.replace("-0.0083", "-0.0084", 1), encoding="utf-8")
     assert run(gate, tmp_path / "s") == (alone(gate), 6)
-
-
-def test_runs_in_one_file(gate, tmp_path):
-    """The reset of the clock cuts the file into its runs."""
-    for group in ("free", "holdout", "stiff"):
-        texts = [log.read_text(encoding="utf-8").split("\n", 1) for log in sorted((gate / group).glob("*.csv"))]
-        for log in (gate / group).glob("*.csv"):
-            log.unlink()
-        (gate / group / "all.csv").write_text(texts[0][0] + "\n" + "".join(text for _, text in texts), encoding="utf-8")
-    write(gate, operations='operations = "clock-reset"')
-    expected = alone(gate)
-    assert run(gate, tmp_path / "s") == (expected, 2)
-    assert run(gate, tmp_path / "s") == (expected, 0)
 
 
 def logs_in(store: Path) -> list[Path]:
@@ -359,18 +319,6 @@ def test_a_renamed_part_of_a_log_is_another_log(tmp_path):
     assert [item.content for item in before] != [item.content for item in after]
 
 
-def test_a_store_that_is_being_created_and_stray_files_in_it_do_no_harm(gate, filled):
-    (filled / "logs" / ".DS_Store").touch()
-    (next((filled / "logs").glob("[0-9a-f]*")) / "folder").mkdir()
-    before = store_status(filled).entries
-    assert collect_garbage(filled).removed == 0 and store_status(filled).entries == before
-    new = gate / "new"
-    new.mkdir()
-    (new / ".cdtool-0123456789abcdef-0123456789abcdef.tmp").touch()
-    Store(new).create()
-    assert Store(new).mark.is_file()
-
-
 def test_a_damaged_or_missing_file_is_computed_again(gate, tmp_path):
     expected, _ = run(gate, tmp_path / "s")
     first, second, *_ = logs_in(tmp_path / "s")
@@ -384,43 +332,11 @@ def test_a_damaged_or_missing_file_is_computed_again(gate, tmp_path):
     assert run(gate, tmp_path / "s") == (expected, 6)
 
 
-def test_a_missing_trace_is_made_again(gate, filled):
-    shutil.rmtree(filled / "traces")
-    assert run(gate, filled)[0] == alone(gate)
-    assert (filled / "traces").is_dir()
-
-
 def test_a_store_that_cannot_be_written_is_one_line(gate, filled):
     shutil.rmtree(filled / "logs")
     (filled / "logs").touch()
     with pytest.raises(OutputError, match="cannot be written"):
         run(gate, filled)
-
-
-def test_keys_are_the_same_in_another_process(gate, filled):
-    code = (
-        "from pathlib import Path; from cdtool.commands.scoring.dry_run import dry_run;"
-        "from cdtool.execution.store.store import Store;"
-        "print(len(dry_run('b.toml', store=Store(Path('../s'))).logs))"
-    )
-    for seed in ("1", "2"):
-        # The paths in the results are relative to the benchmark file, whatever the folder it is called from.
-        done = subprocess.run(
-            [sys.executable, "-c", code],
-            check=True,
-            capture_output=True,
-            text=True,
-            cwd=gate,
-            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(cdtool.__file__).parents[1])},
-        )
-        assert done.stdout == "0\n"
-
-
-def test_a_fleet_that_was_moved_is_known(gate, tmp_path):
-    expected, _ = run(gate, tmp_path / "s")
-    moved = tmp_path / "elsewhere"
-    gate.rename(moved)
-    assert run(moved, tmp_path / "s") == (expected, 0)
 
 
 def killed_run(gate):
@@ -443,27 +359,10 @@ def test_a_killed_run_continues_where_it_stopped(gate, tmp_path):
     assert run(gate, tmp_path / "s") == (alone(gate), 2)
 
 
-@pytest.mark.parametrize("threshold", THRESHOLDS.names())
-def test_what_was_learned_is_restored_without_loss(made, threshold, tmp_path):
-    for name in ("free", "holdout", "stiff", "machine.toml"):
-        (tmp_path / name).symlink_to(made / name)
-    setup = with_detectors(read_benchmark_file(write(tmp_path, threshold)), ["momentum", "friction_ekf"])
-    learned = Teaching(setup, Workers()).learned
-    restored = Learned.of_text(learned.to_text(setup.rule), setup.rule)
-    assert replace(restored, seconds=learned.seconds).to_text(setup.rule) == learned.to_text(setup.rule)
-    assert restored.about == learned.about
-
-
 def test_a_folder_that_is_not_a_store_is_refused(gate):
     with pytest.raises(cdtool.base.errors.ConfigurationError, match="neither a store nor an empty folder"):
         run(gate, gate)
     assert not (gate / "logs").exists()
-
-
-def test_a_dry_run_refuses_a_file_in_place_of_a_store_as_a_run_does(gate, tmp_path):
-    (tmp_path / "store").touch()
-    with pytest.raises(ConfigurationError, match="is not a store"):
-        dry_run(write(gate), store=Store(tmp_path / "store"))
 
 
 def test_a_run_to_learn_from_that_could_not_be_read_is_retried(gate, tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from dataclasses import replace
 from functools import cache
@@ -103,21 +102,6 @@ def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: 
     assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "hold_s": 0.003}
 
 
-def test_true_contacts_are_listed_beside_the_logs(folder: Path) -> None:
-    with (folder / "contacts.csv").open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    assert [row["recording"] for row in rows] == ["stiff/01.mcap", "stiff/02.mcap", "stiff/03.csv", "soft/01.mcap"]
-    run = simulated(1, 2, "stiff", 3)
-    assert run.contact_start is not None
-    assert float(rows[2]["true_contact_s"]) == pytest.approx(run.contact_start, abs=1e-6)
-
-
-def test_logs_stay_small(folder: Path) -> None:
-    samples = ARM.impact_duration[0] / ARM.sample_period
-    assert (folder / "stiff" / "03.csv").stat().st_size < 80 * samples
-    assert (folder / "stiff" / "01.mcap").stat().st_size < 130 * samples
-
-
 def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path, tmp_path: Path) -> None:
     counts = keys(free=0, holdout=0, stiff=4, soft=0)
     done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--set", "format=mixed", "-o", tmp_path / "b")
@@ -127,16 +111,6 @@ def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path,
     other = command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "c")
     assert other.status == 0, other.err
     assert (tmp_path / "c" / "stiff" / "03.csv").read_bytes() != (folder / "stiff" / "03.csv").read_bytes()
-
-
-def test_from_python_the_same_folder_is_written_in_one_line(tmp_path: Path) -> None:
-    assert cdtool.simulate_arm(tmp_path / "python", {"stiff": 1}, seed=6, trial=2) == 1
-    counts = keys(free=0, holdout=0, stiff=1, soft=0)
-    assert command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "line").status == 0
-    names = sorted(path.relative_to(tmp_path / "line") for path in (tmp_path / "line").rglob("*.*"))
-    assert len(names) == 3
-    for name in names:
-        assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "line" / name).read_bytes()
 
 
 def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_path: Path) -> None:

@@ -78,9 +78,3 @@ def test_the_limits_added_by_hand_hold_with_room() -> None:
         if item.figure in ("p95_ms", "force_at_alarm_max_n"):
             assert item.value is not None and item.largest is not None
             assert 1.2 * item.value < item.largest
-
-
-def test_the_sample_logs_stay_small() -> None:
-    sizes = {folder: sum(path.stat().st_size for path in (SAMPLES / folder).rglob("*.*")) for folder in FOLDERS}
-    assert sizes["gate"] < 20e6
-    assert sizes["arm/trial_1"] + sizes["arm/trial_2"] < 7e6

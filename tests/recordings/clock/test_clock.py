@@ -234,23 +234,6 @@ def test_after_a_pause_the_held_value_expires_again_by_the_recent_rate():
     np.testing.assert_array_equal(np.isfinite(held[:, 0]), [True, False, True, False])
 
 
-@given(
-    st.lists(
-        st.sampled_from([0.0, -0.0, 0.5, -2.0, 1e300, np.nan, np.inf, -np.inf]) | st.floats(-9.0, 9.0), max_size=9
-    ),
-    st.integers(1, 2),
-)
-def test_the_integral_has_the_bits_of_the_cumulated_sum_of_its_steps(speeds, joints):
-    values = np.array(speeds[: len(speeds) // joints * joints]).reshape(-1, joints)
-    time = np.cumsum(np.arange(1.0, len(values) + 1.0) * 0.1)
-    held = np.where(np.isfinite(values), values, np.nan)
-    for k in range(len(held)):
-        held[k] = np.where(np.isnan(held[k]), held[k - 1] if k else 0.0, held[k])
-    steps = np.diff(time)[:, np.newaxis] * 0.5 * (held[1:] + held[:-1])
-    expected = np.vstack((np.zeros((min(1, len(values)), joints)), np.cumsum(steps, axis=0)))
-    assert integrate(Series(time, values, "m/s"), "m").values.tobytes() == expected.tobytes()
-
-
 @given(st.lists(st.sampled_from([0.9, 0.95, 1.0, 1.0, 1.0, 1.04, 1.05, 1.2, 2.5, 2.6, 9.0]), max_size=40))
 def test_a_clock_seen_as_regular_at_first_sight_has_neither_gaps_nor_jitter(steps):
     time = np.cumsum([0.0, *steps])

@@ -65,15 +65,6 @@ def test_samples_after_a_pause_are_shifted_and_the_pause_is_reported_as_one_gap(
     ]
 
 
-@pytest.mark.parametrize("pause", [0.04, 0.3, 60.0])
-def test_pauses_longer_than_a_few_stamp_steps_do_not_change_the_period(pause):
-    i = np.arange(6000)
-    true = 0.0037 + i * 1.3e-3 + pause * (i // 1500)
-    clean = clean_time(floor_to_step(true, 0.01))
-    assert np.abs(clean.time - true).max() < 2e-3
-    assert gap_facts(clean)[0].numbers["count"] == 3
-
-
 def test_no_time_depends_on_stamps_beyond_the_next_changes():
     """The start of the log depends on two changes of the stamp, samples after a pause on one, all others on none."""
     i = np.arange(3000)
@@ -86,30 +77,12 @@ def test_no_time_depends_on_stamps_beyond_the_next_changes():
         np.testing.assert_array_equal(clean_time(stamps[:end]).time, whole[:end])
 
 
-def test_a_rounding_clock_is_half_a_step_late_and_as_regular():
-    true = 0.0037 + np.arange(4000) * 1.3e-3
-    clean = clean_time(np.round(true * 100.0) / 100.0)
-    late = clean.time - true
-    assert np.all((late > 0.003) & (late < 0.006))
-    assert np.std(np.diff(clean.time[1000:])) < 0.05e-3
-
-
 def test_a_clock_that_drifts_against_the_samples_is_followed():
     i = np.arange(300_000)
     true = np.cumsum(1e-3 * (1.0 + 1e-3 * np.sin(i / 2e4)))
     clean = clean_time(floor_to_step(true, 0.01))
     assert clean.keep.all()
     assert np.abs(clean.time - true).max() < 2e-3
-
-
-@pytest.mark.parametrize(("before", "after"), [(2e-3, 1e-3), (1e-3, 2e-3)], ids=["faster", "slower"])
-def test_after_a_change_of_the_sample_rate_the_line_has_the_new_slope(before, after):
-    true = np.concatenate((np.arange(2000) * before, 2000 * before + np.arange(4000) * after))
-    clean = clean_time(floor_to_step(true, 0.01))
-    assert clean.keep.all()
-    assert np.abs(clean.time - true).max() < 0.02
-    assert np.abs(clean.time - true)[2500:].max() < 0.01
-    assert np.median(np.diff(clean.time[2500:])) == pytest.approx(after, rel=0.02)
 
 
 def test_samples_of_a_stopped_clock_are_dropped_and_reported_as_a_loss():

@@ -9,8 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
+from cdtool.detectors.base import missing_after_first
 from cdtool.recordings.clock import EPOCH, clean_time, epoch_start, integrate, previous_value, stamps
 from cdtool.recordings.clock.coarse_clock import recent_medians
+from cdtool.recordings.clock.held_samples import hold_last
 from cdtool.recordings.recording import Series
 
 STEP = st.sampled_from([1e-3, 1e-3, 1e-3, 0.02, 1.0, 0.0, -1e-3, -5.0, 2e8, EPOCH, 1e9, math.nan, math.inf, -math.inf])
@@ -85,3 +87,14 @@ def test_the_integral_holds_the_last_speed_over_missing_ones(drawn):
         travel += step * 0.5 * (after + before)
         expected.append(travel)
     assert integrate(series, "m").values[:, 0].tolist() == expected
+
+
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=12))
+def test_what_is_missing_is_held_and_marked_once_there_was_a_sample(marks):
+    missing = np.array(marks, dtype=bool).reshape(-1, 2)
+    values = np.arange(1.0, 2.0 * len(missing) + 1.0).reshape(-1, 2)
+    last, begun = np.zeros(2), np.zeros(2, dtype=bool)
+    held, marked = hold_last(values, missing), missing_after_first(missing)
+    for k in range(len(values)):
+        last, begun = np.where(missing[k], last, values[k]), begun | ~missing[k]
+        assert held[k].tolist() == last.tolist() and marked[k].tolist() == (missing[k] & begun).tolist()

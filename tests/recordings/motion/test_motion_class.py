@@ -6,17 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.base.arrays import FloatArray
 from cdtool.commands.learning.grouping import by_class
 from cdtool.recordings.motion import measured_class, motion_class
-from cdtool.recordings.motion.motion_class import MotionClass, averaged
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
-from tests.bits import COUNTS, assert_same_bits, clocks, samples
+from tests.bits import COUNTS, clocks, samples
 from tests.recordings.motion.speed_logs import log
 
 
@@ -37,17 +34,6 @@ def jittered(speed: float, rate: float, seed: int) -> Recording:
 def test_a_speed_derived_from_jittering_stamps_is_not_overestimated(rate):
     for seed in range(5):
         assert measured_class(jittered(0.0698, rate, seed)).nominal_speed == pytest.approx(0.0698, rel=0.05)
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.03, 0.06])
-def test_noise_does_not_raise_the_nominal_speed(noise):
-    for seed in range(5):
-        assert measured_class(log((0.2, 4.0), noise=noise, seed=seed)).nominal_speed == pytest.approx(0.2, rel=0.03)
-
-
-def test_an_overshoot_is_not_the_nominal_speed():
-    recording = log((0.45, 1.3), (0.28, 3.0))
-    assert measured_class(recording).nominal_speed == pytest.approx(0.28, rel=0.02)
 
 
 def test_the_reference_names_a_run_and_the_measured_speed_is_what_is_learned():
@@ -90,20 +76,6 @@ def test_directions_and_speeds_are_classes_of_their_own_in_the_order_of_their_fi
     assert [group[0].name for group in classes] == ["run0", "run1", "run2"]
 
 
-def test_a_class_survives_json():
-    common = common_class([log((0.2, 4.0), seed=i) for i in range(6)])
-    loaded = MotionClass.from_dict(common.to_dict())
-    assert loaded == common and loaded.course is not None and common.course is not None
-    np.testing.assert_array_equal(loaded.course.by_travel.mean, common.course.by_travel.mean)
-    assert MotionClass.from_dict(common.without_course.to_dict()).course is None
-
-
-def test_there_and_back_alike_has_the_direction_of_its_first_motion():
-    for seed in range(8):
-        assert measured_class(log((0.3, 3.0), (-0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == 1
-        assert measured_class(log((-0.3, 3.0), (0.3, 3.5), (0.0, 1.0), noise=0.02, seed=seed)).direction == -1
-
-
 def test_classes_that_lie_close_are_learned_and_no_class_is_refused_whole():
     rng = np.random.default_rng(3)
     runs = []
@@ -116,52 +88,8 @@ def test_classes_that_lie_close_are_learned_and_no_class_is_refused_whole():
     assert sum(map(len, classes)) + len(odd) == len(runs)
 
 
-def averaged_by_numpy(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
-    if len(time) < 2:
-        return speed
-    steps = np.diff(time)
-    ends = np.concatenate(([time[0] - steps[0]], time))
-    travel = np.concatenate(([0.0], np.cumsum(np.concatenate((steps[:1], steps)) * speed)))
-    before, after = np.maximum(time - 0.5 * seconds, ends[0]), np.minimum(time + 0.5 * seconds, ends[-1])
-    return (np.interp(after, ends, travel) - np.interp(before, ends, travel)) / (after - before)
-
-
-def class_by_numpy(series: Series) -> tuple[int, float]:
-    present = np.isfinite(series.values[:, 0])
-    if not present.any():
-        return 0, 0.0
-    time, speed = series.time[present], series.values[present, 0]
-    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    seconds = max(0.1, 5 * period)
-    smooth = averaged_by_numpy(time, speed, seconds)
-    in_motion = period * float(np.count_nonzero(np.abs(smooth) > 0.1 * np.abs(smooth).max()))
-    if in_motion * 0.2 < seconds:
-        smooth = averaged_by_numpy(time, speed, max(in_motion * 0.2, period)) if period else speed
-    size = np.abs(smooth)
-    moving = size > 0.1 * size.max()
-    if not moving.any():
-        return 0, 0.0
-    usual = float(np.median(size[moving]))
-    for _ in range(2):
-        fast = smooth[size >= 0.8 * usual]
-        usual = float(np.median(np.abs(fast)))
-    clear = abs(float(np.sum(fast))) > 0.2 * float(np.sum(np.abs(fast)))
-    return (1 if (float(np.sum(fast)) if clear else float(fast[0])) > 0.0 else -1), usual
-
-
 speeds = st.one_of(st.just(0.2), st.sampled_from([-0.2, 0.0, -0.0, np.nan, np.inf]), st.floats(-1.0, 1.0))
 logged = COUNTS.flatmap(lambda count: st.tuples(clocks(count), samples(count, values=speeds)))
-
-
-@settings(deadline=None, max_examples=30)
-@given(logged, st.sampled_from([0.1, 1e-3, 5.0]))
-def test_an_averaged_speed_and_its_class_have_the_bits_of_numpy(logged, seconds):
-    series = Series(*logged, "m/s")
-    present = np.isfinite(series.values[:, 0])
-    time, speed = series.time[present], series.values[present, 0]
-    assert_same_bits(averaged(time, speed, seconds), averaged_by_numpy(time, speed, seconds))
-    found = motion_class(Recording("made up", "", ("x",), {"speed": series}))
-    assert (found.direction, found.nominal_speed) == class_by_numpy(series)
 
 
 def test_the_class_of_a_speed_is_found_once():

@@ -14,7 +14,7 @@ from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_ru
 from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.motion.speed_course import TOLERANCE
-from cdtool.recordings.motion.speed_range import FORGET, GUARD, KNOWN, SpeedRange, in_ranges
+from cdtool.recordings.motion.speed_range import FORGET, GUARD, KNOWN, SpeedRange
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
 from tests.recordings.motion.speed_logs import log
@@ -73,19 +73,6 @@ def test_close_speeds_are_told_apart_where_they_differ_by_more_than_their_noise(
             assert fits.mean() > 0.995
 
 
-@pytest.mark.parametrize("speed", [0.15, 0.36])
-def test_a_speed_outside_the_range_does_not_fit_once_the_axis_runs(speed):
-    time, fits, _ = found_in(log((speed, 0.9 / speed), (0.0, 1.0)))
-    assert not fits[(time > 2.0) & (time < 3.0)].any()
-
-
-def test_the_fastest_and_slowest_speed_found_are_the_learned_ones():
-    for speed in (0.97 * SLOW.nominal_speed, 1.03 * FAST.nominal_speed):
-        time, fits, found = found_in(log((speed, 0.9 / speed), (0.0, 1.0)))
-        assert fits[time < 3.0].all()
-        assert SLOW.nominal_speed <= np.nanmin(found) <= np.nanmax(found) <= FAST.nominal_speed
-
-
 @pytest.mark.parametrize("slowed", [0.28, 0.25, 0.2, 0.1, 0.0])
 def test_a_contact_that_slows_the_axis_changes_nothing_before_it_is_as_old_as_the_guard(slowed):
     usual, struck = log((0.3, 4.0)), log((0.3, 2.0), (slowed, 2.0))
@@ -124,27 +111,6 @@ def test_nothing_depends_on_later_samples(speed, seed, end):
         assert np.array_equal(ours[:count], theirs[:count], equal_nan=True)
 
 
-@settings(max_examples=15, deadline=None)
-@given(st.floats(0.2, 0.3), st.integers(0, 2**31))
-def test_own_clocks_gaps_and_nan_change_the_speed_little(speed, seed):
-    rng = np.random.default_rng(seed)
-    recording = log((speed, 0.9 / speed), (0.0, 1.0), seed=seed)
-    channels = {}
-    for name, series in recording.channels.items():
-        kept = rng.random(len(series)) > 0.5
-        gap = rng.uniform(1.5, 3.0)
-        kept &= (series.time < gap) | (series.time > gap + 0.2)
-        values = np.where(rng.random(series.values.shape) < 0.1, np.nan, series.values)
-        jittered = np.sort(series.time + rng.uniform(0.0, 1e-3, len(series)))
-        channels[name] = Series(jittered[kept], values[kept], series.unit)
-    damaged = replace(recording, channels=channels)
-    clock = np.arange(0.0, 3.0, 1.7e-3)
-    found = RANGE.speed_so_far(damaged, clock)
-    assert np.isfinite(found[clock > 2.5]).all()
-    assert found[np.isfinite(found)] == pytest.approx(speed, rel=0.05)
-    assert np.isnan(RANGE.speed_so_far(damaged, np.array([-1.0]))).all()
-
-
 def test_it_is_the_speed_of_the_joint_that_leads():
     recording = log((0.25, 3.6), (0.0, 1.0))
     channels = {
@@ -154,16 +120,3 @@ def test_it_is_the_speed_of_the_joint_that_leads():
     several = Recording("two", "made up", ("first", "second"), channels)
     second = SpeedRange(tuple(replace(item, joint=1) for item in RANGE.classes))
     assert np.array_equal(found_in(several, second)[2], found_in(recording)[2], equal_nan=True)
-
-
-def test_three_speeds_are_interpolated_between_neighbours():
-    among = SpeedRange((SLOW, learned(0.25), FAST))
-    for speed in (0.22, 0.28):
-        _, fits, found = found_in(log((speed, 0.9 / speed), (0.0, 1.0)), among)
-        assert fits.mean() > 0.998 and found[np.isfinite(found)] == pytest.approx(speed, rel=0.05)
-
-
-def test_classes_of_one_direction_and_joint_belong_together_in_order_of_speed():
-    back, other = MotionClass(-1, 0.2), MotionClass(1, 0.1, joint=1)
-    assert in_ranges([FAST, back, SLOW, other]) == [[2, 0], [1], [3]]
-    assert in_ranges([]) == []

@@ -71,33 +71,3 @@ def test_a_spike_and_the_extremes_of_each_column_survive_a_million_samples():
 def test_less_than_two_pixels_is_refused():
     with pytest.raises(UsageError, match="pixels is 1"):
         decimate(np.arange(9.0), np.arange(9.0), 1)
-
-
-def _by_whole_arrays(time, values, pixels):
-    """Return the samples that are kept, found with arrays of all columns of pixels."""
-    if len(time) <= 4 * pixels:
-        return np.arange(len(time))
-    edges = np.searchsorted(time, np.linspace(time[0], time[-1], pixels + 1)[1:-1])
-    starts = np.unique([0, *edges.tolist()])
-    starts = starts[starts < len(time)]
-    column = np.repeat(np.arange(len(starts)), np.diff([*starts.tolist(), len(time)]))
-    missing = np.isnan(values)
-    low, high = np.where(missing, np.inf, values), np.where(missing, -np.inf, values)
-    least, greatest = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
-    marks = (~missing & (low == least[column]), ~missing & (high == greatest[column]), missing)
-    kept = [0, len(time) - 1]
-    for mark in marks:
-        kept += [np.flatnonzero(mark & (column == i))[0] for i in range(len(starts)) if (mark & (column == i)).any()]
-    return np.unique(kept)
-
-
-FEW = st.sampled_from([0.0, -0.0, 1.0, 1.0 + 1e-15, -2.0, np.inf, -np.inf, np.nan])
-
-
-@given(st.lists(FEW, max_size=120), st.integers(2, 12), st.sampled_from([0.0, 0.5, 30.0]), st.integers(0, 2**32 - 1))
-def test_the_samples_that_are_kept_are_those_of_whole_arrays(values, pixels, gap, seed):
-    random = np.random.default_rng(seed)
-    time = np.cumsum(random.uniform(0.5, 1.5, len(values)) + gap * (random.random(len(values)) < 0.1))
-    samples = np.array(values, dtype=np.float64)
-    expected = _by_whole_arrays(time, samples, pixels)
-    assert kept_samples(time, samples, pixels).tolist() == expected.tolist()

@@ -73,16 +73,6 @@ def test_the_reading_at_rest_is_the_one_of_the_onset_rule():
     assert curve.force[0] == pytest.approx(noisy[round(contact.start * 1e3)] - contact.rest)
 
 
-def test_a_pull_after_the_push_stays_negative():
-    pulled = half_sine(TIME) - 300.0 * ((TIME > 3.0) & (TIME < 3.2))
-    assert force_time_curve(recording(pulled), CONTACT).force.min() == pytest.approx(-300.0)
-
-
-def test_a_stronger_pull_long_after_the_contact_does_not_turn_its_sign():
-    pulled = half_sine(TIME) - 9000.0 * ((TIME > 6.0) & (TIME < 6.2))
-    assert force_time_curve(recording(pulled), CONTACT).peak == pytest.approx(PEAK, rel=1e-3)
-
-
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_inertia_before_the_cell_is_given_back(direction, sign):
@@ -116,16 +106,6 @@ def test_a_mass_without_the_required_channel_is_an_error_that_names_it():
             force_time_curve(recording(force), CONTACT, wrong)
 
 
-def test_without_acceleration_for_a_while_the_corrected_force_is_missing_there():
-    gone = moving()
-    values = gone["acceleration"].values[:, 0].copy()
-    values[(TIME >= 2.03) & (TIME < 2.08)] = np.nan
-    gone["acceleration"] = Series(TIME, values, "m/s2")
-    curve = force_time_curve(recording(half_sine(TIME), **gone), CONTACT, 5.0)
-    (begins,), (ends,) = curve.holes()
-    assert (begins, ends) == (pytest.approx(0.029), pytest.approx(0.080))
-
-
 def test_missing_samples_are_left_out_and_counted():
     force = half_sine(TIME)
     force[3000:3600] = np.nan
@@ -145,14 +125,6 @@ def test_a_few_lost_samples_and_a_slow_sample_rate_are_not_a_hole():
     curve = force_time_curve(recording(slow), CONTACT)
     assert missing_share(curve) == pytest.approx(0.0, abs=2e-3)
     assert len(curve.time) == 600
-
-
-def test_a_cell_that_dies_is_missing_to_the_end_of_the_record():
-    force = half_sine(TIME)
-    force[3000:] = np.nan
-    curve = force_time_curve(recording(force), CONTACT)
-    assert curve.end == pytest.approx(5.999)
-    assert missing_share(curve) == pytest.approx(5.0 / 5.999, abs=1e-3)
 
 
 def test_a_cell_at_its_stop_is_marked_there_and_nowhere_else():
@@ -190,13 +162,6 @@ def test_the_curve_ends_at_the_next_contact():
     assert curve.peak == pytest.approx(PEAK, rel=1e-3)
     assert curve.end == pytest.approx(3.0)
     assert curve.time[-1] < 3.0
-
-
-def test_a_contact_not_measured_by_the_cell_has_no_curve():
-    with pytest.raises(RecordingError, match="no load-cell sample after the onset"):
-        force_time_curve(recording(half_sine(TIME)), Contact(9.0, 9.5, 0.0))
-    with pytest.raises(RecordingError, match="force"):
-        force_time_curve(Recording("run", "run.csv", ("gate",), moving()), CONTACT)
 
 
 def test_the_force_at_an_alarm_is_that_of_the_last_sample_before_it():

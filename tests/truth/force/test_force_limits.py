@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -108,14 +107,6 @@ def test_robot_profiles_limit_the_pressure_of_29_areas_and_gate_profiles_none():
     assert shipped["en_12453_wide_gap"].pressure_limit() is None
 
 
-def test_the_page_lists_every_pressure():
-    page = PAGE.read_text(encoding="utf-8")
-    for name, profile in read_force_limits().items():
-        for item in profile.pressures:
-            transient = "–" if item.transient is None else f"{item.transient:g}"
-            assert f"| {item.area} | `{name}` | {transient} | {item.quasi_static:g} |" in page
-
-
 LIMITED = (
     GOOD
     + """pressure_source = "our own rule 8"
@@ -154,13 +145,6 @@ def test_a_fault_in_the_pressures_names_file_and_key(tmp_path, old, new, key):
     with pytest.raises(ConfigurationError, match=key) as fault:
         read_force_limits(written(tmp_path, LIMITED.replace(old, new)))
     assert "limits.toml" in fault.value.message
-
-
-def test_the_file_is_part_of_the_package():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    data = project["tool"]["setuptools"]["package-data"]["cdtool"]
-    assert "truth/force/limits.toml" in data
-    assert (ROOT / "cdtool" / "truth" / "force" / "limits.toml").exists()
 
 
 def test_a_file_of_the_user_replaces_the_shipped_one(tmp_path):
@@ -207,13 +191,6 @@ def test_a_profile_without_steps_is_refused(tmp_path, steps):
     assert "from_s" in str(fault.value) or "at 0" in str(fault.value)
 
 
-def test_a_file_without_profiles_or_none_at_all_is_refused(tmp_path):
-    with pytest.raises(ConfigurationError, match="no profile"):
-        read_force_limits(written(tmp_path, "# nothing\n"))
-    with pytest.raises(ConfigurationError, match="no such file"):
-        read_force_limits(tmp_path / "none.toml")
-
-
 def test_an_unknown_profile_is_answered_with_the_nearest():
     with pytest.raises(UsageError, match="en_12453_reducing") as fault:
         profile_of(read_force_limits(), "en_12453_reducing")
@@ -234,3 +211,10 @@ def test_the_page_shows_a_valid_file_and_every_shipped_profile_with_its_forces(t
         assert all(stated), name
         found = [(float(item[2] or 0.0), float(item[1])) for item in stated if item]
         assert found == [(step.from_s, step.at_most_n) for step in shipped[name].steps], name
+
+
+def test_a_file_without_profiles_or_none_at_all_is_refused(tmp_path):
+    with pytest.raises(ConfigurationError, match="no profile"):
+        read_force_limits(written(tmp_path, "# nothing\n"))
+    with pytest.raises(ConfigurationError, match="no such file"):
+        read_force_limits(tmp_path / "none.toml")

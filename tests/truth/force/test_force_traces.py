@@ -13,7 +13,6 @@ from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Contact, Recording
 from cdtool.results.results import ContactResult, RecordingResult, Results
 from cdtool.results.traced_force import force_profiles, traced_forces
-from cdtool.results.traces.file import encode_traces, read_traces
 from cdtool.results.traces.trace import Trace, make_trace
 from cdtool.truth.force.curve import force_time_curve
 from cdtool.truth.force.limits import ForceProfile, ForceStep
@@ -69,14 +68,6 @@ def test_a_kept_curve_is_the_contacts_force_with_its_verdict_and_alarms(hit, con
     assert np.isnan(found.verdict.steps[2].peak) and np.isnan(found.verdict.steps[2].peak_at)
 
 
-def test_a_load_cell_that_counts_downward_gives_the_same_curve(hit, contacts):
-    force = hit["force"]
-    turned = replace(hit, channels={**hit.channels, "force": replace(force, values=-force.values)})
-    both = ((hit, contacts), (turned, find_contacts(turned, OnsetRule(20.0, 8.0))))
-    one, other = (traced_forces(scored(item, felt), [traced(item, felt)])[0] for item, felt in both)
-    assert np.allclose(one.force, other.force)
-
-
 def test_a_contact_ends_where_the_next_begins_and_each_has_its_verdict(hit, contacts):
     second = replace(contacts[0], start=contacts[0].start + 0.1)
     both = [contacts[0], second]
@@ -85,25 +76,12 @@ def test_a_contact_ends_where_the_next_begins_and_each_has_its_verdict(hit, cont
     assert (first.contact, other.contact) == (1, 2)
 
 
-def test_an_operation_of_a_cut_log_finds_the_logs_verdict(hit, contacts):
-    trace = replace(traced(hit, contacts), recording=f"{hit.name}#1", operation=1)
-    assert len(traced_forces(scored(hit, contacts), [trace])) == 1
-
-
 def test_traces_without_a_verdict_or_a_load_cell_give_none(hit, contacts):
     results, trace = scored(hit, contacts), traced(hit, contacts)
     assert traced_forces(replace(results, forces=()), [trace]) == ()
     assert traced_forces(results, [replace(trace, group="another")]) == ()
     assert traced_forces(results, [replace(trace, force_time=np.empty(0), force=np.empty(0))]) == ()
     assert traced_forces(results, []) == ()
-
-
-def test_curves_read_from_a_file_are_found_too(hit, contacts, tmp_path):
-    path = tmp_path / "a.traces.json.gz"
-    path.write_bytes(encode_traces([traced(hit, contacts)]))
-    (found,) = traced_forces(scored(hit, contacts), read_traces(path))
-    (kept,) = traced_forces(scored(hit, contacts), [traced(hit, contacts)])
-    assert found.force.max() == pytest.approx(kept.force.max(), rel=1e-3)
 
 
 def test_profiles_are_read_back_from_the_provenance_of_a_file(hit, contacts):

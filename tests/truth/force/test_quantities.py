@@ -37,35 +37,9 @@ def test_an_exponential_decay_is_above_a_level_for_a_logarithm(peak, constant, s
     assert above.begin == 0.0 and above.length == pytest.approx(constant * math.log(1.0 / share), abs=STEP)
 
 
-@given(st.floats(0.01, 1.0), st.floats(0.01, 1.0))
-def test_a_rectangle_is_above_a_level_for_its_length(begin, length):
-    force = np.where((begin <= TIME) & (begin + length >= TIME), 300.0, 0.0)
-    assert time_above(curve(force), 150.0).length == pytest.approx(length, abs=2.0 * STEP)
-
-
 def test_a_ramp_crosses_exactly_between_two_samples():
     above = time_above(curve(np.array([0.0, 100.0, 200.0, 0.0]), np.array([0.0, 0.1, 0.2, 0.3])), 150.0)
     assert above.begin == pytest.approx(0.15) and above.end == pytest.approx(0.225)
-
-
-def test_two_peaks_are_one_time_with_the_pause_between_them():
-    force = np.where((TIME < 0.2) | ((TIME > 0.5) & (TIME < 0.6)), 300.0, 0.0)
-    assert time_above(curve(force), 150.0).length == pytest.approx(0.6, abs=2.0 * STEP)
-
-
-def test_a_ringing_force_is_above_until_its_last_crossing():
-    force = 400.0 * np.exp(-TIME / 0.3) * np.cos(2.0 * np.pi * 10.0 * TIME)
-    last = TIME[np.flatnonzero(force > 150.0)[-1]]
-    assert time_above(curve(force), 150.0).end == pytest.approx(float(last), abs=2.0 * STEP)
-
-
-def test_a_force_that_never_exceeds_the_level_has_no_time_and_one_at_the_level_neither():
-    assert time_above(curve(np.full(len(TIME), 150.0)), 150.0).length == 0.0
-    assert math.isnan(time_above(curve(np.zeros(len(TIME))), 150.0).begin)
-
-
-def test_a_contact_that_never_ends_has_an_infinite_time():
-    assert time_above(curve(np.full(len(TIME), 200.0)), 150.0).length == math.inf
 
 
 @pytest.mark.parametrize("level", [0.0, -1.0, math.nan])

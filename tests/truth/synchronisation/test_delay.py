@@ -30,18 +30,6 @@ def test_the_delay_does_not_depend_on_scale_offset_and_sign(delay, scale, offset
     assert found.known and found.delay == pytest.approx(delay, abs=2e-6)
 
 
-@pytest.mark.parametrize("exponent", [-200, 200])
-def test_the_scale_may_be_extreme(exponent):
-    late = signal(10.0**exponent * bump(GRID.times - 0.01))
-    assert delay_of(late, signal(bump(GRID.times)), 0.8, 1.3, 0.1).delay == pytest.approx(0.01, abs=2e-6)
-
-
-def test_missing_points_are_left_out():
-    values = bump(GRID.times - 0.02)
-    values[240:246] = np.nan
-    assert delay_of(signal(values), signal(bump(GRID.times)), 0.8, 1.3, 0.1).delay == pytest.approx(0.02, abs=1e-5)
-
-
 @pytest.mark.parametrize(
     ("late", "early", "is_transient", "reason"),
     [

@@ -5,9 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pytest
-
-from cdtool.base.errors import UsageError
 from cdtool.commands.inject.coverage.files import check_coverage_files, write_coverage
 from tests.report.html.coverage_case import coverage_case
 
@@ -37,13 +34,3 @@ def test_the_json_has_the_reasons_and_the_speeds(tmp_path: Path) -> None:
     assert values["speeds"] == [{"speed": None, "lowest": 0.2, "highest": 0.2}]
     assert len(values["cells"]) == 8
     check_coverage_files(targets, [])  # its own files may be rewritten
-
-
-@pytest.mark.parametrize(
-    ("names", "message"),
-    [(["map.docx"], "is"), (["a.html", "a.html"], "twice"), (["no/a.html"], "no folder"), (["in.json"], "is read")],
-)
-def test_a_target_that_cannot_be_written_is_refused(tmp_path: Path, names: list[str], message: str) -> None:
-    (tmp_path / "in.json").write_text("{}", encoding="utf-8")
-    with pytest.raises(UsageError, match=message):
-        check_coverage_files([tmp_path / name for name in names], [tmp_path / "in.json"], force=True)

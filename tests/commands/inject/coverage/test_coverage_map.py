@@ -54,14 +54,6 @@ def test_a_cell_has_mean_standard_error_and_median_force() -> None:
     assert (cell.contacts, cell.missed, cell.unreliable) == (3, 0, 0)
 
 
-def test_brackets_are_a_range_and_their_difference_is_no_scatter() -> None:
-    names = {"a": (NEAR, "frozen"), "b": (NEAR, "frozen"), "c": (NEAR, "stiff"), "d": (NEAR, "stiff")}
-    cell = made([row("a", 50.0), row("b", 52.0), row("c", 90.0), row("d", 92.0)], names).cells["gm"][NEAR]
-    assert cell.range_ms == (51.0, 91.0)
-    assert cell.standard_error_ms == pytest.approx(math.sqrt(2.0) / 2.0)
-    assert cell.uncertainty_ms == pytest.approx(20.0 + math.sqrt(2.0))
-
-
 def test_a_cell_misses_most_if_more_than_half_of_its_assessable_contacts_are_missed() -> None:
     names = dict.fromkeys("abcd", (NEAR, "known"))
     rows = [row("a", None, "missed"), row("b", None, "missed"), row("c", 50.0), row("d", None, "not_assessable")]
@@ -73,48 +65,12 @@ def test_a_cell_misses_most_if_more_than_half_of_its_assessable_contacts_are_mis
     assert math.isnan(only.latency_ms)
 
 
-def test_late_alarms_are_counted_as_unreliable() -> None:
-    cell = made([row("a", 150.0), row("b", 250.0)], {"a": (NEAR, "k"), "b": (NEAR, "k")}).cells["gm"][NEAR]
-    assert cell.unreliable == 1
-
-
 def test_partly_missed_cells_tell_most_then_the_least_certain() -> None:
     names = {"a": (NEAR, "k"), "b": (NEAR, "k"), "c": (FAR, "k"), "d": (FAR, "k")}
     rows = [row("a", 50.0), row("b", None, "missed"), row("c", 50.0), row("d", 150.0)]
     rows += [row(name, value, detector="pt") for name, value in zip("abcd", (50.0, 51.0, 60.0, 64.0), strict=True)]
     telling = made(rows, names).most_telling(3)
     assert [(item.detector, item.key) for item in telling] == [("gm", NEAR), ("gm", FAR), ("pt", FAR)]
-
-
-def test_a_detector_without_rows_has_no_panel_and_other_recordings_do_not_count() -> None:
-    found = made([row("a", 50.0), row("real", 20.0)], {"a": (NEAR, "k")})
-    assert list(found.cells) == ["gm"]
-    assert found.cells["gm"][NEAR].contacts == 1
-    assert (found.positions, found.stiffnesses) == ((0.5,), (1e4,))
-
-
-def test_the_recordings_of_a_cell_are_missed_first_then_from_slow_to_fast_then_not_assessable() -> None:
-    names = dict.fromkeys("abcde", (NEAR, "k"))
-    rows = [row("a", 50.0), row("b", None, "not_assessable"), row("c", 70.0), row("d", None, "missed"), row("e", 60.0)]
-    cell = made(rows, names).cells["gm"][NEAR]
-    assert "".join(item.recording for item in cell.recordings) == "dceab"
-    assert [item.is_missed for item in cell.recordings] == [True, False, False, False, False]
-    assert math.isnan(cell.recordings[0].force_n) and cell.recordings[1].force_n == 700.0
-
-
-def test_cells_with_misses_begin_with_the_largest_share() -> None:
-    names = {"a": (NEAR, "k"), "b": (NEAR, "k"), "c": (FAR, "k"), "d": (FAR, "k")}
-    rows = [row("a", 50.0), row("b", None, "missed"), row("c", None, "missed"), row("d", None, "not_assessable")]
-    assert [(name, key, cell.missed) for name, key, cell in made(rows, names).missed()] == [
-        ("gm", FAR, 1),
-        ("gm", NEAR, 1),
-    ]
-
-
-def test_a_cell_whose_missed_contacts_are_all_of_it_is_certain() -> None:
-    found = made([row("a", None, "missed"), row("b", None, "missed")], dict.fromkeys("ab", (NEAR, "k")))
-    assert found.most_telling() == []
-    assert found.cells["gm"][NEAR].telling is None
 
 
 @pytest.mark.parametrize(
@@ -131,38 +87,8 @@ def test_a_limit_within_two_errors_and_that_of_the_model_tells_much(limit: float
     assert cell.telling is reason
 
 
-def test_only_upper_limits_of_latencies_of_the_detector_and_group_count() -> None:
-    names = dict.fromkeys("abc", (NEAR, "k"))
-    rows = [row("a", 55.0), row("b", 60.0), row("c", 65.0)]
-    others = (
-        LimitRule("pt", "pt", "*", "p95_ms", largest=60.0),
-        LimitRule("group", "gm", "stiff", "p95_ms", largest=60.0),
-        LimitRule("figure", "gm", "*", "missed", largest=60.0),
-        LimitRule("least", "gm", "*", "p95_ms", least=60.0),
-    )
-    assert made(rows, names, others).cells["gm"][NEAR].limit_ms is None
-    both = (LimitRule("a", "*", "*", "mean_ms", largest=90.0), LimitRule("b", "gm", "*", "max_ms", largest=80.0))
-    assert made(rows, names, both).cells["gm"][NEAR].limit_ms == 80.0
-
-
-def test_brackets_further_apart_than_the_scatter_are_the_reason() -> None:
-    names = {"a": (NEAR, "frozen"), "b": (NEAR, "frozen"), "c": (NEAR, "stiff"), "d": (NEAR, "stiff")}
-    found = made([row("a", 50.0), row("b", 52.0), row("c", 90.0), row("d", 92.0)], names)
-    assert [item.reason for item in found.most_telling()] == [TellingReason.ASSUMPTIONS]
-
-
-def test_the_standard_deviation_is_that_of_the_detected_contacts() -> None:
-    names = dict.fromkeys("abcd", (NEAR, "k"))
-    cell = made([row("a", 50.0), row("b", 60.0), row("c", 70.0), row("d", None, "missed")], names).cells["gm"][NEAR]
-    assert cell.standard_deviation_ms == pytest.approx(10.0)
-
-
 def test_speeds_that_differ_by_more_than_a_fifth_are_classes() -> None:
     assert speed_classes({"a": [0.2], "b": [0.24], "c": [-0.3, -0.32]}) == {"a": 0.22, "b": 0.22, "c": 0.31}
-
-
-def test_speeds_that_differ_along_the_track_only_are_no_classes() -> None:
-    assert speed_classes({"a": [0.1, 0.2, 0.3], "b": [0.12, 0.21, 0.33]}) == {"a": None, "b": None}
 
 
 def test_cells_of_a_map_are_split_by_speed() -> None:
@@ -173,3 +99,9 @@ def test_cells_of_a_map_are_split_by_speed() -> None:
     assert found.speeds == (SpeedClass(0.1, 0.1, 0.1), SpeedClass(0.3, 0.29, 0.31))
     assert found.cells["gm"][slow].latency_ms == 90.0
     assert found.cells["gm"][fast].latency_ms == 51.0
+
+
+def test_brackets_further_apart_than_the_scatter_are_the_reason() -> None:
+    names = {"a": (NEAR, "frozen"), "b": (NEAR, "frozen"), "c": (NEAR, "stiff"), "d": (NEAR, "stiff")}
+    found = made([row("a", 50.0), row("b", 52.0), row("c", 90.0), row("d", 92.0)], names)
+    assert [item.reason for item in found.most_telling()] == [TellingReason.ASSUMPTIONS]

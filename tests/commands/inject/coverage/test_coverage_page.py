@@ -8,16 +8,14 @@ import hashlib
 import html
 import json
 import re
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from cdtool.base.plain_text import plain
 from cdtool.commands.inject.coverage.page import coverage_html
 from tests.report.hostile import HOSTILE
-from tests.report.html.coverage_case import ONSET, coverage_case
+from tests.report.html.coverage_case import coverage_case
 
 
 def data_of(text: str) -> dict[str, Any]:
@@ -60,13 +58,6 @@ def test_misses_are_named_first() -> None:
     ]
 
 
-def test_without_a_miss_the_page_says_so() -> None:
-    case = coverage_case()
-    text = coverage_html(replace(case, map=replace(case.map, cells={"quick": case.map.cells["quick"]})))
-    assert "No assessable contact is missed" in text
-    assert 'id="missed"' not in text
-
-
 def test_a_cell_opens_its_worst_contact_that_has_a_trigger_plot() -> None:
     text = coverage_html(coverage_case())
     data, traces = data_of(text), traces_of(text)
@@ -81,21 +72,6 @@ def test_a_cell_opens_its_worst_contact_that_has_a_trigger_plot() -> None:
     assert slowest["contacts"][0][:2] == ["100000_0.5_1.csv", "22.0 ms"]
     assert slowest["traces"][0] == -1 and traces[slowest["traces"][1]]["recording"] == "100000_0.5_0.csv"
     assert data["cells"][data["first"]]["title"] == "slow: 1 m, 10 N/mm"
-
-
-def test_a_trigger_plot_begins_shortly_before_its_contact() -> None:
-    for trace in traces_of(coverage_html(coverage_case())):
-        assert trace["start"] == pytest.approx(ONSET - 0.5)
-        assert trace["end"] == 3.0
-
-
-def test_the_trigger_plots_are_as_many_as_the_page_may_hold(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = coverage_html(coverage_case())
-    size = len(json.dumps(traces_of(whole)[0], separators=(",", ":")))
-    monkeypatch.setattr("cdtool.commands.inject.coverage.page._MOST_TRACE_TEXT", 2.5 * size)
-    text = coverage_html(coverage_case())
-    assert len(traces_of(text)) == 2 < len(traces_of(whole))
-    assert max(number for cell in data_of(text)["cells"] for number in cell["traces"]) == 1
 
 
 def test_the_list_of_tests_can_be_copied_and_has_commands_that_exist() -> None:
@@ -126,12 +102,6 @@ def test_clearly_different_speeds_have_maps_of_their_own() -> None:
     assert "slow: 1 m, 10 N/mm, 0.300 m/s" in {item["title"] for item in data_of(text)["cells"]}
 
 
-def test_one_class_of_speed_has_one_map_per_detector() -> None:
-    text = coverage_html(coverage_case())
-    assert text.count("<h3>quick</h3>") == 1
-    assert "speed [m/s]" not in text
-
-
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_names_from_files_are_text(kind: str) -> None:
     case = coverage_case(lambda name: f"{HOSTILE[kind]}{name}")
@@ -153,31 +123,3 @@ def test_the_policy_allows_only_this_script_and_this_style() -> None:
         assert f"{kind}-src 'sha256-{digest}'" in policy
     assert not re.search(r'\b(src|href)="(?!#)', text)
     assert 'style="' not in text
-
-
-def test_the_same_map_makes_the_same_page() -> None:
-    assert coverage_html(coverage_case()) == coverage_html(coverage_case())
-
-
-def test_a_map_without_any_assessable_contact_is_shown_as_such() -> None:
-    case = coverage_case()
-    unknown = {
-        name: {
-            key: replace(
-                cell,
-                missed=0,
-                not_assessable=2,
-                latency_ms=np.nan,
-                standard_error_ms=np.nan,
-                range_ms=(np.nan, np.nan),
-                force_n=np.nan,
-                limit_ms=None,
-            )
-            for key, cell in cells.items()
-        }
-        for name, cells in case.map.cells.items()
-    }
-    text = coverage_html(replace(case, map=replace(case.map, cells=unknown), traces={}))
-    assert "No contact is assessable" in text
-    assert set(cells_of(text).values()) == {("unassessed", "2 of 2 not assessable")}
-    assert 'id="telling"' not in text

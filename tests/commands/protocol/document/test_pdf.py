@@ -12,11 +12,10 @@ import pytest
 from cdtool.base.errors import UsageError
 from cdtool.commands.protocol.assessment.protocol import Protocol
 from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason
-from cdtool.commands.protocol.document.blocks import HeadedTable, Items, SectionHeading
+from cdtool.commands.protocol.document.blocks import HeadedTable, Items
 from cdtool.commands.protocol.document.document import protocol_document
 from cdtool.commands.protocol.document.pdf import to_pdf
 from cdtool.commands.protocol.document.words import words_of
-from tests.commands.protocol.document.conftest import LONG
 from tests.report.hostile import HOSTILE
 
 CASES = ["pass", "fail", "incomplete", "pressure_en", "pressure_de"]
@@ -44,25 +43,6 @@ def test_it_is_a_tagged_pdf_a_with_its_language_and_title(name, documents, pypdf
     xmp = root["/Metadata"].get_data().decode()
     assert re.search(r"pdfaid:part\D+2\b", xmp) and re.search(r"pdfaid:conformance\W+A\b", xmp)
     assert document.title in xmp
-
-
-def structure(node: Any) -> list[str]:
-    """Return the kinds of all tags below a node of the structure tree."""
-    node = node.get_object() if hasattr(node, "get_object") else node
-    if not hasattr(node, "get"):
-        return []
-    kids = node.get("/K", [])
-    kids = kids if isinstance(kids, list) else [kids]
-    return [str(node.get("/S", "")), *(kind for kid in kids for kind in structure(kid))]
-
-
-def test_headings_tables_lists_and_figures_are_tagged_as_such(documents, pypdf):
-    document = documents["incomplete"]
-    root = pypdf.PdfReader(io.BytesIO(to_pdf(document))).trailer["/Root"]
-    kinds = structure(root["/StructTreeRoot"])
-    assert kinds.count("/H1") == 1
-    assert kinds.count("/H2") == sum(isinstance(item, SectionHeading) and item.level == 1 for item in document.blocks)
-    assert kinds.count("/Figure") == 1 and {"/L", "/LI", "/Table", "/TR", "/TH", "/TD"} <= set(kinds)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -110,27 +90,6 @@ def test_the_text_holds_every_cell_of_the_document(name, documents, pypdf):
     assert [cell for cell in cells if squeezed(cell) not in text] == []
 
 
-def test_names_and_numbers_can_be_searched_and_copied_unless_a_name_is_longer_than_its_column(documents, pypdf):
-    texts = []
-    for name in ("pass", "incomplete"):
-        pages = pypdf.PdfReader(io.BytesIO(to_pdf(documents[name]))).pages
-        texts.append(" ".join(" ".join(page.extract_text() for page in pages).split()))
-    assert "\u200b" not in texts[0]
-    assert "profile en_12453_reducing_gap were not" in texts[0] and "3 edge/03.csv 0.2 451 235.1" in texts[0]
-    assert LONG in squeezed(texts[1]) and LONG not in texts[1]
-
-
-@pytest.mark.parametrize("times", [1, 2, 4])
-def test_no_heading_is_the_last_text_of_a_page(times, protocols, pypdf):
-    document = protocol_document(many(protocols["fail"], times))
-    headings = {squeezed(item.text) for item in document.blocks if isinstance(item, SectionHeading)}
-    for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages:
-        lines = [squeezed(line) for line in page.extract_text().splitlines() if line.strip()]
-        footer = next(n for n, line in enumerate(lines) if line.startswith("Daten(SHA256)"))
-        body = [line for line in lines[:footer] if line]
-        assert body[-1] not in headings, body
-
-
 @pytest.mark.parametrize("name", ["fail", "incomplete"])
 def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, protocols, pypdf):
     long = "Nebenschließkante {number}, 300 mm über dem Boden, bei geöffnetem Flügel, von der Straße aus gesehen"
@@ -157,11 +116,6 @@ def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, p
     assert all(squeezed(words_of("en").reason(item)) in everything for item in reasons)
 
 
-def test_a_few_reasons_are_listed_once(documents):
-    headings = [item.text for item in documents["incomplete"].blocks if isinstance(item, SectionHeading)]
-    assert "All reasons" not in headings and "What is incomplete" in headings
-
-
 def test_hostile_names_are_text_and_the_same_document_gives_the_same_bytes(protocols, pypdf):
     hostile = "".join(HOSTILE.values()) + "#panic() $x$ *b* `c` \\"
     plan = replace(protocols["pass"].plan, machine=replace(protocols["pass"].plan.machine, maker=hostile))
@@ -169,22 +123,6 @@ def test_hostile_names_are_text_and_the_same_document_gives_the_same_bytes(proto
     made = to_pdf(document)
     assert made == to_pdf(document)
     assert "#panic()" in "".join(page.extract_text() for page in pypdf.PdfReader(io.BytesIO(made)).pages)
-
-
-def test_a_long_name_of_a_point_breaks_in_its_heading(protocols, pypdf):
-    (point,) = protocols["pass"].points
-    long = replace(point, point=replace(point.point, name="Nebenschließkante" * 12))
-    made = to_pdf(protocol_document(replace(protocols["pass"], points=(long,))))
-    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(made)).pages]
-    # 176 mm hold about 100 characters.
-    assert max(len(line) for text in pages for line in text.splitlines() if "Nebenschließkante" in line) < 150
-
-
-def test_the_only_date_in_it_is_the_day_of_the_test(documents, pypdf):
-    info = pypdf.PdfReader(io.BytesIO(to_pdf(documents["pass"]))).metadata
-    assert str(info["/CreationDate"]).startswith("D:20260331")
-    undated = pypdf.PdfReader(io.BytesIO(to_pdf(replace(documents["pass"], day=None)))).metadata
-    assert str(undated["/CreationDate"]).startswith("D:19700101")  # PDF/A requires one
 
 
 def test_without_the_library_one_line_says_what_to_install(documents, monkeypatch):

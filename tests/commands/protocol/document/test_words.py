@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason
+from cdtool.commands.protocol.assessment.reasons import Reason
 from cdtool.commands.protocol.document.words import LANGUAGES, words_of
 from cdtool.truth.force.limits import read_force_limits
 from cdtool.truth.force.verdict import CauseKind, StepCause
@@ -63,26 +63,12 @@ def test_every_reason_and_every_cause_has_a_sentence(language):
     }
 
 
-def test_the_causes_have_the_placeholders_of_their_numbers():
-    from cdtool.truth.force import verdict
-
-    for kind, sentence in verdict._SENTENCES.items():
-        assert placeholders(texts("en")[f"cause.{kind}"]) == placeholders(sentence)
-
-
 def test_numbers_and_dates_are_as_usual_in_the_language():
     english, german = words_of("en"), words_of("de")
     assert (english.number(1234.56), german.number(12.345)) == ("1235", "12,35")
     assert (english.number(123456.0), german.number(-0.5), german.number(None)) == ("123456", "−0,5", "–")
     day = dt.date(2026, 3, 1)
     assert (english.value(day), german.value(day)) == ("1 March 2026", "01.03.2026")
-
-
-def test_a_cause_is_part_of_the_sentence_of_its_reason():
-    values = {"point": "edge", "repetition": 2, "recording": "a.csv", "step": "static"}
-    reason = Reason("not_assessable", values, StepCause("samples_missing", {"missing_ms": 12.5}))
-    wanted = "edge, Wiederholung 2 (a.csv), statisch: Werte der Kraftmessdose fehlen für 12,5 ms"
-    assert words_of("de").reason(reason) == wanted
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -92,11 +78,6 @@ def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
     assert words_of(language).name("step", "my step") == "my step"
     areas = {item.area for profile in read_force_limits().values() for item in profile.pressures}
     assert areas == set(words_of(language).texts["area"])
-
-
-def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():
-    reasons = tuple(Reason("no_value", {"key": key, "file": "p.toml"}) for key in ("a", "b"))
-    assert words_of("en").reasons(ProtocolVerdict(reasons), "incomplete") == ["Missing in p.toml: a, b"]
 
 
 def test_no_value_of_a_reason_is_rounded_across_its_limit():
