@@ -293,7 +293,7 @@ def test_an_impact_log_without_contact_is_left_out_by_name(gate_folder, tmp_path
         ('"GATE/stiff/*.csv"', '"GATE/stif/*.csv"', ("impacts.stiff.logs", "no file matches")),
         ('["GATE/stiff/*.csv"]', "[]", ("impacts.stiff.logs", "is empty")),
         ("above_n = 20.0", "above_n = -1", ("onset.above_n", "above 0")),
-        ("back_to_n = 8.0", "back_to_n = 30.0", ("onset: back_to_n", "more than above_n")),
+        ("back_to_n = 8.0", "back_to_n = 30.0", ("onset.back_to_n", "more than above_n")),
         ("above_n", "above", ("onset.above", "above_n")),
         ("[onset]", '[signature]\nforce = "no"\n[onset]', ("signature.force", "true or false")),
         ("[onset]", "[activation]\ndebounce = 2.6\n[onset]", ("activation.debounce", "whole number")),
