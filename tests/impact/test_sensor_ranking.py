@@ -64,16 +64,6 @@ def test_a_differentiated_ramp_is_its_slope():
     assert logged[:, -1] == pytest.approx(3.0, rel=1e-3)
 
 
-def test_what_never_exceeds_the_threshold_is_not_seen():
-    assert sensor(noise=1.0).time_to_see(TIME, np.full(TIME.size, 4.9), 5.0) is None
-
-
-def test_a_pulse_between_two_samples_is_not_promised():
-    pulse = np.where((TIME > 0.0102) & (TIME < 0.0106), 100.0, 0.0)
-    assert sensor(sample_rate=100.0).time_to_see(TIME, pulse, 5.0) is None
-    assert sensor(sample_rate=1e4).time_to_see(TIME, pulse, 5.0) == pytest.approx(0.0104, abs=3e-4)
-
-
 @settings(max_examples=60, deadline=None)
 @given(
     noise=st.floats(0.01, 10.0),
@@ -145,12 +135,6 @@ def test_a_log_in_whole_counts_is_quiet_before_the_touch_and_sees_it_within_a_co
     assert hidden is not None and 0.4 * promised < max(seen) <= hidden < 1.5 * promised
 
 
-def test_the_steady_motion_deviates_by_nothing_at_the_touch():
-    motion = example.RANKED.simulate()
-    for name, (_, course) in deviations(example.RANKED, motion).items():
-        assert abs(course[0]) < 1e-9 * max(1.0, np.abs(course).max()), name
-
-
 def test_what_limits_names_the_improvement_that_saves_most():
     noisy = replace(example.SENSORS[2], noise=5.0, resolution=0.0)
     (found,) = rank_sensors(example.RANKED, [noisy]).responses
@@ -178,12 +162,6 @@ def test_a_sensor_that_sees_nothing_comes_last_without_a_time():
     last = found.responses[-1]
     assert (last.sensor, last.time, last.force, last.peak_so_far, last.saving) == (deaf, None, None, None, None)
     assert last.limited_by == ITSELF
-
-
-def test_without_noise_counts_and_filter_only_sampling_is_left():
-    ideal = sensor(noise=0.0, sample_rate=1e4)
-    (found,) = rank_sensors(example.RANKED, [ideal]).responses
-    assert found.time is not None and found.time <= 1.1e-4
 
 
 def test_values_without_meaning_are_named():

@@ -131,16 +131,6 @@ def test_locked_joints_stand_where_they_are_locked(tmp_path, seed):
 
 
 @needs_pinocchio
-def test_a_joint_without_an_axis_moves_about_x(tmp_path):
-    plain = (
-        '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><limit effort="1" velocity="1"/></joint>'
-    )
-    path = write(tmp_path, link("a"), link("b"), plain)
-    assert_as_in_pinocchio(path, ["j"])
-    assert read_urdf(path, ["j"], {}).contact_jacobian(np.zeros((1, 1)), "b", (0, 0, 0))[0, 3:, 0].tolist() == [1, 0, 0]
-
-
-@needs_pinocchio
 def test_an_arm_with_identified_and_slightly_unphysical_inertias_is_as_in_pinocchio():
     assert_as_in_pinocchio(UR10E_LOGS / "ur10e.urdf", [f"joint{k}" for k in (1, 2, 3, 4, 5, 6)])
 
@@ -173,14 +163,6 @@ def test_a_panda_and_a_ur10_without_their_meshes_are_as_in_pinocchio(tmp_path):
         path = tmp_path / "alone.urdf"
         path.write_bytes((robots() / robot).read_bytes())
         assert_as_in_pinocchio(path, joints, locked)
-
-
-@needs_pinocchio
-def test_meshes_are_never_looked_for(tmp_path, capfd):
-    mesh = '<visual><geometry><mesh filename="package://nowhere/arm.dae"/></geometry></visual>'
-    path = write(tmp_path, link("base"), link("arm", BODY + mesh), joint("j", "revolute", "base", "arm"))
-    assert [item.name for item in read_urdf(path, ["j"], {}).links] == ["base", "arm"]
-    assert capfd.readouterr() == ("", "")
 
 
 @needs_pinocchio
@@ -235,20 +217,10 @@ def test_a_missing_file_is_named(tmp_path):
     assert "no such file" in refused(tmp_path / "none.urdf").message
 
 
-def test_a_folder_is_no_urdf(tmp_path):
-    assert "cannot be read" in refused(tmp_path).message
-
-
 def test_broken_xml_is_reported_with_line_and_column(tmp_path):
     path = tmp_path / "broken.urdf"
     path.write_text('<robot name="r">\n<link name="a"></robot>\n', encoding="utf-8")
     assert "broken XML in line 2, column 18: mismatched tag" in refused(path).message
-
-
-def test_another_kind_of_xml_is_no_urdf(tmp_path):
-    path = tmp_path / "model.sdf"
-    path.write_text("<sdf/>", encoding="utf-8")
-    assert "its root is <sdf>" in refused(path).message
 
 
 def test_an_xacro_file_must_be_expanded_first(tmp_path):
@@ -284,15 +256,6 @@ def test_joints_neither_logged_nor_locked_are_listed_with_the_line_to_write(tmp_
     assert fault.hint == "locked = { tip = 0.0, slide = 0.0 }"
 
 
-def test_a_mimic_joint_is_a_joint_of_its_own(tmp_path):
-    follower = joint("tip", "revolute", "arm", "tip", more='<mimic joint="j" multiplier="2"/>')
-    assert "neither logged nor locked: tip" in refused(write(tmp_path, *ARM, link("tip"), follower)).message
-
-
-def test_no_joint_at_all_is_refused(tmp_path):
-    assert "no joint is logged" in refused(write(tmp_path, *ARM), [], {"j": 0.0}).message
-
-
 @pytest.mark.parametrize(
     ("joints", "locked", "message"),
     [
@@ -325,11 +288,6 @@ def test_masses_and_inertias_that_cannot_be_are_refused(tmp_path, old, new, mess
     assert message in refused(path).message
 
 
-def test_an_axis_without_length_is_refused(tmp_path):
-    path = write(tmp_path, link("base"), link("arm"), joint("j", "revolute", "base", "arm", axis="0 0 0"))
-    assert "joint 'j': its axis has the length 0" in refused(path).message
-
-
 @needs_pinocchio
 def test_an_inertia_matrix_that_is_not_positive_definite_is_refused(tmp_path):
     round_body = '<inertial><mass value="1"/><inertia ixx="1" ixy="{}" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
@@ -346,6 +304,25 @@ def test_an_inertia_matrix_that_is_not_positive_definite_is_refused(tmp_path):
     assert "drive_inertia" in fault.hint
 
 
+def test_another_kind_of_xml_is_no_urdf(tmp_path):
+    path = tmp_path / "model.sdf"
+    path.write_text("<sdf/>", encoding="utf-8")
+    assert "its root is <sdf>" in refused(path).message
+
+
+def test_no_joint_at_all_is_refused(tmp_path):
+    assert "no joint is logged" in refused(write(tmp_path, *ARM), [], {"j": 0.0}).message
+
+
+def test_an_axis_without_length_is_refused(tmp_path):
+    path = write(tmp_path, link("base"), link("arm"), joint("j", "revolute", "base", "arm", axis="0 0 0"))
+    assert "joint 'j': its axis has the length 0" in refused(path).message
+
+
 def test_drive_inertias_that_are_not_one_per_joint_are_refused(tmp_path):
     with pytest.raises(ConfigurationError, match="2 values of drive_inertia, 1 joints"):
         read_urdf(write(tmp_path, *ARM), ["j"], {}, drive_inertia=(1.0, 2.0))
+
+
+def test_a_folder_is_no_urdf(tmp_path):
+    assert "cannot be read" in refused(tmp_path).message

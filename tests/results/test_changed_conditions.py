@@ -23,10 +23,10 @@ from cdtool.results.results import (
     ContactResult,
     ExposureResult,
     FalseAlarmResult,
-    ForceResult,
     Results,
 )
 from tests.bits import every_value
+from tests.synthetic.builds import MISSED, contact
 
 NAMES = ("momentum", "pure_torque")
 WINTER = (
@@ -36,24 +36,8 @@ WINTER = (
 )
 
 
-def contacts(group: str, detector: str, latencies: list[float | None]) -> list[ContactResult]:
-    return [
-        ContactResult(
-            f"{group}/{number}.csv",
-            group,
-            detector,
-            "gate",
-            5.0,
-            0.001,
-            None if latency is None else 5.0 + 1e-3 * latency,
-            latency,
-            "missed" if latency is None else "detected",
-            100.0,
-            900.0,
-            watched_ms=1000.0,
-        )
-        for number, latency in enumerate(latencies)
-    ]
+def contacts(group: str, detector: str, outcomes: list[float | str]) -> list[ContactResult]:
+    return [contact(f"{group}/{n}.csv", group, detector, item, 5.0, 100.0) for n, item in enumerate(outcomes)]
 
 
 def alarms(group: str, detector: str, *operations: int) -> list[FalseAlarmResult]:
@@ -66,7 +50,7 @@ UNCHANGED = Results(
     ("stiff", "holdout"),
     (
         *contacts("stiff", "momentum", [10.0 + number for number in range(12)]),
-        *contacts("stiff", "pure_torque", [30.0, 31.0, None]),
+        *contacts("stiff", "pure_torque", [30.0, 31.0, MISSED]),
     ),
     tuple(alarms("holdout", "pure_torque", 3)),
     tuple(
@@ -80,7 +64,7 @@ BOTH = replace(
     contacts=(
         *UNCHANGED.contacts,
         *contacts("winter/stiff", "momentum", [20.0 + number for number in range(12)]),
-        *contacts("winter/stiff", "pure_torque", [None, None]),
+        *contacts("winter/stiff", "pure_torque", [MISSED, MISSED]),
     ),
     false_alarms=(*UNCHANGED.false_alarms, *alarms("winter/holdout", "momentum", 0, 0, 1, 2)),
     exposure=(
@@ -122,12 +106,6 @@ def test_a_row_has_each_result_with_that_of_the_unchanged_machine():
     assert math.isnan(unscored.changed.not_assessable_share)
 
 
-def test_a_condition_without_its_counterpart_stands_alone():
-    alone = replace(BOTH, groups=("stiff",), exposure=BOTH.exposure[:2] + BOTH.exposure[4:], false_alarms=[])
-    assert condition_rows(evaluate(alone))[0].unchanged.free is None
-    assert "unchanged –" in to_markdown(Report(evaluate(alone)))
-
-
 def limits(text: str, largest: float):
     groups = (*BOTH.groups, *(item.group for item in WINTER))
     place = Place("b.toml", "limits.")
@@ -144,11 +122,6 @@ def test_a_limit_is_about_a_condition_only_if_it_names_it():
     assert winter.conclusion.outcome == "violated" and winter.conclusion.exit_status == 1
     with pytest.raises(ConfigurationError, match=r"unknown group 'winter/hold'.*"):
         limits("momentum.winter/hold.false_alarms", 2)
-
-
-def test_forces_under_a_condition_do_not_decide():
-    row = ForceResult("winter/stiff/0.csv", "winter/stiff", 1, "gap", "fail", 900.0, ())
-    assert evaluate(replace(BOTH, forces=[row])).results.conclusion == evaluate(BOTH).results.conclusion
 
 
 def test_every_report_has_them():

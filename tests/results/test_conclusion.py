@@ -20,7 +20,6 @@ from cdtool.results.files.results_file import to_json
 from cdtool.results.limits import LimitRule, unchecked
 from cdtool.results.results import (
     CalibrationResult,
-    ContactResult,
     ExposureResult,
     PointResult,
     RecordingFinding,
@@ -240,14 +239,6 @@ def test_limits_met_are_not_a_pass_while_contacts_fail_at_3600_n():
     )
 
 
-@pytest.mark.parametrize(("allowed", "status"), [(1, 0), (0, 1)])
-def test_a_limit_on_misses_decides_about_them_where_there_is_one(allowed, status):
-    made = results([40.0] * 3 + [MISSED], ["pass"] * 4)
-    evaluated = evaluate(made, [LimitRule("*.missed", "*", "*", "missed", largest=allowed)])
-    assert evaluated.results.conclusion.exit_status == status
-    assert evaluated.results.conclusion.missed_without_limit == 0
-
-
 def test_without_profile_and_limit_a_miss_is_named_without_a_violation():
     for limits, outcome in (((), "not_asked"), ((MET,), "met")):
         evaluated = evaluate(results([40.0] * 3 + [MISSED]), limits)
@@ -277,28 +268,8 @@ def test_a_detector_without_an_assessable_impact_free_operation_has_assessed_not
     assert conclusion.reasons == ("momentum, holdout: none of 4 operations could be assessed: standing still 100 %",)
 
 
-def test_reasons_for_unassessable_contacts_are_named():
-    made = results([NOT_ASSESSABLE] * 3)
-    made = replace(made, contacts=tuple(replace(item, reason="the axis stands still") for item in made.contacts))
-    assert evaluate(made).results.conclusion.reasons == (
-        "momentum, stiff: none of 3 contacts could be assessed: the axis stands still",
-    )
-
-
 def test_what_was_left_out_is_3_and_a_violation_comes_first():
     left_out = (Skipped("a.csv", "empty file"),)
     assert evaluate(replace(results([40.0] * 2), skipped=left_out)).results.conclusion.exit_status == 3
     both = evaluate(replace(results([40.0] * 2, ["fail"] * 2), skipped=left_out)).results.conclusion
     assert both.exit_status == 1 and both.facts == ("force_violated", "left_out")
-
-
-def test_a_recording_of_which_a_part_is_lost_is_3_and_was_not_left_out():
-    findings = (RecordingFinding("a.csv", "its end is cut off", "loss"), RecordingFinding("b.csv", "a gap"))
-    conclusion = evaluate(replace(results([40.0] * 2), findings=findings)).results.conclusion
-    assert conclusion.exit_status == 3 and conclusion.facts == ("lost",)
-    assert evaluate(replace(results([40.0] * 2), findings=findings[1:])).results.conclusion.exit_status == 0
-
-
-def test_contacts_keep_their_spelling_in_the_data():
-    made: ContactResult = results([NOT_ASSESSABLE]).contacts[0]
-    assert made.outcome == "not_assessable"

@@ -11,9 +11,8 @@ import pytest
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.files.strict_json import strict_json
-from cdtool.report.model import onset_words
 from cdtool.results.files.results_file import json_pieces, read_results, to_json
-from cdtool.results.results import SCHEMA_VERSION, FalseAlarmResult, RecordingResult, Results, Skipped, tables
+from cdtool.results.results import SCHEMA_VERSION, FalseAlarmResult, RecordingResult, Results, tables
 from cdtool.results.summary import summarise
 from tests.report.html.html_case import case
 from tests.results.full_results import FULL, RESULTS, STEP
@@ -58,21 +57,6 @@ def test_results_survive_writing_and_reading(tmp_path):
     assert (again.limits, again.sweep, again.points[0].steps[0].name) == (FULL.limits, FULL.sweep, "dynamic")
 
 
-def test_names_in_json_have_no_control_characters_and_can_be_encoded(tmp_path):
-    name = "a\x1b[31m\x9b31m\u202egnp.exe\u2028\udc80 碰撞"
-    text = to_json(replace(RESULTS, skipped=(Skipped(name, name),)))
-    assert not set(name) & set(text) - set("a[31mgnp.ex 碰撞")
-    path = tmp_path / "results.json"
-    path.write_text(text, encoding="utf-8")
-    assert read_results(path).skipped == (Skipped(name, name),)
-
-
-def test_a_number_without_decimals_is_read_as_one_with(tmp_path):
-    path = tmp_path / "results.json"
-    path.write_text(to_json(RESULTS).replace('"onset_s": 5.0', '"onset_s": 5'), encoding="utf-8")
-    assert isinstance(read_results(path).contacts[0].onset_s, float)
-
-
 @pytest.mark.parametrize(
     "content", ["", "{}", "[]", '{"schema_version": 4}', '{"schema_version": 1}', '{"schema_version": NaN}', "\x00"]
 )
@@ -109,13 +93,6 @@ def test_a_false_alarm_of_version_4_names_its_recording_as_a_contact_does(tmp_pa
     read = read_results(path)
     alarm = replace(old.false_alarms[0], recording=recording, operation=operation)
     assert (read.schema_version, read.false_alarms) == (SCHEMA_VERSION, (alarm,))
-
-
-def test_the_words_of_the_onset_name_the_label_file():
-    rule = "load cell above 20 N for 3 ms"
-    assert onset_words({}) == "rule not stated" and onset_words({"onset": rule, "label_file": None}) == rule
-    assert onset_words({"onset": rule, "label_file": "a/b/labels.csv"}) == f"{rule}; label file labels.csv"
-    assert onset_words({"onset": rule, "label_file": "C:\\b\\labels.csv"}) == f"{rule}; label file labels.csv"
 
 
 def test_another_version_is_named_with_a_hint(tmp_path):

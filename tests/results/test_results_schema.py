@@ -118,16 +118,6 @@ def test_a_wrong_value_does_not_follow_it(wrong, value):
     assert faults(values)
 
 
-@pytest.mark.parametrize(
-    ("where", "value"),
-    [("contacts.0.side", None), ("contacts.0.side", "below"), ("contacts.0.latency_ms", 10), ("provenance.any", [1])],
-)
-def test_optional_parts_follow_the_schema(where, value):
-    values = values_of(FULL)
-    change(where, value)(values)
-    assert not faults(values)
-
-
 @pytest.mark.parametrize("part", ["contacts", "forces", "limits", "schema_version"])
 def test_a_missing_part_is_an_error(part):
     values = values_of(FULL)

@@ -68,16 +68,6 @@ def test_the_reference_torque_counts_where_every_run_has_it_and_the_measured_tor
     assert Adaptive().fit([with_torque(pairs[0]), *pairs[1:]]).inputs == ("reference_speed",)
 
 
-def test_one_side_follows_the_direction_of_the_reference_at_any_speed():
-    rng = np.random.default_rng(3)
-    fitted = Adaptive(sides="one").fit([excited(rng) for _ in range(4)])
-    for direction, speed in ((1, 0.2), (-1, 0.11)):
-        _, band = fitted.evaluate(stroke(direction, speed), signal(np.zeros(N)))
-        watched, free = (band.upper, band.lower) if direction > 0 else (band.lower, band.upper)
-        assert np.isfinite(watched).all() and np.isinf(free[400:]).all()
-        assert np.isfinite(free[:300]).all()
-
-
 def test_without_a_reference_it_says_so():
     recording = Recording("bare", "bare", ("axis",), {"speed": Series(TIME, TIME, "m/s")})
     with pytest.raises(RecordingError, match="reference_speed"):

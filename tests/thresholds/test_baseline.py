@@ -43,13 +43,6 @@ def test_limits_are_median_and_quantile_distance_of_the_first_seconds():
     assert np.all(status[:first] == Status.START_UP)
 
 
-def test_a_few_outliers_in_the_first_seconds_do_not_widen_the_limits():
-    values = 0.1 * np.random.default_rng(4).standard_normal(400)
-    plain = evaluated(np.full(400, 0.4), values)[2][-1]
-    values[[20, 50, 80]] = 1e6
-    assert evaluated(np.full(400, 0.4), values)[2][-1] < 1.3 * plain
-
-
 def test_rest_before_the_motion_is_not_part_of_it():
     rng = np.random.default_rng(5)
     speed = np.repeat([0.0, 0.5], [300, 300]) + 1e-4 * rng.standard_normal(600)
@@ -168,9 +161,3 @@ def test_without_a_speed_it_is_an_error_that_names_the_channel():
     _, signal = run_of(np.full(10, 0.5), np.zeros(10))
     with pytest.raises(RecordingError, match="speed"):
         FittedBaseline(1.0, 8.0).evaluate(Recording("run", "", ("axis",), {}), signal)
-
-
-def test_rounding_errors_are_no_spread():
-    rounded = 5.0 * (1.0 + 1e-15 * np.random.default_rng(2).standard_normal(400))
-    status, lower, upper = evaluated(np.full(400, 0.4), rounded)
-    assert not np.any(status == Status.VALID) and np.isnan(lower[-1]) and np.isnan(upper[-1])

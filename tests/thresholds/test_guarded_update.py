@@ -104,12 +104,6 @@ def test_a_limit_that_would_leave_the_reserve_is_refused_with_its_place():
     assert f"spreads from the one first learned; at most {RESERVE:g} allowed (inspect the machine there" in refused
 
 
-def test_while_accelerating_the_place_is_a_time():
-    early = 100.0 + 60.0 * (np.abs(TIME - 0.8) < 0.05)
-    with pytest.raises(SignatureError, match=r"0\.[34]\d s after the motion began"):
-        guarded(FIRST, FIRST, CLEAN, signal(early), 3.0, 6.0, 1.0)
-
-
 def test_a_run_that_ends_early_is_refused_with_the_share_it_covered():
     short = stroke(time=TIME[:2600])
     item = signal(np.full(2600, 100.0), TIME[:2600])

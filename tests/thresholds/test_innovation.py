@@ -12,7 +12,7 @@ from cdtool.base.errors import NothingValidError, UsageError
 from cdtool.detectors.detection import Status
 from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.whitening import burg
-from tests.thresholds.strokes import TIME, N, jittering_clock, signal, stroke
+from tests.thresholds.strokes import TIME, N, signal, stroke
 
 # Behind the ramp, before the end of the travel that enough runs have reached.
 RUNNING = slice(1500, 3900)
@@ -46,13 +46,6 @@ def test_burg_finds_a_pure_tone_exactly():
     assert spread < 1e-3
 
 
-def test_burg_leaves_out_sections_that_are_too_short():
-    rng = np.random.default_rng(2)
-    long = coloured(rng)
-    assert burg([long, np.ones(2)], 2)[0] == pytest.approx(burg([long], 2)[0], rel=1e-12)
-    assert np.isnan(burg([np.ones(2)], 2)[1])
-
-
 def test_innovations_of_normal_runs_are_white_and_of_unit_spread(fitted):
     recording, normal = runs(1, seed=9)[0]
     statistic, _ = fitted.evaluate(recording, normal)
@@ -72,13 +65,6 @@ def test_a_jump_shows_at_once_and_a_slow_ramp_hardly_at_all(fitted):
     assert jump[3000] - quiet[3000] == pytest.approx(20.0, rel=0.1)
     # 18 N after 0.9 s: (1 - sum a) of it are left.
     assert slow[3900] - quiet[3900] == pytest.approx(18.0 * (1.0 - sum(MODEL)), rel=0.15)
-
-
-def test_it_starts_with_as_many_samples_of_start_up_as_its_order(fitted):
-    recording, normal = runs(1, seed=9)[0]
-    statistic, _ = fitted.evaluate(recording, normal)
-    first = int(np.flatnonzero(statistic.status[:, 0] != Status.NO_LIMIT)[0])
-    assert (statistic.status[first : first + 2] == Status.START_UP).all() and statistic.valid[first + 2]
 
 
 @pytest.mark.parametrize("missing", [1, 5, 20])
@@ -145,15 +131,6 @@ def test_a_level_that_a_contact_has_reached_in_a_gap_is_seen_behind_it(fitted):
         assert statistic.values[3000 + missing, 0] > 5.5
 
 
-def test_a_jittering_clock_does_not_matter_to_it():
-    time = jittering_clock(N, 0.3)
-    rng = np.random.default_rng(4)
-    pairs = [(stroke(time=time), signal(100.0 + coloured(rng), time)) for _ in range(20)]
-    fitted = Innovation(order=2).fit(pairs)
-    statistic, _ = fitted.evaluate(*pairs[0])
-    assert np.std(statistic.values[RUNNING]) == pytest.approx(1.0, abs=0.08)
-
-
 def test_the_change_from_time_to_position_is_no_innovation():
     rng = np.random.default_rng(6)
     # A mean that changes steeply where acceleration ends: in time and in position its curves do not meet.
@@ -176,13 +153,6 @@ def test_another_rate_is_not_assessable(fitted):
 def test_a_signal_that_does_not_vary_is_refused():
     with pytest.raises(NothingValidError, match="variation"):
         Innovation().fit([(stroke(), signal(np.full(N, 3.0)))] * 12)
-
-
-def test_it_belongs_to_the_class_of_its_runs_and_watches_the_side_that_opposes_the_motion():
-    fitted = Innovation(sides="one").fit(runs(12, direction=-1))
-    assert fitted.motion.direction == -1
-    _, band = fitted.evaluate(*runs(1, direction=-1)[0])
-    assert (band.upper[2000:] == np.inf).all() and (band.lower[2000:] == -5.5).all()
 
 
 def test_an_order_without_meaning_is_refused():

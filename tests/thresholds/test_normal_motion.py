@@ -59,11 +59,6 @@ def test_a_place_is_known_by_travel_so_that_a_stop_is_compared_with_where_it_hap
     assert mean[3000:, 0] == pytest.approx(0.2, abs=2e-3)
 
 
-def test_before_the_motion_begins_nothing_is_known(normal):
-    _, mean, _ = normal.compare(run(99), "torque")
-    assert np.isnan(mean[:300]).all() and np.isfinite(mean[500:5900]).all()
-
-
 def test_positions_count_from_the_start_of_the_motion_whatever_the_encoder_says(normal):
     log = run(3)
     moved = replace(log["position"], values=log["position"].values + 55.0)
@@ -73,11 +68,6 @@ def test_positions_count_from_the_start_of_the_motion_whatever_the_encoder_says(
         assert one[i] == pytest.approx(other[i], abs=1e-9, nan_ok=True)
 
 
-def test_alarms_of_several_detectors_share_one_comparison(normal):
-    log = run(77)
-    assert normal.compare(log, "torque") is normal.compare(log, "torque")
-
-
 def test_a_class_serves_a_recording_of_its_speed_joints_and_channels_only(normal):
     log, known = run(99), NormalMotions((normal,))
     assert known.of(log, MOTION) is normal
@@ -85,11 +75,6 @@ def test_a_class_serves_a_recording_of_its_speed_joints_and_channels_only(normal
     assert known.of(log, replace(MOTION, direction=-1)) is Absence.NO_CLASS
     assert known.of(replace(log, channels={"torque": log["torque"]}), MOTION) is Absence.NO_CHANNELS
     assert NormalMotions((), Absence.FEW_RUNS).of(log, MOTION) is Absence.FEW_RUNS
-
-
-def test_the_class_nearest_in_speed_is_chosen(normal):
-    faster = learn_normal_motion(runs(5), replace(MOTION, nominal_speed=0.21))
-    assert NormalMotions((faster, normal)).of(run(99), replace(MOTION, nominal_speed=0.199)) is normal
 
 
 def test_it_survives_json(normal):
@@ -133,12 +118,6 @@ def test_a_run_more_moves_the_mean_as_learning_from_all_of_them_does():
     known = np.isfinite(one[1]) & np.isfinite(other[1])
     assert one[1][known] == pytest.approx(other[1][known], rel=1e-3)
     assert one[2][known] == pytest.approx(other[2][known], rel=1e-2)
-
-
-def test_an_odd_run_moves_the_mean_by_no_more_than_the_cap_allows(normal):
-    updated = normal.with_run(run(50, offset=4000.0), cap=3.0)
-    before, after = (item.compare(run(99), "torque")[1][3000, 0] for item in (normal, updated))
-    assert 0.0 < after - before < 3.0 * 4.0 / 40.0 * 1.5
 
 
 def test_neither_load_cell_nor_label_is_learned():

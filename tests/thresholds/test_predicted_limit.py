@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.base.errors import SignatureError, UsageError
+from cdtool.base.errors import UsageError
 from cdtool.detectors.detection import Status
 from cdtool.thresholds.predicted_limit import PredictedLimit
-from tests.thresholds.strokes import STILL, TIME, N, jittering_clock, noise_runs, signal
+from tests.thresholds.strokes import TIME, N, jittering_clock, noise_runs, signal
 
 
 def impulse_response(order: int, forgetting: float, ahead: float) -> np.ndarray:
@@ -56,16 +56,6 @@ def test_a_parabola_is_predicted_exactly_on_any_clock(share):
     )
 
 
-def test_a_line_over_a_short_gap_is_predicted_as_without_the_gap():
-    values = 5.0 + 20.0 * TIME
-    holed = signal(values)
-    status, held = holed.status.copy(), holed.values.copy()
-    status[2000:2015], held[2000:2015] = Status.GAP, np.nan
-    statistic = PredictedLimit().statistic(replace(holed, values=held, status=status), 1e-3)
-    assert (statistic.status[2000:2015] == Status.GAP).all() and statistic.valid[2015:].all()
-    np.testing.assert_allclose(statistic.values[2015:, 0], values[2015:] + 0.2, atol=1e-6)
-
-
 def test_a_gap_longer_than_the_memory_restarts_it():
     holed = signal(np.where(TIME < 2.0, 0.0, 50.0))
     status = holed.status.copy()
@@ -76,14 +66,6 @@ def test_a_gap_longer_than_the_memory_restarts_it():
     assert (statistic.status[back : back + start_up] == Status.START_UP).all()
     assert statistic.valid[back + start_up :].all()
     np.testing.assert_allclose(statistic.values[back:, 0], 50.0, atol=1e-6)
-
-
-def test_behind_a_gap_within_the_memory_it_is_judged_at_once():
-    holed = signal(np.where(TIME < 2.0, 0.0, 50.0))
-    status = holed.status.copy()
-    status[2000:2050] = Status.GAP
-    statistic = PredictedLimit().statistic(replace(holed, status=status), 1e-3)
-    assert statistic.valid[2050:].all() and statistic.values[2050, 0] > 40.0
 
 
 def test_it_stays_exact_over_a_hundred_thousand_samples():
@@ -102,23 +84,9 @@ def test_limits_are_learned_on_the_prediction_and_not_on_the_signal():
     assert ratio == pytest.approx(3.39 / 0.25, rel=0.15)
 
 
-def test_one_side_watches_what_opposes_the_motion_and_serves_its_class_alone():
-    backward = PredictedLimit(sides="one").fit(noise_runs(4, direction=-1))
-    assert backward.limit.upper == (np.inf,) and np.isfinite(backward.limit.lower[0])
-    assert backward.motion is not None and backward.motion.direction == -1
-    assert PredictedLimit().fit(noise_runs(4)).motion is None
-    with pytest.raises(SignatureError, match="others"):
-        PredictedLimit(sides="one").fit([*noise_runs(2), *noise_runs(1, direction=-1)])
-
-
 @pytest.mark.parametrize(
     "wrong", [{"order": 3}, {"forgetting": 1.0}, {"forgetting": 0.1}, {"ahead": -1.0}, {"safety_factor": 0.0}]
 )
 def test_settings_without_meaning_are_refused(wrong):
     with pytest.raises(UsageError):
         PredictedLimit(**wrong)
-
-
-def test_runs_without_two_samples_are_refused():
-    with pytest.raises(SignatureError, match="two samples"):
-        PredictedLimit().fit([(STILL, signal([1.0], np.zeros(1)))] * 2)

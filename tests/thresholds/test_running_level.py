@@ -14,14 +14,14 @@ from cdtool.base.errors import UsageError
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
-from cdtool.detectors.detection import Band, Signal, Status
+from cdtool.detectors.detection import Band, Status
 from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.momentum import Momentum
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.running_level_kernel import CLIP, FREEZE, GUARD, MEMORY, START, WIDER
 from cdtool.thresholds.signature import Signature
-from tests.thresholds.strokes import TIME, N, jittering_clock, noise_runs, signal, stroke
+from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
 
 REACH = 6.0
 MOVING = 0.3 + 0.02  # the strokes begin to move at 0.3 s
@@ -41,11 +41,6 @@ def following(still: FittedSignature) -> FittedSignature:
 def band_of(signature: FittedSignature, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     _, band = signature.evaluate(stroke(), signal(values))
     return band.lower[:, 0], band.upper[:, 0]
-
-
-def spread_of(signature: FittedSignature) -> FloatArray:
-    lower, upper = band_of(signature, np.full(N, 100.0))
-    return (upper - lower) / (2.0 * signature.safety_factor)
 
 
 def by_the_book(
@@ -116,13 +111,6 @@ def test_the_band_is_twice_as_wide_at_first_and_as_learned_after_a_second_of_mot
     assert ratio[np.searchsorted(TIME[known], first + GUARD + START + 0.01)] == pytest.approx(1.0)
 
 
-def test_the_level_is_never_further_than_the_reach(still, following):
-    values = np.full(N, 160.0)
-    moved = band_of(following, values)[1] - band_of(still, values)[1]
-    settled = (TIME > 2.5) & np.isfinite(moved)
-    assert moved[settled] == pytest.approx(REACH * spread_of(still)[settled], rel=1e-6)
-
-
 def test_a_contact_is_not_followed_while_it_lasts(still, following):
     values = 100.0 + np.random.default_rng(2).normal(size=N)
     values[2500:] += 20.0
@@ -151,35 +139,6 @@ def test_limits_do_not_depend_on_later_samples(following):
         changed[end:] = 1e3 * rng.normal(size=N - end)
         for limit, other in zip(whole, band_of(following, changed), strict=True):
             np.testing.assert_array_equal(limit[:end], other[:end])
-
-
-def test_samples_that_are_not_valid_teach_nothing(following):
-    values = np.full(N, 103.0)
-    status = np.zeros((N, 1), dtype=np.uint8)
-    values[1800:2300], status[1800:2300] = 200.0, Status.GAP
-    _, band = following.evaluate(stroke(), Signal(TIME, values[:, np.newaxis], status, "N", True, ("axis",)))
-    assert band.upper[2700, 0] == pytest.approx(band_of(following, np.full(N, 103.0))[1][2700], abs=0.05)
-
-
-def test_a_jittered_clock_with_lost_rows_changes_nothing_but_the_samples(still, following):
-    time = jittering_clock(N, 0.9, seed=8)
-    kept = np.random.default_rng(9).random(N) > 0.2
-    kept[1500:2200] = False
-    time = time[kept]
-    values = signal(np.full(len(time), 104.0), time)
-    limits = [item.evaluate(stroke(time=time), values)[1].upper[:, 0] for item in (following, still)]
-    settled = (time > MOVING + GUARD + START + 1.0) & np.isfinite(limits[1])
-    assert (limits[0] - limits[1])[settled] == pytest.approx(4.0, abs=0.3)
-
-
-def test_a_slow_log_is_not_watched_with_wide_limits_for_ever(following):
-    time = np.arange(0.0, 7.0, 0.4)
-    values = signal(np.full(len(time), 100.0), time)
-    learned = Signature(sides="two", adaptive_level=REACH).fit([(stroke(time=time), values)] * 12)
-    still = replace(learned, adaptive_level=0.0)
-    bands = [item.evaluate(stroke(time=time), values)[1] for item in (learned, still)]
-    widths = [(band.upper - band.lower)[:, 0] for band in bands]
-    assert np.isfinite(widths[1][-3]) and widths[0][-3] == pytest.approx(widths[1][-3])
 
 
 def test_the_factor_that_a_sample_meets_does_not_depend_on_the_factor_that_is_set(following):

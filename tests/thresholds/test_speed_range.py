@@ -15,14 +15,12 @@ from cdtool.base.errors import SignatureError, UsageError
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion.speed_range import GUARD
 from cdtool.recordings.recording import Recording, Series
-from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.signature_curve import Curve
 from cdtool.thresholds.speed_range import CURVATURE, RELEASE, SignatureOverSpeeds, interpolate, over_speeds
 from tests.recordings.motion.speed_logs import log
-from tests.thresholds.strokes import jittering_clock
 
 SPEEDS = (0.2, 0.3)
 MEANS, SPREADS = (100.0, 110.0), (1.0, 2.0)
@@ -104,17 +102,6 @@ def test_until_the_speed_is_known_the_band_holds_those_of_both_speeds(between):
     assert upper[there] == pytest.approx(MEANS[1] + 5.5 * SPREADS[1])
 
 
-@pytest.mark.parametrize("speed", SPEEDS)
-def test_at_a_learned_speed_the_limits_are_those_of_its_class(slow, fast, speed):
-    own = {0.2: slow, 0.3: fast}[speed]
-    recording = stroke(speed, seed=3)
-    _, mixed = judged(recording, force(recording, 105.0), [slow, fast]).evaluated
-    _, plain = own.evaluate(recording, force(recording, 105.0))
-    later = slice(2200, 3200)
-    assert mixed.upper[later] == pytest.approx(plain.upper[later], abs=0.6)
-    assert mixed.lower[later] == pytest.approx(plain.lower[later], abs=0.6)
-
-
 @pytest.mark.parametrize(("speed", "assessed"), [(0.25, True), (0.21, True), (0.15, False), (0.37, False)])
 def test_speeds_between_are_assessed_and_others_are_not(slow, fast, speed, assessed):
     recording = stroke(speed)
@@ -185,42 +172,6 @@ def test_a_contact_that_slows_the_axis_does_not_move_the_band_before_the_guard(b
     before = (time >= 2.3) & (time < 2.5 + GUARD)
     upper = [band_of(between, item)[1] for item in (free, struck)]
     assert upper[1][before] == pytest.approx(upper[0][before], abs=0.05)
-
-
-def test_limits_are_linear_in_the_safety_factor(between):
-    recording = stroke(0.25)
-    signal = force(recording, 108.0, 1.0)
-    statistic, met = exceedance(between, recording, signal)
-    _, other = exceedance(between.with_safety_factor(2.0), recording, signal)
-    judged_there = statistic.valid
-    np.testing.assert_allclose(other[judged_there], met[judged_there], rtol=1e-9)
-
-
-def test_an_adaptive_level_moves_the_band_between_speeds(between):
-    following = replace(between, signatures=tuple(replace(item, adaptive_level=6.0) for item in between.signatures))
-    recording = stroke(0.25)
-    moved = band_of(following, recording, 108.0)[1] - band_of(between, recording, 108.0)[1]
-    time = recording["speed"].time
-    settled = (time > 3.4) & (time < 3.6)
-    assert moved[settled] == pytest.approx(3.0, abs=0.4)
-
-
-def test_own_clocks_gaps_and_missing_references_change_little(between):
-    recording = stroke(0.25)
-    rng = np.random.default_rng(7)
-    channels = {}
-    for name, series in recording.channels.items():
-        kept = (rng.random(len(series)) > 0.3) & ((series.time < 2.0) | (series.time > 2.2))
-        jittered = np.sort(series.time + rng.uniform(0.0, 1e-3, len(series)))
-        channels[name] = Series(jittered[kept], series.values[kept], series.unit)
-    damaged = replace(recording, channels=channels)
-    clock = jittering_clock(4000, 0.9, seed=8)
-    column = np.full((len(clock), 1), 105.0)
-    signal = Signal(clock, column, np.zeros(column.shape, dtype=np.uint8), "N", True, ("axis",))
-    _, band = between.evaluate(damaged, signal)
-    plain = band_of(between, recording)[1]
-    there = (clock > 2.8) & (clock < 3.4)
-    assert band.upper[there, 0] == pytest.approx(np.interp(clock[there], recording["speed"].time, plain), abs=0.4)
 
 
 def test_a_location_that_one_class_does_not_know_has_no_limit(between, slow, fast):

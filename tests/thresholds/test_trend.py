@@ -13,7 +13,7 @@ from cdtool.thresholds.first_order import filtered_slope, low_passed
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.limit_and_trend import LimitAndTrend
 from cdtool.thresholds.trend import Trend
-from tests.thresholds.strokes import STILL, TIME, N, jittering_clock, noise_runs, signal
+from tests.thresholds.strokes import STILL, TIME, N, jittering_clock, signal
 
 
 def test_a_ramp_gives_its_slope_after_the_closed_form_on_any_clock():
@@ -73,45 +73,9 @@ def test_the_trend_alarms_before_the_value_does_on_a_fast_ramp_and_never_on_a_sl
     assert first(fitted, 12.0) == np.inf and first(value, 12.0) < np.inf
 
 
-def test_the_line_sees_a_ramp_by_its_lead_ahead():
-    statistic = LimitAndTrend(lead=0.05).statistic(signal(30.0 * TIME), 1e-3)
-    np.testing.assert_allclose(statistic.values[500:, 0], 30.0 * (TIME[500:] + 0.05), rtol=1e-6)
-    assert statistic.unit == "N"
-
-
-def test_the_table_is_narrower_for_a_rising_value_than_for_a_resting_one():
-    rng = np.random.default_rng(0)
-    # Normal runs: high values that rest, and fast changes about zero.
-    shape = np.where(TIME < 2.0, 100.0, 5.0 * np.sin(60.0 * TIME))
-    pairs = [(STILL, signal(shape + 0.1 * rng.normal(size=N))) for _ in range(10)]
-    fitted = LimitAndTrend(shape="table", steps=8).fit([(r, replace(s, status=_masked(s))) for r, s in pairs])
-    resting, rising = signal(np.full(N, 50.0)), signal(50.0 + 250.0 * np.maximum(TIME - 2.0, 0.0))
-    for normal, outside in ((resting, False), (rising, True)):
-        statistic, band = fitted.evaluate(STILL, normal)
-        at = 2100
-        assert (statistic.values[at, 0] > band.upper[at, 0]) == outside
-    assert fitted.limits[-1].greatest[0] < 20.0 < fitted.limits[0].greatest[0]
-
-
-def test_a_table_level_that_few_runs_reach_takes_the_limit_below_it():
-    pairs = noise_runs(10)
-    top = max(float(np.max(Trend().statistic(s, 1e-3).values[100:])) for _, s in pairs)
-    fitted = LimitAndTrend(shape="table", steps=5).fit(pairs)
-    assert len(fitted.limits) == 5 and fitted.rising[-1, 0] < top
-    greatest = [item.greatest[0] for item in fitted.limits]
-    assert all(np.isfinite(greatest)) and greatest == sorted(greatest, reverse=True)
-
-
 @pytest.mark.parametrize(
     "wrong", [{"shape": "circle"}, {"lead": 0.0}, {"time_constant": -1.0}, {"steps": 1}, {"sides": "left"}]
 )
 def test_settings_without_meaning_are_refused(wrong):
     with pytest.raises(UsageError):
         LimitAndTrend(**wrong)
-
-
-def _masked(s):
-    # The jump between the two halves is no part of the normal signal.
-    status = s.status.copy()
-    status[1990:2010] = Status.NOT_APPLICABLE
-    return status

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 
 from cdtool.commands.identify.axis.rigid_axis import CrossValidation, UnseenRun, identify_rigid_axis
-from cdtool.commands.identify.axis.speed_controller import ControllerComparison
-from cdtool.commands.identify.axis.start_ensemble import StartEnsemble
-from cdtool.commands.identify.axis.two_mass import StartComparison
-from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
+from cdtool.commands.identify.plots import draw_friction, draw_unseen_run
 from cdtool.report.plots.figures import encoded
 from tests.synthetic.gate_runs import GATE, free_runs
 
@@ -29,18 +26,6 @@ def validation(wrong_by: float) -> CrossValidation:
     return CrossValidation(wrong_by, 8, 5.0, 4, unseen)
 
 
-def test_the_residual_is_drawn_with_its_size_and_the_floor() -> None:
-    figure = draw_unseen_run(validation(25.0), "N")
-    above, below = figure.axes
-    assert "25.0 N RMS" in above.get_title(loc="left")
-    assert "largest error of 10" in above.get_title(loc="left")
-    residual = lines(below)["measured − model"].get_ydata()
-    assert np.nanmax(np.abs(residual - 25.0)) < 1e-9
-    assert np.isnan(residual).any()  # where the axis rests
-    (band,) = below.collections
-    assert np.ptp(band.get_paths()[0].vertices[:, 1]) == pytest.approx(10.0)
-
-
 def test_friction_has_bars_of_two_standard_errors_and_the_model_over_the_same_speeds() -> None:
     fit = identify_rigid_axis(free_runs(GATE, 404, 3), GATE.motor_mass)
     left, right = draw_friction(fit, UNITS).axes
@@ -51,26 +36,6 @@ def test_friction_has_bars_of_two_standard_errors_and_the_model_over_the_same_sp
     segment = bars.lines[2][0].get_segments()[0]
     assert segment[1][1] - segment[0][1] == pytest.approx(4.0 * fit.friction_curve.standard_error[0])
     assert right.get_xlabel() == "position [m]"
-
-
-def test_a_start_shows_the_difference_beside_that_between_runs() -> None:
-    time = 1e-3 * np.arange(-300.0, 2000.0)
-    measured = {"speed": np.clip(time, 0.0, 0.2), "torque": 200.0 * (time > 0.0)}
-    deviation = {name: 0.1 * values for name, values in measured.items()}
-    ensemble = StartEnsemble(1e-3, 300, 4, measured, deviation, 1, 0.2, ())
-    start = StartComparison(ensemble, {"speed": measured["speed"] + 0.03, "torque": measured["torque"]})
-    figure = draw_starts(start, UNITS)
-    _, _, speed, torque = figure.axes
-    assert lines(speed)["measured − model"].get_ydata() == pytest.approx(-0.03)
-    assert lines(torque)["measured − model"].get_ydata() == pytest.approx(0.0)
-
-
-def test_the_controllers_difference_is_stated() -> None:
-    time = 1e-3 * np.arange(500)
-    compared = ControllerComparison(time, np.ones(500), np.full(500, 3.0), True)
-    above, below = draw_controller(compared, "N").axes
-    assert "torque reference, difference 2.00 N RMS" in above.get_title(loc="left")
-    assert np.all(below.get_lines()[0].get_ydata() == -2.0)
 
 
 def test_the_same_content_has_the_same_bytes() -> None:

@@ -6,12 +6,9 @@ import math
 
 import pytest
 
-from cdtool.commands.identify.estimate import Identified, Missing, NotIdentifiable
-from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction
+from cdtool.commands.identify.estimate import Missing, NotIdentifiable
 from cdtool.commands.identify.words import (
-    listed_numbers,
     words_of_base_set,
-    words_of_decision,
     words_of_reason,
 )
 
@@ -37,11 +34,6 @@ def test_a_reason_states_the_numbers_that_show_it(missing, numbers, words) -> No
     assert words_of_reason(NotIdentifiable("machine", "x", missing, numbers)).startswith(words)
 
 
-def test_numbers_are_listed_as_in_a_sentence() -> None:
-    assert listed_numbers((0.0612, 0.2, math.nan)) == "0.0612, 0.2 and -"
-    assert listed_numbers((0.2,)) == "0.2"
-
-
 def test_the_answer_about_the_base_parameters_has_its_numbers() -> None:
     numbers = {"condition_number": 122.3, "base_parameters": 36.0, "not_determined": 13.0}
     item = NotIdentifiable("machine", "base_parameters", (Missing.OTHER_MOTION, Missing.MORE_RECORDINGS), numbers)
@@ -51,20 +43,3 @@ def test_the_answer_about_the_base_parameters_has_its_numbers() -> None:
     )
     singular = NotIdentifiable("machine", "base_parameters", (Missing.OTHER_MOTION,), {"condition_number": math.inf})
     assert "condition number infinite; add a motion of all joints at once;" in words_of_base_set(singular)
-
-
-@pytest.mark.parametrize(
-    ("answer", "words"),
-    [
-        (FrictionAnswer.NEW, "new: viscous and Coulomb friction"),
-        (FrictionAnswer.NOT_BETTER, "old: not better by more than one standard error"),
-        (FrictionAnswer.NOT_MOVED, "old: the joint does not move"),
-    ],
-)
-def test_a_decision_states_why_the_old_friction_stays(answer: FrictionAnswer, words: str) -> None:
-    before = math.nan if answer is FrictionAnswer.NOT_MOVED else 4.0
-    form = FrictionForm.FRICTION_ALONE if answer is FrictionAnswer.NEW else FrictionForm.PREVIOUS
-    errors = {FrictionForm.FRICTION_ALONE: 3.0, FrictionForm.PREVIOUS: before}
-    friction = JointFriction(0, form, FrictionForm.FRICTION_ALONE, Identified(()), (), errors, 30.0)
-    assert friction.answer is answer
-    assert words_of_decision(friction) == words

@@ -89,12 +89,6 @@ def test_an_existing_file_is_kept_unless_it_is_the_machine_file_itself(tmp_path:
     assert again.text == own.read_text(encoding="utf-8")
 
 
-def test_what_is_found_is_not_said_to_be_unidentifiable(identified: tuple[IdentifiedMachine, Path]) -> None:
-    (joint,) = identified[0].joints
-    refused = {(item.section, item.key) for item in joint.not_identifiable}
-    assert not refused & {(change.section, change.key) for change in identified[0].changes}
-
-
 CRASHES = """machine = "{gate}/machine.toml"
 detectors = ["momentum"]
 threshold = "limit"
@@ -185,13 +179,6 @@ def test_values_of_the_file_are_at_the_motor_and_other_joints_keep_theirs(tmp_pa
     assert "# two screws" in text
     assert "was 10.0 (guessed)" in text
     assert changes[0].old == (10.0, 10.0)
-
-
-def test_a_rotary_axis_has_an_inertia(tmp_path: Path) -> None:
-    path = tmp_path / "machine.toml"
-    path.write_text('[machine]\ntype = "rotary_axis"\ntransmission_ratio = 0.1\n', encoding="utf-8")
-    changes = changes_of(read_machine_file(path).machine, {}, [estimate("load_mass", 2.0, 0)])
-    assert [change.key for change in changes] == ["load_inertia"]
 
 
 def test_a_joint_whose_value_is_known_only_together_does_not_undo_that_of_another(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.alarms.pipeline import judge
 from cdtool.base.errors import SignatureError, UsageError
-from cdtool.commands.signature.coverage import LeftOutRun, SignatureCoverage, check_coverage, gaps_of
+from cdtool.commands.signature.coverage import LeftOutRun, SignatureCoverage, check_coverage
 from cdtool.detectors.detection import Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.results.curves.sweep import critical_factor
@@ -67,12 +67,6 @@ def test_a_run_unlike_the_others_alarms_when_it_is_left_out_though_not_when_it_w
     assert found.alarms == 1 and not found.enough
 
 
-def test_runs_that_differ_as_a_whole_need_more_of_them_than_runs_that_do_not():
-    alike, apart = (check_coverage(season(14, together=share), RULE, ACTIVATION) for share in (0.1, 2.0))
-    assert alike.enough and alike.more_runs == 0 and alike.verdict.startswith("enough runs: ")
-    assert apart.chance > 10.0 * alike.chance and apart.factor_needed > alike.factor_needed
-
-
 def test_the_verdict_says_how_many_runs_or_which_factor():
     assert coverage().verdict.startswith("needs 16 more runs, or raise the safety factor to at least 6.3: the chance")
     assert "operation is 1 in 100; at most 1 in 1000 is allowed" in coverage().verdict
@@ -97,25 +91,6 @@ def test_a_section_without_a_limit_is_reported_with_location_and_share_of_runs()
     assert gap.end == pytest.approx(travel[2600] - travel[402] - 2 * 0.002, abs=0.003)
     assert "valid in at most 64 % of the runs; 80 % are required" in gap.described
     assert not others
-
-
-def test_while_accelerating_a_part_without_a_limit_is_a_time():
-    blind = season(12)
-    for _, signal in blind:
-        signal.status[600:700] = Status.START_UP
-    (gap,) = check_coverage(blind, RULE, ACTIVATION).gaps
-    assert (gap.axis, gap.share) == ("time", 0.0)
-    assert (gap.start, gap.end) == (pytest.approx(0.2, abs=0.02), pytest.approx(0.3 - 2 * 0.01, abs=0.015))
-    assert "s after the motion began" in gap.described
-    # Without the runs, the end of the time-based part is unknown: both curves are checked.
-    assert {item.axis for item in gaps_of(learned(blind))} == {"time", "travel"}
-
-
-def test_an_unassessable_run_is_named_and_not_counted():
-    blind = season(14)
-    blind[3][1].status[:] = Status.NOT_APPLICABLE
-    found = check_coverage(blind, RULE, ACTIVATION)
-    assert found.not_assessable == ("run3",) and len(found.runs) == 13
 
 
 def test_too_few_runs_and_an_invalid_target_are_refused():

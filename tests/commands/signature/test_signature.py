@@ -149,14 +149,6 @@ def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path)
     assert once == twice
 
 
-def test_a_check_with_some_of_the_runs_is_reported(gate_folder, signature):
-    done = check(signature, gate_folder, *logs_of(gate_folder)[:4])
-    assert done.status == 3 and "only 4 of the 11 runs learned from are given" in done.err
-    done = check(signature, gate_folder, *logs_of(gate_folder)[:2])
-    assert done.status == 2 and "at least 3 are required" in done.err and "advice: nothing was assessable" in done.out
-    assert "nothing can be used: " in done.err and "done" not in done.err
-
-
 def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):
     path, machine = tmp_path / "cut.json", ("-m", gate_folder / "machine.toml")
     learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--set=operations=motion", "-o", path)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
 import tomllib
 
 import pytest
@@ -23,20 +21,6 @@ def test_it_is_one_line_and_a_frame_with_a_row_per_detector_and_group(tuned):
     assert tuned.summary().group.tolist() == ["stiff", "soft"] and tuned.best.detector == "momentum"
     assert "<p>Tuned: " in tuned._repr_html_()
     assert tuned.skipped.columns.tolist() == ["recording", "reason"] and dict(tuned.unusable) == {}
-
-
-def test_it_is_pickled_and_copied(tuned):
-    for copied in (pickle.loads(pickle.dumps(tuned)), copy.deepcopy(tuned)):
-        assert copied.summary().equals(tuned.summary())
-
-
-def test_its_figures_are_drawn_as_in_the_report(tuned):
-    front, around = tuned.plot.front(), tuned.plot.sensitivity("gm")
-    assert "stiff" in front.axes[0].get_xlabel() and "soft" in front.axes[0].get_ylabel()
-    assert {"tried", "chosen"} <= set(front.axes[0].get_legend_handles_labels()[1])
-    assert any("debounce" in axes.get_xlabel() for axes in around.axes)
-    with pytest.raises(cdtool.CdtoolError, match="'momentun' was not tuned"):
-        tuned.plot.front("momentun")
 
 
 def test_it_is_saved_as_the_command_writes_it_and_the_result_can_be_used(tuned, tmp_path):

@@ -112,13 +112,6 @@ def test_a_bounce_that_never_ends_is_an_error_and_no_endless_loop(monkeypatch):
         simulate_impact(frictionless, ConstantTorque(1.0), HuntCrossley(1e9, 0.0), Start(gap=1e-3), duration=100.0)
 
 
-def test_constants_that_are_far_apart_are_an_error_and_no_endless_work(monkeypatch):
-    monkeypatch.setattr("cdtool.impact.effort.MOST_EVALUATIONS", 10_000)
-    sticky = RigidTransmission(1e-4, 1e4, 0.01)
-    with pytest.raises(UsageError, match="far quicker"):
-        simulate_impact(sticky, ConstantTorque(1.0), HuntCrossley(1e5, 0.0), Start(gap=1e-3), duration=10.0)
-
-
 def test_a_torque_limit_bounds_the_torque_and_its_integrator_does_not_wind_up():
     limited = replace(example.SPEED_LOOP, torque_limit=0.6)
     start = Start(gap=0.0, load_speed=0.25)
@@ -138,11 +131,6 @@ def test_a_torque_limit_bounds_the_torque_and_its_integrator_does_not_wind_up():
     assert limited.rates([0.55, 0.0, 0.6], motor_speed=2.0 * limited.reference)[0] < 0.0
 
 
-def test_a_torque_limit_below_what_the_motion_takes_is_refused():
-    with pytest.raises(UsageError, match=r"limit is 0\.4 N m, steady motion takes 0\.5"):
-        replace(example.RANKED, controller=replace(example.SPEED_LOOP, torque_limit=0.4)).simulate()
-
-
 def test_a_slew_limit_bounds_the_slope_of_the_torque():
     limited = replace(example.SPEED_LOOP, slew_limit=2.0)
     found = simulate_impact(
@@ -158,3 +146,15 @@ def test_a_slew_limit_bounds_the_slope_of_the_torque():
         duration=0.05,
     )
     assert np.max(np.diff(free.motor_torque) / np.diff(free.time)) > 20.0
+
+
+def test_constants_that_are_far_apart_are_an_error_and_no_endless_work(monkeypatch):
+    monkeypatch.setattr("cdtool.impact.effort.MOST_EVALUATIONS", 10_000)
+    sticky = RigidTransmission(1e-4, 1e4, 0.01)
+    with pytest.raises(UsageError, match="far quicker"):
+        simulate_impact(sticky, ConstantTorque(1.0), HuntCrossley(1e5, 0.0), Start(gap=1e-3), duration=10.0)
+
+
+def test_a_torque_limit_below_what_the_motion_takes_is_refused():
+    with pytest.raises(UsageError, match=r"limit is 0\.4 N m, steady motion takes 0\.5"):
+        replace(example.RANKED, controller=replace(example.SPEED_LOOP, torque_limit=0.4)).simulate()

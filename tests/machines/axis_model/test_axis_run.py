@@ -57,20 +57,6 @@ def test_nothing_is_interpolated_across_a_gap() -> None:
     assert run.known("speed").all()
 
 
-def test_a_missing_sample_is_not_a_gap() -> None:
-    clock = np.arange(1000) * 1e-3
-    recording = Log(clock, clock).recording()
-    values = recording["torque"].values[:, 0].copy()
-    values[500] = np.nan
-    with_hole = Recording("log", "log", ("axis",), {**recording.channels, "torque": Series(clock, values, "N")})
-    assert axis_run(with_hole).known("torque").all()
-
-
-def test_a_channel_that_was_not_logged_is_known_nowhere() -> None:
-    clock = np.arange(100) * 1e-3
-    assert not axis_run(Log(clock, clock).recording()).known("position").any()
-
-
 @pytest.mark.parametrize(
     ("channels", "message"),
     [
@@ -84,8 +70,3 @@ def test_the_missing_channel_is_named(channels: tuple[str, ...], message: str) -
     part = Recording("log", "log", ("axis",), {name: whole[name] for name in channels})
     with pytest.raises(RecordingError, match=message):
         axis_run(part)
-
-
-def test_channels_without_common_time_are_no_run() -> None:
-    with pytest.raises(RecordingError, match="0 samples in common"):
-        axis_run(Log(np.arange(100) * 1e-3, 10.0 + np.arange(100) * 1e-3).recording())

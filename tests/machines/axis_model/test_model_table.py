@@ -91,19 +91,6 @@ def test_a_wrong_key_is_named(tmp_path: Path, more: str, message: str) -> None:
         read(tmp_path, f"{GATE}\n{more}\n")
 
 
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ("[model.controller]\nspeed_gain = 4300", "model.controller.period is missing"),
-        ("[model.drive]\nmotor_mass = 100", "are both given"),
-    ],
-)
-def test_values_that_make_no_model_are_refused(tmp_path: Path, more: str, message: str) -> None:
-    file = read(tmp_path, f"{GATE}\n{more}\n")
-    with pytest.raises(ConfigurationError, match=message):
-        axis_model(file.machine, file.model)  # type: ignore[arg-type]
-
-
 def test_load_coordinates_may_give_the_motors_share(tmp_path: Path) -> None:
     text = """
 [machine]
@@ -119,20 +106,14 @@ stiffness = 8e4
     assert (drive.motor_mass, drive.load_mass) == (534.0, 620.0)
 
 
-LOAD_SIDE = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 95\n'
-
-
 @pytest.mark.parametrize(
-    ("text", "is_known"),
+    ("more", "message"),
     [
-        (LOAD_SIDE, True),
-        (f"{LOAD_SIDE}[model.drive]\nrigid = true\n", True),
-        (f"{LOAD_SIDE}[model.drive]\nmotor_mass = 30\n", False),
-        (f"{LOAD_SIDE}[model.drive]\nmotor_mass = 30\nstiffness = 8e4\n", False),
-        (GATE, False),
-        (f"{GATE}[model.drive]\nrigid = true\n", True),
+        ("[model.controller]\nspeed_gain = 4300", "model.controller.period is missing"),
+        ("[model.drive]\nmotor_mass = 100", "are both given"),
     ],
 )
-def test_an_axis_of_one_mass_that_logs_its_load_is_rigid(tmp_path: Path, text: str, is_known: bool) -> None:
-    file = read(tmp_path, text)
-    assert bool(axis_model(file.machine, file.model).drive.stated_rigid) is is_known  # type: ignore[arg-type]
+def test_values_that_make_no_model_are_refused(tmp_path: Path, more: str, message: str) -> None:
+    file = read(tmp_path, f"{GATE}\n{more}\n")
+    with pytest.raises(ConfigurationError, match=message):
+        axis_model(file.machine, file.model)  # type: ignore[arg-type]

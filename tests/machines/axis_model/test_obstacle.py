@@ -9,11 +9,6 @@ from cdtool.base.errors import ConfigurationError
 from cdtool.machines.axis_model.obstacle import Obstacle
 
 
-def test_a_spring_in_series_with_a_load_cell_has_the_stiffness_of_both() -> None:
-    obstacle = Obstacle.spring(2e4, series_stiffness=5e4)
-    assert obstacle.steepest == pytest.approx(1.0 / (1.0 / 2e4 + 1.0 / 5e4))
-
-
 def test_the_series_stiffness_widens_each_point_by_its_force() -> None:
     obstacle = Obstacle((0.0, 0.01, 0.03), (0.0, 100.0, 120.0), series_stiffness=1e4)
     np.testing.assert_allclose(obstacle.penetration_curve, [[0.0, 0.02, 0.042], [0.0, 100.0, 120.0]])
@@ -37,9 +32,3 @@ def test_a_curve_that_is_not_a_force_curve_is_refused(
 ) -> None:
     with pytest.raises(ConfigurationError, match=message):
         Obstacle(deflection, force)
-
-
-@pytest.mark.parametrize("stiffness", [0.0, -1.0, float("inf"), float("nan")])
-def test_a_spring_needs_a_stiffness(stiffness: float) -> None:
-    with pytest.raises(ConfigurationError, match="stiffness"):
-        Obstacle.spring(stiffness)

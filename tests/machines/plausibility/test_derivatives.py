@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.machines.plausibility import derivatives
-from cdtool.machines.plausibility.derivatives import units_apart
 from cdtool.recordings.recording import Recording, Series
 
 TIME = np.arange(0.0, 10.0, 2e-3)
@@ -85,13 +82,6 @@ def test_a_coordinate_of_a_tool_is_no_speed_although_it_follows_one():
     assert contradictions(tool)["speed", ""].numbers["found"] == "still"
 
 
-def test_a_channel_that_the_machine_file_confirms_is_not_checked():
-    wrong = stroke(speed=-1.0)
-    confirmed = replace(wrong, findings=(Finding("confirmed", "speed"),))
-    assert list(contradictions(wrong)) == [("speed", "")]
-    assert list(contradictions(confirmed)) == [("acceleration", "")]
-
-
 @pytest.mark.parametrize("quantum", [0.0, 1e-4])
 @pytest.mark.parametrize("offset", [0.0, 2e-3])
 @pytest.mark.parametrize("seed", range(3))
@@ -127,22 +117,3 @@ def test_columns_of_two_joints_in_the_wrong_order_are_named():
         ("speed", "shoulder"): "elbow",
         ("speed", "elbow"): "shoulder",
     }
-
-
-def test_leaps_gaps_and_impacts_of_a_minority_change_nothing():
-    recording, rng = stroke(), np.random.default_rng(2)
-    channels = dict(recording.channels)
-    for name, series in channels.items():
-        values = series.values.copy()
-        for start in rng.integers(0, 5900, 6):
-            values[start : start + 40] = np.nan if name == "speed" else values[start] + 3.0
-        channels[name] = Series(series.time, values, series.unit)
-    assert not contradictions(replace(recording, channels=channels))
-
-
-@pytest.mark.parametrize(
-    ("ratio", "units"),
-    [(1000.0, "mm and m, or ms and s"), (1e-3, "mm and m, or ms and s"), (60.0, "min and s"), (3.0, ""), (0.0, "")],
-)
-def test_a_factor_names_the_nearest_units(ratio, units):
-    assert units_apart(ratio) == units

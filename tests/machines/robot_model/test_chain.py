@@ -11,8 +11,7 @@ from cdtool.base.errors import ConfigurationError
 from cdtool.machines.axis_model.model_table import ModelTable
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
-from cdtool.machines.robot_model.chain_kernel import solve_in_place
-from cdtool.machines.robot_model.parameters import largest_rate, point_in_joint, robot_model
+from cdtool.machines.robot_model.parameters import point_in_joint, robot_model
 from cdtool.machines.robot_model.simulation import inertia_with_rigid_motors
 from tests.synthetic.robots import six_joint_robot
 
@@ -71,25 +70,6 @@ def test_levers_are_those_of_the_jacobian_and_the_derivative_of_the_place(tmp_pa
         assert moved - place == pytest.approx(float(lever @ step), abs=1e-11)
 
 
-def test_an_index_names_the_link_of_a_joint_of_the_log(tmp_path: Path) -> None:
-    model = robot_model(six_joint_robot(tmp_path, SHUFFLED), None)
-    assert [model.link(index).name for index in range(6)] == ["link2", "link1", "link3", "link6", "link5", "link4"]
-    for wrong, message in ((6, "no joint 6"), ("link7", "unknown link"), ("base", "does not move")):
-        with pytest.raises(ConfigurationError, match=message):
-            model.link(wrong)
-
-
-def test_motor_inertia_may_be_a_share_of_the_links() -> None:
-    values = {key: value for key, value in ARM.items() if key not in ("motor_inertia", "transmission_ratio")}
-    machine = PlanarArm.of({**values, "coordinates": "load"})
-    table = ModelTable({"drive": {"motor_mass": (0.02, 0.01), "stiffness": (400.0, 400.0)}})
-    model = robot_model(machine, table)
-    matrix, _ = model.dynamics(np.zeros(2), np.zeros(2))
-    expected = machine.inertia_matrix(np.zeros((1, 2)))[0] - np.diag([0.02, 0.01])
-    np.testing.assert_allclose(matrix, expected, atol=1e-12)
-    assert model.axes[0].drive.motor_mass == 0.02
-
-
 @pytest.mark.parametrize(
     ("sections", "message"),
     [
@@ -102,20 +82,3 @@ def test_motor_inertia_may_be_a_share_of_the_links() -> None:
 def test_a_wrong_model_names_its_key(sections: dict[str, dict[str, tuple[float, ...]]], message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
         robot_model(planar_arm(), ModelTable(sections))
-
-
-def test_the_solver_solves_and_returns_nan_without_a_positive_definite_inertia() -> None:
-    rng = np.random.default_rng(3)
-    root, vector = rng.normal(size=(5, 5)), rng.normal(size=5)
-    matrix = root @ root.T + np.eye(5)
-    solution = vector.copy()
-    solve_in_place(matrix.copy(), solution)
-    np.testing.assert_allclose(matrix @ solution, vector, atol=1e-12)
-    solution = vector.copy()
-    solve_in_place(-matrix, solution)
-    assert np.isnan(solution).all()
-
-
-def test_the_largest_rate_is_that_of_the_fastest_decay() -> None:
-    assert largest_rate(np.diag([2.0, 5.0]), [4.0, 5.0]) == pytest.approx(2.0)
-    assert largest_rate(np.eye(2), [0.0, 0.0]) == 0.0

@@ -14,9 +14,8 @@ from cdtool.commands.simulate.arm_model import ArmStroke, integrate_arm
 from cdtool.commands.simulate.arm_parameters import ArmParameters
 from cdtool.machines.axis_model.model_table import Bristle, ModelTable
 from cdtool.machines.axis_model.obstacle import Obstacle
-from cdtool.machines.axis_model.parameters import ElasticDrive
 from cdtool.machines.robot_model.parameters import RobotModel, point_in_joint, robot_model
-from cdtool.machines.robot_model.simulation import PointContact, RobotInputs, simulate_robot, substeps, wind_up_at
+from cdtool.machines.robot_model.simulation import PointContact, RobotInputs, simulate_robot, substeps
 from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
 from tests.machines.robot_model.test_chain import planar_arm
 from tests.synthetic.robots import six_joint_robot
@@ -80,17 +79,6 @@ def test_energy_is_conserved_without_friction_and_drive(tmp_path: Path) -> None:
     assert np.ptp((kinetic + potential)[1:]) < 1e-6 * np.max(kinetic)
 
 
-def test_a_robot_at_rest_stays_there_rigid_or_elastic(tmp_path: Path) -> None:
-    pose = np.array([0.3, -0.4, 0.5, 0.1, 0.2, -0.6])
-    for drive in ({}, {"stiffness": (2e4,) * 6, "damping": (20.0,) * 6}):
-        motion = simulate_robot(frictionless(tmp_path, drive=drive), resting(300, pose))
-        np.testing.assert_allclose(motion["motor_position"], np.tile(pose, (300, 1)), atol=1e-6)
-        load = six_joint_robot(tmp_path).gravity(motion["link_position"][:1])[0]
-        np.testing.assert_allclose(motion["drive_torque"][0], load, atol=1e-6)
-        if drive:
-            np.testing.assert_allclose(motion["wind_up"][-1], load / 2e4, rtol=1e-4, atol=1e-9)
-
-
 def test_a_static_contact_loads_every_joint_with_its_lever(tmp_path: Path) -> None:
     """The joints, held by stiff integrating controllers, carry J' F in the end (thesis 2.5)."""
     gains = {"period": (0.001,) * 6, "speed_gain": (100.0,) * 6, "integral_gain": (200.0,) * 6}
@@ -130,13 +118,6 @@ def test_a_bristle_holds_a_joint_that_a_smooth_sign_lets_creep() -> None:
     assert crept > 1e-3
 
 
-def test_the_wind_up_has_the_torque_of_the_drive_in_both_directions() -> None:
-    drive = ElasticDrive(motor_mass=0.1, load_mass=0.2, stiffness=440.0, take_up_travel=0.003, end_stiffness=800.0)
-    assert wind_up_at(drive, 0.88) == pytest.approx(0.002)
-    assert wind_up_at(drive, -(1.32 + 1.6)) == pytest.approx(-0.005)
-    assert wind_up_at(ElasticDrive(load_mass=0.2), 5.0) == 0.0
-
-
 def test_what_cannot_be_simulated_is_an_error() -> None:
     bare = robot_model(planar_arm(), None)
     with pytest.raises(ConfigurationError, match="no controller"):
@@ -145,13 +126,3 @@ def test_what_cannot_be_simulated_is_an_error() -> None:
     contact = PointContact(0, (0.28, 0.0, 0.0), (0.0, 0.0, 1.0), Obstacle.spring(1e14))
     with pytest.raises(ConfigurationError, match="integration steps"):
         substeps(stiff, np.zeros((1, 2)), 1e-3, contact)
-
-
-def test_friction_that_nothing_states_is_smooth_enough_for_few_steps(tmp_path: Path) -> None:
-    machine = six_joint_robot(tmp_path, coulomb_friction=30.0, coulomb_slope=0.0)
-    loose = robot_model(machine, ModelTable({"controller": CONTROLLER}))
-    motion = simulate_robot(loose, resting(50, np.zeros(6)))
-    assert np.isfinite(motion.rows).all()
-    stated = ModelTable({"controller": CONTROLLER, "friction": {"smoothing_speed": (1e-7,) * 6}})
-    with pytest.raises(ConfigurationError, match="smoothing_speed"):
-        simulate_robot(robot_model(machine, stated), resting(50, np.zeros(6)))

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from cdtool.results.curves.amoc import amoc_curves, rate_unit
-from cdtool.results.curves.sweep import MULTIPLES
+from cdtool.results.curves.amoc import amoc_curves
 from cdtool.results.results import Results
 from tests.results.sweeps import CONTACTS, FACTOR, swept
 
@@ -29,32 +28,10 @@ def test_rates_are_false_alarms_per_monitored_hour():
     assert curve.at_most == pytest.approx(-math.log(0.05) / 0.1)
 
 
-def test_rates_are_per_operation_where_the_budget_is():
-    results = of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms), false_alarm_budget="1/1000op")
-    (curve,) = amoc_curves(results)
-    assert curve.per == "operation"
-    assert curve.rate(curve.points[0]) == pytest.approx(8 / 40)
-    assert curve.at_most == pytest.approx(-math.log(0.05) / 40)
-
-
-@pytest.mark.parametrize(
-    ("budget", "unit"), [("0.1/h", "hour"), ("1/1000op", "operation"), (None, "hour"), ("?", "hour")]
-)
-def test_the_unit_is_the_budgets_else_hours(budget, unit):
-    assert rate_unit(of(false_alarm_budget=budget)) == unit
-
-
 def test_the_point_in_use_has_the_factor_that_is_set():
     (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms)))
     assert curve.set_point.safety_factor == pytest.approx(FACTOR)
     assert curve.set_point.median == pytest.approx(60.0)
-
-
-def test_points_are_in_the_order_of_the_factor_whatever_the_order_of_the_rows():
-    rows = swept("momentum", "stiff", lambda m: 60.0 * m, alarms)
-    assert amoc_curves(of(*rows)) == amoc_curves(of(*reversed(rows)))
-    factors = [point.safety_factor for point in amoc_curves(of(*rows))[0].points]
-    assert factors == sorted(factors) and len(factors) == len(MULTIPLES)
 
 
 def test_an_unreached_median_is_infinite_and_one_without_contacts_is_missing():
@@ -64,10 +41,3 @@ def test_an_unreached_median_is_infinite_and_one_without_contacts_is_missing():
     (curve,) = amoc_curves(of(*blind))
     assert all(math.isnan(point.median) for point in curve.points)
     assert curve.not_assessable == CONTACTS
-
-
-def test_a_detector_not_assessable_in_the_hold_out_has_no_curve():
-    seen = swept("momentum", "stiff", lambda m: 60.0 * m, alarms)
-    blind = swept("direct", "stiff", lambda m: 60.0 * m, lambda _: 0, hours=0.0)
-    assert [curve.detector for curve in amoc_curves(of(*seen, *blind))] == ["momentum"]
-    assert amoc_curves(of()) == ()

@@ -34,27 +34,8 @@ def test_a_missed_contact_keeps_the_curve_above_zero_until_its_censoring():
     assert (curve.end, curve.detected) == (300.0, 2)
 
 
-def test_not_assessable_contacts_are_counted_and_change_nothing():
-    seen = [row("direct", late) for late in (10.0, 20.0)]
-    (without,), (curve,) = survival_curves(of(*seen)), survival_curves(of(*seen, row("direct", None, "not_assessable")))
-    assert np.array_equal(curve.curve.share, without.curve.share)
-    assert (curve.contacts, curve.not_assessable) == (3, 1)
-
-
-def test_where_nothing_could_be_assessed_the_curve_is_its_beginning():
-    (curve,) = survival_curves(of(row("direct", None, "not_assessable")))
-    assert curve.curve.times.tolist() == [0.0]
-    assert (curve.end, curve.detected, curve.not_assessable) == (0.0, 0, 1)
-
-
 def test_the_median_of_the_summary_is_where_the_curve_passes_a_half():
     late = np.array([12.0, 31.0, 45.0, 46.0, 80.0])
     (curve,) = survival_curves(of(*(row("momentum", float(x)) for x in late)))
     at = curve.curve.times[np.flatnonzero(curve.curve.share <= 0.5)[0]]
     assert at == latency_quantile(late, np.zeros(5, bool), 0.5).value
-
-
-def test_curves_come_in_the_order_of_the_file_and_groups_without_contacts_have_none():
-    found = survival_curves(of(row("momentum", 5.0), row("direct", 6.0)))
-    assert [(curve.group, curve.detector) for curve in found] == [("stiff", "direct"), ("stiff", "momentum")]
-    assert survival_curves(of()) == ()

@@ -6,19 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import UsageError
-from cdtool.detectors.detection import Band, Status, Verdict
 from cdtool.recordings.recording import Contact
 from cdtool.results.curves.false_alarm_budget import Budget, set_factor
-from cdtool.results.curves.sweep import MULTIPLES, critical_factor, highest_held, sweep
+from cdtool.results.curves.sweep import MULTIPLES, critical_factor, sweep
 from cdtool.thresholds.limit import FittedLimit
 from cdtool.truth.matching import match
-from tests.results.detections import ACTIVATION, OPERATION, detection
+from tests.results.detections import ACTIVATION, detection
 
 
 @pytest.mark.parametrize(
@@ -110,14 +106,6 @@ def test_too_small_an_exposure_is_refused_with_the_missing_amount():
         set_factor(Budget(1e-3, "operation"), "d", [detection(seed) for seed in range(20)], ACTIVATION)
 
 
-def test_unassessable_operations_do_not_count_as_exposure():
-    runs = [detection(seed) for seed in range(12)]
-    status = np.full_like(runs[0].statistic.status, Status.NOT_APPLICABLE)
-    blind = replace(runs[0], statistic=replace(runs[0].statistic, status=status))
-    with pytest.raises(UsageError, match="11 were assessable"):
-        set_factor(Budget(1 / 13, "operation"), "d", [blind, *runs[1:]], ACTIVATION)
-
-
 def test_limits_without_spread_cannot_be_set():
     stuck = FittedLimit((0.0,), (0.0,), (0.0,), (0.0,), safety_factor=3.0)
     runs = []
@@ -127,14 +115,6 @@ def test_limits_without_spread_cannot_be_set():
         runs.append(replace(found, judgement=replace(found.judgement, thresholds=(stuck,))))
     with pytest.raises(UsageError, match="no spread"):
         set_factor(Budget(0.5, "operation"), "d", runs, ACTIVATION)
-
-
-def test_a_detection_without_a_threshold_never_alarms():
-    statistic = detection(0).statistic
-    nothing = np.full(statistic.values.shape, np.nan)
-    blind = Detection(OPERATION, "d", statistic, Band(nothing, nothing), Verdict("not_assessable"))
-    swept = sweep(blind, [Contact(3.0, 3.1, 0.0)], ACTIVATION, 1.0, MULTIPLES)
-    assert not swept.false_alarms.any() and np.isnan(swept.latency).all()
 
 
 def test_a_budget_states_the_missing_amount_with_all_digits():
@@ -151,17 +131,6 @@ def test_a_budget_states_the_missing_amount_with_all_digits():
     ]
 
 
-@given(
-    st.lists(st.integers(-3, 6), max_size=40).map(lambda values: np.array(values, dtype=np.float64)),
-    st.integers(1, 5),
-    st.integers(1, 5),
-)
-def test_the_highest_value_that_is_held_is_that_of_all_windows(values, debounce, later):
-    needed = np.where(np.arange(len(values)) < 20, debounce, later).astype(np.int64)
-    held = [values[k - n + 1 : k + 1].min() for k, n in enumerate(needed) if k + 1 >= n]
-    assert highest_held(values, needed) == max(held, default=-np.inf)
-
-
 def test_a_budget_with_a_confidence_is_met_that_often():
     """The rate above the c-th largest of n is distributed as beta(c, n + 1 - c)."""
     budget = Budget.parse("1/20op at 90%")
@@ -174,15 +143,15 @@ def test_a_budget_with_a_confidence_is_met_that_often():
     assert budget.needed == 45.0 and budget.allowed(45.0) == 0 and budget.allowed(44.0) == -1
 
 
-def test_a_budget_by_hours_with_a_confidence_allows_fewer_alarms():
-    budget = Budget.parse("0.1/h at 95%")
-    assert budget.needed == pytest.approx(29.957, abs=1e-3)
-    assert (budget.allowed(29.9), budget.allowed(30.0), Budget.parse("0.1/h").allowed(30.0)) == (-1, 0, 2)
-    assert budget.allowed(200.0) < Budget.parse("0.1/h").allowed(200.0)
-
-
 @pytest.mark.parametrize("text", ["1/100op at 20%", "1/100op at 100%", "1/100op at", "1/100op at x%", "3/op at 95%"])
 def test_a_wrong_confidence_is_refused(text):
     with pytest.raises(UsageError, match="false-alarm budget is"):
         Budget.parse(text)
     assert str(Budget.parse("1/100op at 95%")) == "1/100op at 95%"
+
+
+def test_a_budget_by_hours_with_a_confidence_allows_fewer_alarms():
+    budget = Budget.parse("0.1/h at 95%")
+    assert budget.needed == pytest.approx(29.957, abs=1e-3)
+    assert (budget.allowed(29.9), budget.allowed(30.0), Budget.parse("0.1/h").allowed(30.0)) == (-1, 0, 2)
+    assert budget.allowed(200.0) < Budget.parse("0.1/h").allowed(200.0)

@@ -19,7 +19,7 @@ from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording
 from cdtool.report.explanation_words import words
-from cdtool.results.explanation.departure import STAYED, departures
+from cdtool.results.explanation.departure import departures
 from cdtool.results.explanation.explanation import Explainer, Explanation
 from cdtool.results.explanation.glitch import glitches
 from cdtool.thresholds.limit import Limit
@@ -98,14 +98,6 @@ def test_a_joint_that_is_stopped_has_left_its_normal_band(arm):
     assert not any("speed of arm" in line or "torque" in line.split("forearm")[0] for line in stayed)
 
 
-def test_every_channel_outside_its_band_is_listed_with_value_mean_spread_and_unit(gate):
-    item = explained("gate", log("gate", "stiff/03.csv"), gate, 300.0)
-    first = next(found for found in item.departed if found.channel == "acceleration")
-    assert first.unit == "m/s2" and abs(first.value - first.mean) > 6.0 * first.spread > 0.0
-    line = next(line for line in words(item) if line.startswith("Moved first"))
-    assert f"against {first.mean:.4g} +- {first.spread:.4g} m/s2" in line
-
-
 def test_a_glitch_of_sixty_revolutions_a_minute_that_alone_raised_the_alarm_is_named(gate):
     clean = log("gate", "holdout/03.csv")
     height = -60.0 * 2.0 * np.pi / 60.0 * 1.333e-3  # 60 rpm of the motor, on the load side
@@ -115,15 +107,6 @@ def test_a_glitch_of_sixty_revolutions_a_minute_that_alone_raised_the_alarm_is_n
     assert (found.kind, found.channel, found.joint, found.samples) == ("spike", "speed", "gate", 6)
     assert found.start == pytest.approx(4.0, abs=3e-3) and found.size == pytest.approx(height, rel=0.15)
     assert "Spike of speed of gate: -0.008" in " ".join(words(item))
-
-
-@pytest.mark.parametrize("length", [1, 2, 5, 25])
-def test_a_spike_of_any_length_is_not_a_departure_of_another_channel(gate, length):
-    item = explained(
-        "gate", glitch(log("gate", "holdout/03.csv"), -0.05, 4.0, 1e-3 * length), gate, 255.0, "momentum", Activation(1)
-    )
-    assert [(found.kind, found.channel) for found in item.glitches] == [("spike", "speed")]
-    assert {found.channel for found in item.departed if not math.isnan(found.time)} <= {"speed"}
 
 
 def test_a_pulse_that_other_channels_answer_is_not_called_a_glitch(gate):
@@ -195,19 +178,6 @@ def test_in_impact_free_runs_glitches_and_departures_are_hardly_ever_named(gate)
     assert looks > 250 and departed == 0 and named <= 2
 
 
-def test_a_channel_that_stayed_is_listed_with_its_numbers(gate):
-    item = explained("gate", glitch(log("gate", "holdout/03.csv"), -0.02), gate, 255.0, activation=Activation(2))
-    torque = next(found for found in item.departed if found.channel == "torque")
-    assert torque.reason == STAYED and math.isnan(torque.time)
-    assert abs(torque.value - torque.mean) < 6.0 * torque.spread
-
-
-def test_a_torque_that_is_off_from_the_start_is_named_as_such(gate):
-    clean = changed(log("gate", "holdout/03.csv"), "torque", lambda _, values: values + 150.0)
-    item = explained("gate", glitch(clean, -0.05), gate, 500.0, activation=Activation(2))
-    assert any(line.startswith("Outside since before: torque (farthest ") for line in words(item))
-
-
 @pytest.mark.parametrize(
     ("absent", "told"),
     [
@@ -225,14 +195,13 @@ def test_without_impact_free_runs_the_comparison_and_its_reason_are_stated(absen
     assert "normal" not in text and "learn" in text.partition("No impact-free runs to compare with")[2]
 
 
-def test_a_drifting_speed_within_its_band_departs_after_the_contact(gate):
-    # The speed deviates by up to half of its limit for 60 ms before this contact, and falls 35 ms after it.
-    item = explained("gate", log("gate", "stiff/04.csv"), gate, 300.0)
-    speed = next(each for each in item.departed if each.channel == "speed")
-    assert 0.03 <= speed.time - 5.939 <= 0.07
-
-
 def test_a_stroke_at_another_speed_is_not_compared_with_a_learned_class(gate):
     (operation,) = operations_of(log("gate", "stiff/03.csv"))
     motion = replace(operation.motion, nominal_speed=0.5)
     assert gate.of(operation.recording, motion) is Absence.NO_CLASS
+
+
+def test_a_torque_that_is_off_from_the_start_is_named_as_such(gate):
+    clean = changed(log("gate", "holdout/03.csv"), "torque", lambda _, values: values + 150.0)
+    item = explained("gate", glitch(clean, -0.05), gate, 500.0, activation=Activation(2))
+    assert any(line.startswith("Outside since before: torque (farthest ") for line in words(item))

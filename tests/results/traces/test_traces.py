@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import gzip
 from dataclasses import replace
-from itertools import cycle
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
 from cdtool.recordings.recording import Contact, Series
@@ -54,16 +51,6 @@ def test_a_trace_is_rounded_within_a_pixel_and_comes_back_from_its_file_as_it_wa
     np.testing.assert_allclose(panel.course.value, every, atol=1e-4 * np.ptp(every))
 
 
-@pytest.mark.parametrize("last", [9_999.0, 86_400.0, 3e7])
-def test_a_trace_of_a_recording_of_hours_can_be_read(tmp_path, last):
-    kept = trace()
-    course = replace(kept.panels[0].course, time=np.append(kept.panels[0].course.time[:-1], kept.start + last))
-    long = replace(kept, end=kept.start + last, panels=(replace(kept.panels[0], course=course),))
-    path = tmp_path / "results.traces.json.gz"
-    path.write_bytes(encode_traces([long]))
-    assert every_value(read_traces(path)) == every_value((long,))
-
-
 @pytest.mark.parametrize("scale", [1e-300, 1e-12, 1.0, 1e300])
 def test_rounded_values_above_a_limit_stay_above_it_and_a_missing_limit_stays_missing(scale):
     value, upper = scale * np.random.default_rng(2).normal(1.0, 1e-3, (2, 500))
@@ -106,43 +93,3 @@ def test_all_missed_the_slowest_and_a_sample_are_kept_in_order():
     slowest = sorted(range(3000), key=lambda i: -(i % 997))[:3]
     assert set(slowest) <= set(numbers)
     assert sum(why == "evenly sampled from all" for why in kept.values()) == 20
-
-
-def test_misses_beyond_the_maximum_are_counted():
-    choice = TraceChoice(500)
-    for number in range(500):
-        choice.offer(number, "stiff", 1, "missed by gm", 0.0)
-    assert len(choice.kept()) <= MOST_KEPT and choice.left_out == 500 - 70
-
-
-OPERATIONS = st.lists(
-    st.tuples(
-        st.sampled_from(["stiff", "soft"]),
-        st.integers(1, 3),
-        st.sampled_from(["", "", "", "missed by gm"]),
-        st.sampled_from([0.0, 0.01, 0.02, 0.03, 0.5]),
-    ),
-    max_size=300,
-)
-
-
-@given(OPERATIONS, st.integers(0, 20), st.integers(1, 3), st.lists(st.integers(1, 9), min_size=1))
-def test_what_a_choice_keeps_was_wanted_by_every_state_of_it_with_fewer_operations(operations, behind, of_a_log, sizes):
-    """A worker decides for the logs of a piece from the state some pieces before: no trace that is kept is missing."""
-    logs = [operations[i : i + of_a_log] for i in range(0, len(operations), of_a_log)]
-    choice, states, wanted = TraceChoice(len(logs)), [], set()
-    first = number = 0
-    for size in cycle(sizes):
-        states.append(choice.copy())
-        early = states[max(0, len(states) - 1 - behind)].copy()
-        for log in range(first, min(first + size, len(logs))):
-            for operation in logs[log]:
-                was_wanted = early.offer(log, *operation) is not None
-                if choice.offer(log, *operation) is not None:
-                    assert was_wanted
-                wanted |= {number} if was_wanted else set()
-                number += 1
-        first += size
-        if first >= len(logs):
-            break
-    assert number == len(operations) and set(choice.kept()) <= wanted

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.identify.axis.excitation import Excitation, distinct_speeds, measure_excitation
+from cdtool.commands.identify.axis.excitation import Excitation, measure_excitation
 from cdtool.commands.identify.axis.filtered_regression import filter_run
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, identify_rigid_axis
 from cdtool.commands.identify.estimate import Missing
@@ -39,48 +38,6 @@ def stroke(speed: float, seconds: float = 4.0, acceleration: float = 1.0) -> Flo
 def test_the_held_speeds_are_found(speeds):
     excitation = excitation_of(*(stroke(speed) for speed in speeds))
     assert excitation.speeds == pytest.approx(speeds, rel=0.01)
-
-
-def test_a_short_ramp_is_not_a_second_speed():
-    assert len(excitation_of(stroke(0.2, seconds=7.0, acceleration=0.2)).speeds) == 1
-
-
-def test_a_sine_holds_many_speeds():
-    time = np.arange(10_000) * PERIOD
-    excitation = excitation_of(0.3 * np.sin(2.0 * math.pi * 0.4 * time))
-    assert len(excitation.speeds) >= 3
-    assert excitation.forward_share == pytest.approx(0.5, abs=0.02)
-    assert excitation.is_accelerated and not excitation.is_one_way
-
-
-def test_one_direction_and_hardly_any_acceleration_are_missing():
-    excitation = excitation_of(np.full(5000, -0.2), noise=1e-3)
-    assert excitation.is_one_way
-    assert not excitation.is_accelerated
-
-
-def test_acceleration_above_its_noise_is_enough():
-    excitation = excitation_of(stroke(0.2), stroke(-0.2), noise=1e-4)
-    assert excitation.is_accelerated and not excitation.is_one_way
-    assert excitation.moving_time == pytest.approx(8.8, rel=0.05)
-
-
-def test_standstill_excites_nothing():
-    excitation = excitation_of(np.zeros(2000), noise=1e-4)
-    assert excitation.moving_time < 0.1
-    assert not excitation.is_accelerated
-    assert measure_excitation([]).speeds == ()
-
-
-def test_speeds_that_are_close_are_one():
-    speeds = np.repeat([0.100, 0.108, 0.2], 100)
-    held = distinct_speeds(speeds, np.full(300, 1.0 / 300.0))
-    assert held == pytest.approx((0.104, 0.2), rel=0.01)
-
-
-def test_a_speed_for_a_short_time_is_not_held():
-    speeds = np.concatenate((np.full(97, 0.1), np.full(3, 0.3)))
-    assert distinct_speeds(speeds, np.full(100, 0.01)) == pytest.approx((0.1,))
 
 
 # An axis with a screw, as the simulated axis has it; its friction depends on the position, too.
@@ -164,3 +121,22 @@ def noisy(run: AxisRun) -> AxisRun:
     assert run.position is not None
     position = run.position + 2e-5 * np.random.default_rng(len(run)).standard_normal(len(run))
     return replace(run, position=position, speed=None, reference_speed=None)
+
+
+def test_standstill_excites_nothing():
+    excitation = excitation_of(np.zeros(2000), noise=1e-4)
+    assert excitation.moving_time < 0.1
+    assert not excitation.is_accelerated
+    assert measure_excitation([]).speeds == ()
+
+
+def test_acceleration_above_its_noise_is_enough():
+    excitation = excitation_of(stroke(0.2), stroke(-0.2), noise=1e-4)
+    assert excitation.is_accelerated and not excitation.is_one_way
+    assert excitation.moving_time == pytest.approx(8.8, rel=0.05)
+
+
+def test_one_direction_and_hardly_any_acceleration_are_missing():
+    excitation = excitation_of(np.full(5000, -0.2), noise=1e-3)
+    assert excitation.is_one_way
+    assert not excitation.is_accelerated

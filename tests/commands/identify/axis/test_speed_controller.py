@@ -8,15 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import cdtool
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.axis.speed_controller import (
     ControllerFit,
     ControllerKind,
-    ControllerSettings,
     identify_controller,
 )
 from cdtool.commands.identify.axis.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
@@ -25,7 +22,7 @@ from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_ru
 from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
-from cdtool.recordings.recording import Recording, Series
+from cdtool.recordings.recording import Recording
 from tests.data_folder import DATA, needs_data
 
 GATE = GateParameters()
@@ -137,33 +134,6 @@ def simulated(error: FloatArray, **values: float) -> FloatArray:
 # The kernel
 
 
-def test_the_integral_of_a_constant_error_is_a_ramp() -> None:
-    force = simulated(np.full(500, 0.1), speed_gain=1000.0, integral_gain=5000.0)
-    np.testing.assert_allclose(force, 100.0 + 0.5 * np.arange(500), rtol=1e-12)
-
-
-def test_a_lag_follows_a_step_exponentially() -> None:
-    error = np.concatenate((np.zeros(10), np.full(100, 0.1)))
-    force = simulated(error, speed_gain=1000.0, lag=0.02)
-    np.testing.assert_allclose(force[10:], 100.0 * (1.0 - np.exp(-np.arange(1, 101) / 20.0)), rtol=1e-12)
-
-
-def test_a_delay_is_a_shift_and_substeps_leave_a_proportional_controller_as_it_is() -> None:
-    error = np.sin(np.arange(300) / 20.0)
-    force = simulated(error, speed_gain=2.0, delay_samples=3.0, substeps=4.0)
-    np.testing.assert_allclose(force[3:], 2.0 * error[:-3], atol=1e-12)
-
-
-@pytest.mark.parametrize("loop", [Loop(), Loop(slew_limit=900.0), Loop(force_limit=6.0, slew_limit=2000.0)])
-def test_the_kernel_is_the_controller_in_plain_python(loop: Loop) -> None:
-    run = loop.run(1)
-    assert run.reference_speed is not None and run.speed is not None and run.reference_torque is not None
-    gains = {"speed_gain": loop.speed_gain, "integral_gain": loop.integral_gain, "anti_windup_rate": 8.0}
-    limits = {"slew_limit": loop.slew_limit, "force_limit": loop.force_limit}
-    force = simulated(run.reference_speed - run.speed, **gains, **limits)
-    np.testing.assert_allclose(force, run.reference_torque, atol=1e-9)
-
-
 # The simulated gate
 
 
@@ -190,78 +160,7 @@ def test_measured_torque_shows_the_gains_of_the_gate_within_their_standard_error
     assert fit.lag == pytest.approx(GATE.current_lag + GATE.torque_filter_time, rel=0.3)
 
 
-def test_the_computed_command_is_the_logged_one(runs: list[AxisRun]) -> None:
-    compared = identify_controller(runs[:3]).comparison
-    assert compared is not None and compared.is_command
-    assert len(compared.time) > 8000
-    assert np.max(np.abs(compared.measured - compared.computed)) < 1e-3
-
-
-def test_rounded_units_of_a_written_log_are_no_obstacle(tmp_path: Path) -> None:
-    folder = tmp_path / "gate"
-    cdtool.simulate_gate(folder, {"free": 3}, seed=3)
-    machine_file = read_machine_file(folder / "machine.toml")
-    fit = identify_controller(
-        [axis_run(cdtool.read(file, machine_file)) for file in sorted((folder / "free").iterdir())]
-    )
-    for key, value in TRUE.items():
-        assert fit.identified[key].value == pytest.approx(value, rel=5e-4)
-        assert deviation(fit.identified[key], value) < 3.0
-
-
-def test_the_torque_filter_separates_the_force_lag(runs: list[AxisRun]) -> None:
-    unknown = identify_controller(runs[:3])
-    assert missing(unknown, "force_lag").numbers["lag_s"] == pytest.approx(unknown.lag)
-    assert missing(unknown, "force_lag").missing == (Missing.TORQUE_FILTER,)
-    assert unknown.controller is not None and unknown.controller.force_lag == 0.0
-    known = identify_controller(runs[:3], ControllerSettings(torque_filter_time=GATE.torque_filter_time))
-    assert deviation(known.identified["force_lag"], GATE.current_lag) < 3.0
-    assert known.controller is not None and known.controller.force_lag == known.identified["force_lag"].value
-
-
-def test_a_gap_in_the_speed_costs_little(runs: list[AxisRun]) -> None:
-    gapped = []
-    for number, run in enumerate(runs[:3]):
-        assert run.speed is not None
-        speed = run.speed.copy()
-        speed[600 + 100 * number : 660 + 100 * number] = np.nan
-        gapped.append(replace(run, speed=speed))
-    fit = identify_controller(gapped)
-    for key, value in TRUE.items():
-        assert fit.identified[key].value == pytest.approx(value, rel=0.01)
-
-
 # Logs that are not the controller's own channels: wrong by no more than what they state
-
-
-def resampled(recording: Recording, step: int) -> Recording:
-    channels = {
-        name: Series(series.time[::step], series.values[::step, 0], series.unit)
-        for name, series in recording.channels.items()
-    }
-    return replace(recording, channels=channels)
-
-
-@pytest.mark.parametrize("step", [4, 10, 50])
-def test_a_log_slower_than_its_controller_has_larger_standard_errors(gate: list[Recording], step: int) -> None:
-    fit = identify_controller([axis_run(resampled(recording, step)) for recording in gate[:4]])
-    for key in ("speed_gain", "integral_gain", "slew_limit"):
-        assert deviation(fit.identified[key], TRUE[key]) < 3.0
-    assert fit.identified["speed_gain"].relative_error > 1e-3
-
-
-def test_a_speed_with_jittered_stamps_has_larger_standard_errors(gate: list[Recording]) -> None:
-    rng = np.random.default_rng(5)
-    jittered = []
-    for recording in gate[:4]:
-        speed = recording["speed"]
-        time = speed.time + 4e-4 + rng.uniform(-3e-4, 3e-4, len(speed))
-        channels = {**recording.channels, "speed": Series(time, speed.values[:, 0], "m/s")}
-        jittered.append(axis_run(replace(recording, channels=channels)))
-    fit = identify_controller(jittered)
-    for key, value in TRUE.items():
-        assert key not in fit.identified or deviation(fit.identified[key], value) < 3.0
-    assert 1e-4 < fit.identified["speed_gain"].relative_error < 0.02
 
 
 def with_noisy_speed(run: AxisRun) -> AxisRun:
@@ -275,13 +174,6 @@ def test_noise_that_the_controller_never_saw_is_in_the_standard_errors(runs: lis
     assert abs(fit.identified["speed_gain"].value - GATE.speed_gain) > 100.0
     for key in ("speed_gain", "integral_gain"):
         assert deviation(fit.identified[key], TRUE[key]) < 3.0
-
-
-def test_a_noisy_speed_is_replaced_by_the_position_that_the_controller_used(runs: list[AxisRun]) -> None:
-    fit = identify_controller([with_noisy_speed(run) for run in runs[:3]])
-    assert fit.speed_from_position
-    for key, value in TRUE.items():
-        assert fit.identified[key].value == pytest.approx(value, rel=1e-4)
 
 
 def test_a_torque_feed_forward_is_not_counted_as_a_gain() -> None:
@@ -316,43 +208,12 @@ def test_the_data_choose_the_structure(loop: Loop, kind: ControllerKind) -> None
     assert fit.controller.position_gain == pytest.approx(loop.position_gain, rel=1e-6)
 
 
-@pytest.mark.parametrize("delay", [0, 1, 4])
-def test_a_delay_between_error_and_command_is_counted(delay: int) -> None:
-    fit = identify_controller([Loop(delay=delay).run(seed) for seed in range(2)])
-    assert fit.delay_samples == delay
-    assert fit.identified["delay"].value == pytest.approx(delay * 1e-3)
-    assert fit.identified["speed_gain"].value == pytest.approx(500.0, rel=1e-6)
-
-
 def test_a_force_limit_that_is_reached_is_identified_with_the_anti_windup() -> None:
     loop = Loop(force_limit=8.0, speed_gain=800.0)
     fit = identify_controller([loop.run(seed) for seed in range(3)])
     assert fit.identified["force_limit"].value == pytest.approx(8.0, rel=1e-6)
     assert fit.identified["anti_windup_rate"].value == pytest.approx(8.0, rel=1e-4)
     assert missing(fit, "slew_limit").missing == (Missing.SATURATION,)
-
-
-def test_a_controller_without_limits_leaves_its_anti_windup_unknown() -> None:
-    fit = identify_controller([Loop().run(seed) for seed in range(2)])
-    for key in ("anti_windup_rate", "slew_limit", "force_limit"):
-        assert missing(fit, key).missing == (Missing.SATURATION,)
-    assert fit.controller is not None
-    assert (fit.controller.slew_limit, fit.controller.anti_windup_rate) == (math.inf, 0.0)
-
-
-@settings(max_examples=8, deadline=None)
-@given(st.floats(10.0, 1e5), st.floats(1.0, 30.0), st.floats(1e-3, 1e3))
-def test_gains_of_any_size_are_identified_in_any_unit_of_force(gain: float, rate: float, unit: float) -> None:
-    run = Loop(speed_gain=gain * unit, integral_gain=gain * rate * unit).run(1, 1500)
-    fit = identify_controller([run])
-    assert fit.identified["speed_gain"].value == pytest.approx(gain * unit, rel=1e-5)
-    assert fit.identified["integral_gain"].value == pytest.approx(gain * rate * unit, rel=1e-4)
-
-
-def test_a_rotary_axis_has_its_own_units() -> None:
-    fit = identify_controller([Loop().run(1)], ControllerSettings(units=("N m", "rad")))
-    assert fit.identified["speed_gain"].unit == "N m s/rad"
-    assert fit.identified["integral_gain"].unit == "N m/rad"
 
 
 def test_the_standard_errors_cover_coloured_noise_of_the_torque() -> None:
@@ -401,26 +262,6 @@ def test_pulses_added_to_the_emps_command_are_not_counted_as_a_gain() -> None:
 # What cannot be identified
 
 
-def test_a_standstill_with_a_noisy_torque_shows_no_gains(runs: list[AxisRun]) -> None:
-    channels = ("torque", "speed", "position", "reference_speed")
-    still = [
-        replace(measured_only(run), **{channel: getattr(run, channel)[:290] for channel in channels})
-        for run in runs[:3]
-    ]
-    fit = identify_controller(still)
-    assert fit.controller is None
-    assert missing(fit, "speed_gain").missing == (Missing.ACCELERATION,)
-
-
-def test_references_of_another_motion_explain_nothing() -> None:
-    runs = [Loop().run(seed) for seed in range(3)]
-    turned = runs[1:] + runs[:1]
-    swapped = [replace(run, reference_speed=other.reference_speed) for run, other in zip(runs, turned, strict=True)]
-    fit = identify_controller(swapped)
-    assert fit.controller is None
-    assert missing(fit, "speed_gain").missing == (Missing.OTHER_CONTROLLER,)
-
-
 def test_a_log_without_references_is_refused(runs: list[AxisRun]) -> None:
     """At constant speed gains came out up to 7 standard errors wrong: what the reference did there is not known."""
     for channels in ({"reference_speed": None}, {"speed": None, "reference_speed": None}):
@@ -441,3 +282,19 @@ def test_runs_of_different_rates_and_no_runs_are_refused() -> None:
         identify_controller([])
     with pytest.raises(IdentificationError, match=r"0\.001 s, seed 2 every 0\.002 s"):
         identify_controller([Loop().run(1), Loop(period=2e-3).run(2)])
+
+
+def test_references_of_another_motion_explain_nothing() -> None:
+    runs = [Loop().run(seed) for seed in range(3)]
+    turned = runs[1:] + runs[:1]
+    swapped = [replace(run, reference_speed=other.reference_speed) for run, other in zip(runs, turned, strict=True)]
+    fit = identify_controller(swapped)
+    assert fit.controller is None
+    assert missing(fit, "speed_gain").missing == (Missing.OTHER_CONTROLLER,)
+
+
+def test_a_noisy_speed_is_replaced_by_the_position_that_the_controller_used(runs: list[AxisRun]) -> None:
+    fit = identify_controller([with_noisy_speed(run) for run in runs[:3]])
+    assert fit.speed_from_position
+    for key, value in TRUE.items():
+        assert fit.identified[key].value == pytest.approx(value, rel=1e-4)

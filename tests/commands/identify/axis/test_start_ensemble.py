@@ -42,22 +42,6 @@ def test_directions_and_speeds_are_ensembles_of_their_own_the_largest_first() ->
     assert found == [(3, 1, 0.2), (2, -1, 0.2), (1, 1, 0.1)]
 
 
-def test_each_stroke_of_a_long_run_is_a_start() -> None:
-    stroke = np.concatenate([ramp(1.0, 0.2), ramp(0.0, 0.2)[::-1][-250:] * 0.0])
-    (ensemble,) = start_ensembles([a_run(np.concatenate([stroke, np.zeros(400), stroke, np.zeros(400)]))])
-    assert ensemble.count == 2
-
-
-def test_a_run_that_begins_in_motion_has_no_start() -> None:
-    assert start_ensembles([a_run(np.full(2000, 0.2))]) == ()
-    assert start_ensembles([a_run(np.zeros(2000))]) == ()
-
-
-def test_one_run_has_no_deviation() -> None:
-    (ensemble,) = start_ensembles([a_run(ramp(1.0, 0.2))])
-    assert not np.any(ensemble.deviation["torque"])
-
-
 def test_a_start_with_a_long_gap_is_left_out() -> None:
     run = a_run(ramp(1.0, 0.2))
     torque = run.torque.copy()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.axis.filtered_regression import LagForm, TorqueLag, shifted
+from cdtool.commands.identify.axis.filtered_regression import LagForm, TorqueLag
 from cdtool.commands.identify.axis.rigid_axis import (
     RigidAxisSettings,
     identify_rigid_axis,
@@ -67,33 +67,6 @@ def test_an_axis_whose_torque_does_not_lag_shows_no_lag(runs):
     for free in (runs, simulated(4, noise=20.0), simulated(5, speeds=(0.2, 0.2)), gate_runs(3)):
         fit = identify_rigid_axis(free, 0.0, QUICK)
         assert fit.torque_lag.time == 0.0 and "torque_filter_time" not in fit.identified
-
-
-def test_gaps_do_not_hide_a_lag(runs):
-    rng = np.random.default_rng(1)
-    holed = []
-    for run in runs:
-        torque = low_passed(run, 0.05).torque.copy()
-        for first in rng.integers(0, len(torque) - 20, 5):
-            torque[first : first + 20] = np.nan
-        holed.append(replace(run, torque=torque))
-    fit = identify_rigid_axis(holed, 0.0, QUICK)
-    assert fit.torque_lag.time == pytest.approx(0.05, abs=5e-3)
-    assert fit.total_mass == pytest.approx(TRUTH["load_mass"], rel=0.03)
-
-
-def test_a_run_at_rest_beside_the_others_does_not_hide_their_lag(runs):
-    rest = replace(runs[0], torque=np.zeros(400), position=np.zeros(400))
-    fit = identify_rigid_axis([*(low_passed(run, 0.05) for run in runs), rest], 0.0, QUICK)
-    assert fit.torque_lag.time == pytest.approx(0.05, abs=5e-3)
-
-
-@pytest.mark.parametrize("samples", [-2.5, -1.0, 0.0, 0.25, 3.0])
-def test_a_shift_moves_a_line_and_marks_what_is_not_known(samples):
-    moved = shifted(np.arange(8.0), samples)
-    expected = np.arange(8.0) + samples
-    inside = (expected >= 0.0) & (expected <= 7.0)
-    assert np.array_equal(np.isfinite(moved), inside) and np.array_equal(moved[inside], expected[inside])
 
 
 @needs_data("emps/DATA_EMPS.mat")

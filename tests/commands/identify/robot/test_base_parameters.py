@@ -10,11 +10,7 @@ import pytest
 
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.robot.base_parameters import (
-    Range,
-    condition_number,
     group_columns,
-    independent_norms,
-    random_rows,
 )
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, Regressor, regressor_of, stacked_torque
 from cdtool.machines.coupled import CoupledMachine
@@ -47,22 +43,6 @@ def test_the_regressor_times_the_own_parameters_is_the_machines_torque(name: str
     motion = states(len(machine.joints))
     rows = stacked_torque(regressor, list(range(len(regressor.columns))), *motion)
     np.testing.assert_allclose(rows @ regressor.values, machine.required_torque(*motion), rtol=1e-11, atol=1e-11)
-
-
-@pytest.mark.parametrize("name", MACHINES)
-def test_momentum_and_rest_are_linear_in_the_same_parameters(name: str, tmp_path: Path) -> None:
-    machine = machine_of(name, tmp_path)
-    regressor = regressor_of(machine)
-    position, speed, _ = states(len(machine.joints))
-    parts = [
-        regressor.momentum(i, position, speed)
-        for i in inertial(regressor, ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA)
-    ]
-    values = regressor.values[: len(parts)]
-    momentum, velocity_force, gravity = machine.momentum_terms(position, speed)
-    np.testing.assert_allclose(sum(v * p for v, (p, _) in zip(values, parts, strict=True)), momentum, atol=1e-11)
-    rest = sum(v * r for v, (_, r) in zip(values, parts, strict=True))
-    np.testing.assert_allclose(rest, gravity - velocity_force, atol=1e-11)
 
 
 def test_the_inertial_columns_are_those_of_pinocchio(tmp_path: Path) -> None:
@@ -103,54 +83,3 @@ def test_base_parameters_explain_every_motion_as_all_parameters_do(name: str, tm
     based = stacked_torque(regressor, list(grouping.base), *motion) @ (grouping.combination @ values)
     np.testing.assert_allclose(based, every, rtol=1e-8, atol=1e-8 * np.abs(every).max())
     assert set(grouping.base) | set(grouping.grouped) | set(grouping.absent) == set(columns)
-
-
-def test_a_drive_on_a_vertical_axis_cannot_be_told_from_its_link(tmp_path: Path) -> None:
-    pytest.importorskip("pinocchio")
-    regressor = regressor_of(panda(tmp_path))
-    grouping = group_columns(regressor, inertial(regressor, ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA))
-    drives = inertial(regressor, ColumnGroup.DRIVE_INERTIA)
-    assert not grouping.is_alone(drives[0])
-    assert grouping.is_alone(drives[6])
-
-
-def test_the_name_of_a_combination_lists_factors(tmp_path: Path) -> None:
-    pytest.importorskip("pinocchio")
-    regressor = regressor_of(panda(tmp_path))
-    grouping = group_columns(regressor, inertial(regressor))
-    names = [grouping.name(row, regressor.columns) for row in range(len(grouping.base))]
-    assert len(set(names)) == 43
-    assert "mx panda_joint2" in names
-    assert any(name.startswith("my panda_joint2 - 0.316 mass panda_joint3") for name in names)
-
-
-def test_a_planar_arm_has_five_base_parameters_that_stand_alone() -> None:
-    regressor = regressor_of(planar_arm())
-    grouping = group_columns(regressor, inertial(regressor))
-    assert [regressor.columns[i].name for i in grouping.base] == ["M11", "M22", "h", "g1", "g2"]
-    np.testing.assert_array_equal(grouping.combination, np.eye(5))
-
-
-def test_independent_norms_are_those_of_the_inverse() -> None:
-    rows = np.random.default_rng(2).normal(size=(40, 5)) * (1.0, 100.0, 1e-3, 1.0, 1.0)
-    wanted = 1.0 / np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
-    np.testing.assert_allclose(independent_norms(rows), wanted, rtol=1e-9)
-    rows[:, 4] = 2.0 * rows[:, 0]
-    norms = independent_norms(rows)
-    assert norms[0] < 1e-6 * np.linalg.norm(rows[:, 0])
-    np.testing.assert_allclose(norms[1], np.linalg.norm(rows[:, 1]), rtol=0.3)
-
-
-def test_the_condition_number_does_not_depend_on_units() -> None:
-    rows = np.random.default_rng(2).normal(size=(40, 3))
-    assert condition_number(rows * (1.0, 1e4, 1e-5)) == pytest.approx(condition_number(rows), rel=1e-9)
-    assert condition_number(rows[:, [0, 1, 1]]) > 1e12
-    assert condition_number(np.column_stack((rows, np.zeros(40)))) == np.inf
-
-
-def test_random_rows_stay_within_the_limits() -> None:
-    regressor = regressor_of(planar_arm())
-    viscous = inertial(regressor, ColumnGroup.VISCOUS)
-    rows = random_rows(regressor, viscous, Range((0.5, 2.0), (1.0, 1.0)))
-    assert 0.45 < np.abs(rows[:, 0]).max() <= 0.5
-    assert 1.9 < np.abs(rows[:, 1]).max() <= 2.0

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.base.errors import UsageError
 from cdtool.commands.identify.estimate import Missing
 from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction, choose_friction
 from cdtool.commands.identify.robot.robot_run import RobotRun
@@ -31,31 +30,6 @@ def values_of(friction: JointFriction) -> dict[str, float]:
     return {item.key: item.value for item in friction.identified.estimates}
 
 
-def test_missing_friction_is_found() -> None:
-    (first, second), _ = choose_friction(runs_of(ARM), frictionless(ARM))
-    assert first.form is FrictionForm.FRICTION
-    assert values_of(first)["viscous_friction"] == pytest.approx(0.396, rel=0.05)
-    assert values_of(first)["coulomb_friction"] == pytest.approx(2.4, rel=0.02)
-    assert values_of(second)["constant_force"] == pytest.approx(-0.12, abs=0.02)
-    assert first.errors[FrictionForm.FRICTION] < NOISE
-    assert first.errors[FrictionForm.PREVIOUS] > 1.5
-    assert first.explained_share > 0.99
-
-
-def test_friction_that_is_right_is_kept_and_the_one_it_was_compared_with_is_named() -> None:
-    for friction in choose_friction(runs_of(ARM, noise=0.5), ARM)[0]:
-        assert friction.form is FrictionForm.PREVIOUS
-        assert friction.identified.estimates == ()
-        assert friction.compared in (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE)
-
-
-def test_only_the_joint_whose_friction_changed_gets_a_new_one() -> None:
-    changed = replace(ARM, coulomb_friction=(0.06, ARM.coulomb_friction[1]))
-    (first, second), _ = choose_friction(runs_of(changed, noise=0.5), ARM)
-    assert values_of(first)["coulomb_friction"] == pytest.approx(3.6, rel=0.05)
-    assert second.form is FrictionForm.PREVIOUS
-
-
 def test_a_missing_motor_inertia_is_found_and_one_from_a_data_sheet_is_kept() -> None:
     without = replace(ARM, motor_inertia=(0.0, 0.0))
     (first, _), _ = choose_friction(runs_of(ARM), without)
@@ -67,17 +41,6 @@ def test_a_missing_motor_inertia_is_found_and_one_from_a_data_sheet_is_kept() ->
         FrictionForm.FRICTION_ALONE,
         FrictionForm.PREVIOUS,
     }
-
-
-def test_viscous_friction_of_slow_motion_is_known_only_together_with_the_rest() -> None:
-    slow = replace(ARM, viscous_friction=(1e-6, 1e-6))
-    friction = choose_friction(runs_of(slow, 0.02, 0.3), frictionless(ARM))[0][0]
-    assert "viscous_friction" not in values_of(friction)
-    assert values_of(friction)["coulomb_friction"] == pytest.approx(2.4, rel=0.1)
-    assert [item.key for item in friction.together] == ["viscous_friction"]
-    (missing,) = friction.identified.not_identifiable
-    assert missing.missing == (Missing.SECOND_SPEED,)
-    assert missing.numbers["standard_error"] > 0.5 * missing.numbers["value"]
 
 
 def test_a_joint_that_rests_keeps_its_friction_and_has_no_errors() -> None:
@@ -93,6 +56,12 @@ def test_a_joint_that_rests_keeps_its_friction_and_has_no_errors() -> None:
     assert set(friction.errors) == {FrictionForm.PREVIOUS}
 
 
-def test_runs_of_another_machine_are_refused() -> None:
-    with pytest.raises(UsageError, match="3 joints"):
-        choose_friction([RobotRun("three", 0.0, 0.01, *np.ones((3, 100, 3)))], ARM)
+def test_viscous_friction_of_slow_motion_is_known_only_together_with_the_rest() -> None:
+    slow = replace(ARM, viscous_friction=(1e-6, 1e-6))
+    friction = choose_friction(runs_of(slow, 0.02, 0.3), frictionless(ARM))[0][0]
+    assert "viscous_friction" not in values_of(friction)
+    assert values_of(friction)["coulomb_friction"] == pytest.approx(2.4, rel=0.1)
+    assert [item.key for item in friction.together] == ["viscous_friction"]
+    (missing,) = friction.identified.not_identifiable
+    assert missing.missing == (Missing.SECOND_SPEED,)
+    assert missing.numbers["standard_error"] > 0.5 * missing.numbers["value"]

@@ -14,7 +14,6 @@ import pytest
 
 import cdtool
 from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.commands.identify.identifying_robot import LoadedRuns
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer
 from cdtool.machines.planar_arm import PlanarArm
 from tests.command import cdtool as command
@@ -42,7 +41,6 @@ TRUE = replace(
     coulomb_slope=(50.0, 50.0),
     constant_force=(0.3, -0.1),
 )
-RIGHT = "viscous_friction = [0.4, 0.3]\ncoulomb_friction = [2.4, 1.8]\nconstant_force = [0.3, -0.1]\n"
 
 
 def arm_files(folder: Path, text: str, noise: float) -> Path:
@@ -52,10 +50,6 @@ def arm_files(folder: Path, text: str, noise: float) -> Path:
     path = folder / "machine.toml"
     path.write_text(text + channels_of(2), encoding="utf-8")
     return path
-
-
-def rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
 
 
 @pytest.fixture(scope="module")
@@ -80,34 +74,6 @@ def test_new_friction_is_decided_and_drawn_as_it_is(arm) -> None:
         )
         # The file has no friction.
         assert np.max(np.abs(curve.previous)) == 0.0
-
-
-def test_the_residual_of_unseen_parts_is_that_of_the_worst_run(arm) -> None:
-    for item in arm.joints:
-        decision, unseen = item.robot, item.evidence.unseen
-        assert unseen.of_runs == 2
-        assert rms(unseen.measured - unseen.predicted) == pytest.approx(decision.after, rel=0.3)
-        assert rms(unseen.measured - unseen.previous) == pytest.approx(decision.before, rel=0.3)
-        # Lines are interrupted at reversals.
-        assert np.isnan(unseen.predicted).any()
-        assert (np.diff(unseen.time) >= 0.0).all()
-
-
-def test_friction_that_is_right_is_kept_with_the_error_of_the_other(tmp_path: Path) -> None:
-    path = arm_files(tmp_path, ARM + RIGHT, 0.5)
-    done = cdtool.identify([str(tmp_path / "run*.csv")], path)
-    for joint, item in enumerate(done.joints):
-        assert item.robot is not None
-        assert item.robot.answer is FrictionAnswer.NOT_BETTER
-        assert item.robot.after == pytest.approx(item.robot.before, rel=0.1)
-        assert item.evidence is not None
-        assert item.evidence.friction is not None
-        assert np.interp(0.5, item.evidence.friction.speed, item.evidence.friction.previous) == pytest.approx(
-            0.5 * TRUE.viscous_friction[joint] + TRUE.coulomb_friction[joint] + TRUE.constant_force[joint], abs=0.01
-        )
-    summary = done.summary
-    assert summary["joints"][0]["friction_decision"]["answer"] == "not_better"
-    assert len(summary["joints"][0]["motion"]["excitation"]["speeds"]) > 1
 
 
 def test_a_joint_that_rests_has_nothing_but_its_need() -> None:
@@ -189,17 +155,6 @@ def test_the_command_identifies_torque_constants(tmp_path: Path) -> None:
     # By the new constants the friction is that of the arm.
     assert values["machine"]["coulomb_friction"] == pytest.approx([2.4, 1.8], rel=0.05)
     assert all(joint["friction_decision"]["after"] < 0.2 for joint in shown)
-
-
-def test_torques_of_the_evidence_are_by_the_new_constants(tmp_path: Path) -> None:
-    currents(tmp_path)
-    payload = LoadedRuns((tmp_path / "loaded.csv",), 0.7, "forearm", (0.25, 0.0, 0.0))
-    path = tmp_path / "machine.toml"
-    done = cdtool.identify([tmp_path / "free.csv"], path, other_logs=payload)
-    for joint in done.joints:
-        assert joint.robot is not None and joint.evidence is not None and joint.evidence.unseen is not None
-        unseen = joint.evidence.unseen
-        assert rms(unseen.measured - unseen.predicted) == pytest.approx(joint.robot.after, rel=0.05)
 
 
 def test_the_command_identifies_torque_constants_of_a_robot_from_a_urdf(tmp_path: Path) -> None:

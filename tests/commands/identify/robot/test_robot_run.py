@@ -8,7 +8,7 @@ import pytest
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.commands.identify.robot.robot_run import RobotRun, central_derivative, robot_run
+from cdtool.commands.identify.robot.robot_run import central_derivative, robot_run
 from cdtool.recordings.recording import Recording, Series
 
 RATES = np.array([1.0, 2.0])
@@ -67,42 +67,8 @@ def test_the_central_derivative_is_exact_for_cubics_and_leaves_gaps_open() -> No
     assert known[5:-5, 1].all()
 
 
-def test_white_noise_is_averaged_by_the_derivative() -> None:
-    noise = np.random.default_rng(3).normal(size=(5000, 1))
-    plain = np.std(np.diff(noise, axis=0) / 0.001)
-    assert np.nanstd(central_derivative(noise, 0.001)) < 0.01 * plain
-
-
-def test_a_log_shorter_than_the_window_has_no_derivative() -> None:
-    assert np.isnan(central_derivative(np.zeros((6, 2)), 0.05)).all()
-
-
-def test_excluded_samples_have_no_torque_and_keep_their_motion() -> None:
-    run = robot_run(recording())
-    excluded = run.time > 2.0
-    rest = run.without(excluded)
-    assert np.isnan(rest.torque[excluded]).all()
-    np.testing.assert_array_equal(rest.torque[~excluded], run.torque[~excluded])
-    assert rest.position is run.position
-
-
 @pytest.mark.parametrize(("missing", "message"), [("position", "no position"), ("torque", "no torque")])
 def test_a_robot_needs_torque_and_pose(missing: str, message: str) -> None:
     with pytest.raises(RecordingError, match=message) as caught:
         robot_run(recording(**{missing: True}))
     assert "\n" not in str(caught.value)
-
-
-def test_channels_of_different_shape_are_refused() -> None:
-    with pytest.raises(RecordingError, match="differ in shape"):
-        RobotRun("log", 0.0, 0.01, np.zeros((9, 2)), np.zeros((9, 3)), np.zeros((9, 2)))
-
-
-def test_a_sample_is_slow_below_three_times_the_noise_and_below_two_percent_of_the_fastest() -> None:
-    time = np.arange(0.0, 20.0, 0.01)
-    speed = np.column_stack((np.sin(time), np.sin(time), np.zeros_like(time)))
-    speed[:, 1] += 0.02 * np.random.default_rng(1).normal(size=len(time))
-    slow = RobotRun("run", 0.0, 0.01, *np.zeros((2, *speed.shape)), speed).slow((1e-3,) * 3)
-    assert np.max(np.abs(speed[slow[:, 0], 0])) == pytest.approx(0.02, abs=0.01)
-    assert np.max(np.abs(speed[slow[:, 1], 1])) == pytest.approx(0.06, rel=0.1)
-    assert slow[:, 2].all()

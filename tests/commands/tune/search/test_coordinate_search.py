@@ -42,16 +42,6 @@ def test_it_comes_close_to_the_optimum_with_few_evaluations(optimum):
     assert len(asked) <= EVALUATIONS and len({item.key for item in asked}) == len(asked)
 
 
-def test_a_flat_cost_leaves_the_gains_alone():
-    search, asked = run(lambda _: 1.0)
-    assert search.best == START and len(asked) == 8  # both gains, up and down, with two steps
-
-
-def test_a_small_improvement_is_noise():
-    search, _ = run(lambda item: 1.0 - 1e-3 * math.log(dict(item.gains)["bandwidth"]))
-    assert search.best == START
-
-
 def test_a_candidate_that_cannot_be_used_is_not_chosen():
     search, _ = run(lambda item: 0.0 if item == START else math.inf)
     assert search.best == START
@@ -73,7 +63,3 @@ def test_what_belongs_to_sensors_or_decides_where_the_method_applies_is_not_sear
     detector = FrictionEkf()
     names = movable_gains(detector, Candidate.of(detector, Limit()))
     assert names == ("sigma_acceleration", "friction_drift")
-
-
-def test_without_a_gain_nothing_is_asked_for():
-    assert CoordinateSearch(START, 0.0, ()).ask() == []

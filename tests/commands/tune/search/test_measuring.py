@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import SignatureError
-from cdtool.commands.tune.search.candidate import Candidate, Measured
+from cdtool.commands.tune.search.candidate import Candidate
 from cdtool.commands.tune.search.measuring import Choice, Measuring
 from cdtool.commands.tune.search.recordings import FreeRun, StruckLog, TuningRecordings
 from cdtool.commands.tune.tuning import learned
@@ -17,7 +17,6 @@ from cdtool.detectors.momentum import Momentum
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Series
 from cdtool.results.curves.false_alarm_budget import Budget
-from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
 from cdtool.truth.onset import OnsetRule, find_contacts
 
@@ -69,15 +68,6 @@ def test_a_candidate_is_measured_on_every_contact_and_subset(recordings, gate):
     assert (made.alarming[:, 0] == 3).all() and (made.alarming[:, 1:] == 2).all()
 
 
-def test_what_is_stored_is_restored(recordings, gate):
-    made = measuring(recordings, gate)(CANDIDATE)
-    again = Measured.from_dict(made.to_dict())
-    for name in ("factors", "latency", "force", "assessable", "alarming"):
-        assert np.array_equal(getattr(made, name), getattr(again, name), equal_nan=True)
-    with pytest.raises((KeyError, ValueError, TypeError)):
-        Measured.from_dict({"reason": ""})
-
-
 def test_the_free_runs_of_a_fold_neither_teach_nor_limit_what_assesses_it(recordings, gate):
     choice = Choice(CANDIDATE, 0, 2)
     usual = measuring(recordings, gate)(choice)
@@ -91,12 +81,6 @@ def test_disturbed_runs_of_other_folds_do_change_it(recordings, gate):
     usual = measuring(recordings, gate)(choice)
     other = measuring(disturbed(recordings, 1), gate)(choice)
     assert not np.array_equal(usual.latency, other.latency, equal_nan=True)
-
-
-def test_a_higher_limit_is_never_met_earlier(recordings, gate):
-    held_out = measuring(recordings, gate)(Choice(CANDIDATE, 0, 2))
-    latency = np.where(np.isnan(held_out.latency), np.inf, held_out.latency)
-    assert (np.diff(latency, axis=0)[np.isfinite(latency[1:])] >= 0.0).all()
 
 
 def test_a_rule_that_cannot_learn_is_unusable_with_its_reason(recordings, gate):
@@ -113,16 +97,3 @@ def test_a_budget_that_the_subsets_cannot_support_is_a_reason(recordings, gate):
     assert (
         "needs 19 impact-free operations to be set, 16 were" in measuring(recordings, gate, "1/20op")(CANDIDATE).reason
     )
-
-
-def test_a_rule_without_classes_is_measured_too(recordings, gate):
-    made = measuring(recordings, gate)(Candidate.of(Momentum(bandwidth=20.0), Limit()))
-    assert made.latency.shape == (2, 6, 10)
-
-
-def test_too_few_runs_outside_a_part_are_reported_with_all_of_them(recordings, gate):
-    """As many runs as the benchmark learns from: 12, of which 9 are outside the largest of five parts."""
-    few = replace(recordings, free=recordings.free[:12])
-    made = measuring(few, gate)(CANDIDATE)
-    assert made.reason.startswith("9 impact-free runs of one class: 1 more is needed to have 10")
-    assert made.reason.endswith("(of 12 impact-free runs, those outside 1 of 5 parts)")

@@ -10,7 +10,7 @@ from cdtool.commands.tune.search.candidate import Candidate, Measured
 from cdtool.commands.tune.search.grid import debounces_to_try, rules_to_try
 from cdtool.commands.tune.search.objective import Goal, Objective
 from cdtool.commands.tune.search.search import search
-from cdtool.commands.tune.search.tuned import pareto_of, sensitivities_of, steps_of
+from cdtool.commands.tune.search.tuned import pareto_of, sensitivities_of
 from cdtool.detectors.momentum import Momentum
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
@@ -85,26 +85,6 @@ def test_a_candidate_that_cannot_be_used_is_left_out():
 
     found, _ = run(latency_of)
     assert found.best.candidate.rule.name == "limit"
-
-
-def test_a_default_that_cannot_be_used_sets_no_bound():
-    def latency_of(candidate):
-        return Measured.unusable("no") if candidate.rule.name == "limit" else by_rule(VALUES)(candidate)
-
-    found, _ = run(latency_of)
-    assert found.best.candidate.rule == Glr(order=12) and steps_of(found, found.best) == ()
-
-
-def test_without_nested_subsets_there_is_one_search():
-    recordings = tuning_recordings(is_nested=False)
-    found, _ = run(lambda _: measured(recordings, np.full(20, 0.02)), recordings)
-    assert len(found.subsets) == 1
-
-
-def test_contributions_multiply_to_the_whole_saving():
-    found, _ = run(by_rule(VALUES, bandwidth=20.0))
-    left = math.prod(1.0 - step.saved for step in steps_of(found, found.best))
-    assert math.isclose(left, math.exp(found.best.score - found.subsets[0].default.score))
 
 
 def test_the_sensitivity_shows_the_flat_part_and_the_edge():
