@@ -388,7 +388,7 @@ def read_benchmark_file(
     stated = {key: value for key, value in (settings or {}).items() if key.partition(".")[0] != "execution"}
     wanted = _Wanted(learning, tuple(also_known), tuple(detectors), stated)
     if machine_file is None:  # the rest is checked with another one, but for what depends on its channels and model
-        table, machine_file = replace(table, limits={}, inject=None), _other_machine(table.joints)
+        table, machine_file = replace(table, limits={}), _other_machine(table.joints)
     benchmark = _resolved(file, table, place, machine_file, wanted)
     place.finish()
     if learning:
@@ -432,7 +432,7 @@ def _resolved(
     impacts, sections = _groups(table, place, found)
     scored, with_impacts = _scored(impacts, impact_free=True), _scored(impacts)
     made = None
-    if table.inject is not None:
+    if table.inject is not None and machine_file.digest:  # a machine file in place of another has none
         made = place.tried(None, SECTIONS.load("inject").read, table.inject, place, found, table.operations, impacts)
     learn = _under_scored_paths(learn, scored)
     onset = place.below("onset")
