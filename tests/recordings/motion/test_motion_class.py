@@ -6,14 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from cdtool.commands.learning.grouping import by_class
 from cdtool.recordings.motion import measured_class, motion_class
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
-from tests.bits import COUNTS, clocks, samples
 from tests.recordings.motion.speed_logs import log
 
 
@@ -86,10 +84,6 @@ def test_classes_that_lie_close_are_learned_and_no_class_is_refused_whole():
     for group in classes:
         common_class([item.recording for item in group])
     assert sum(map(len, classes)) + len(odd) == len(runs)
-
-
-speeds = st.one_of(st.just(0.2), st.sampled_from([-0.2, 0.0, -0.0, np.nan, np.inf]), st.floats(-1.0, 1.0))
-logged = COUNTS.flatmap(lambda count: st.tuples(clocks(count), samples(count, values=speeds)))
 
 
 def test_the_class_of_a_speed_is_found_once():

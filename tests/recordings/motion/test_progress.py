@@ -4,26 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
 from cdtool.recordings.motion.progress import RUNNING_SHARE, START_SHARE, progress
 from cdtool.recordings.recording import Recording, Series
-from tests.bits import COUNTS, VALUES, clocks, samples
-
-
-@st.composite
-def recordings(draw: st.DrawFn) -> Recording:
-    count, joints = draw(COUNTS), draw(st.sampled_from([1, 2]))
-    time = draw(clocks(count))
-    # A position that often grows, with steps back and gaps.
-    steps = draw(samples(count, joints, st.one_of(st.just(0.25), st.integers(-1, 2).map(float), VALUES)))
-    with np.errstate(invalid="ignore"):
-        position = np.cumsum(steps, axis=0) if draw(st.booleans()) else steps
-    own = draw(st.sampled_from([0.0, 0.7e-3]))
-    speed = draw(samples(count, joints, st.one_of(st.just(1.0), VALUES)))
-    channels = {"speed": Series(time, speed, "m/s"), "position": Series(time + own, position, "m")}
-    return Recording("made up", "", tuple("ab"[:joints]), channels)
 
 
 def test_a_recording_that_runs_needs_a_position_and_one_at_rest_does_not():

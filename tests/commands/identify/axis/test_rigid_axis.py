@@ -262,11 +262,6 @@ def test_noise_that_the_controller_feeds_back_biases_least_squares_and_not_instr
     assert abs(plain.total_mass - 80.0) > 3.0 * abs(cured.total_mass - 80.0)
 
 
-def noisy(deviation: float) -> list[AxisRun]:
-    rng = np.random.default_rng(7)
-    return [replace(run, position=run.position + deviation * rng.standard_normal(len(run))) for run in clean(count=6)]
-
-
 def test_stated_standard_errors_cover():
     """Friction over the track and between strokes: 1 and 2 standard errors cover at least 60 and 85 %."""
     count = 36

@@ -16,7 +16,6 @@ from cdtool.commands.identify.axis.speed_controller import (
     ControllerKind,
     identify_controller,
 )
-from cdtool.commands.identify.axis.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Missing, NotIdentifiable
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
@@ -120,15 +119,6 @@ def missing(fit: ControllerFit, key: str) -> NotIdentifiable:
 def deviation(estimate: Estimate, true: float) -> float:
     """Return how many standard errors an estimate is off."""
     return abs(estimate.value - true) / estimate.standard_error
-
-
-def simulated(error: FloatArray, **values: float) -> FloatArray:
-    rest = {"period": 1e-3, "slew_limit": math.inf, "force_limit": math.inf, "substeps": 1.0}
-    numbers = tuple({**dict.fromkeys(PARAMETER_ORDER, 0.0), **rest, **values}[name] for name in PARAMETER_ORDER)
-    inputs = np.vstack((error, np.zeros((2, len(error)))))
-    output = np.empty(len(error))
-    simulate_controller(numbers, np.array([0, len(error)]), np.zeros(1), np.array([np.nan]), inputs, output)
-    return output
 
 
 # The kernel
