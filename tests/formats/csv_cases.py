@@ -315,6 +315,8 @@ def _with_cell(table: Table, cell: str, row: int = 5) -> str:
 
 # --- lines above the rows
 
+_plain("sections in brackets", lambda table: table.text(above="[Header]\nVersion=2\n[Data]"))
+_plain("units in brackets above the names", lambda table: table.text(above="[s],[N m],[m/s]"))
 _plain("no header", lambda table: table.text(header=False), ("0", "1", "2"))
 _plain("no header, decimal comma", lambda table: table.text(";", ",", header=False), ("0", "1", "2"))
 _plain("names in quotes", lambda table: table.text().replace("t,a,b", '"t","a","b"'))

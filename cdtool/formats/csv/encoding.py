@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from cdtool.base.errors import RecordingError
+from cdtool.base.files.kinds import kind_of
 from cdtool.formats.csv.gzipped import is_gzipped, measure
 from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text, read_sample, read_small, recoded
 from cdtool.formats.csv_dialect.east_asian import east_asian
@@ -25,6 +26,7 @@ _FEW, _SHARE = 3, 0.02
 # The first bytes of a file, by which text is distinguished from other contents.
 HEAD_BYTES = 4096
 _ALLOWED = bytes(byte for byte in range(256) if not _CONTROL.match(bytes((byte,))))
+_TABLES = ("", "a table of numbers")  # kinds of a text that begins with [, as a head [Header] or the unit [s]
 _OTHER_KINDS = (b"%PDF", b"\x89", b"GIF8", b"\xff\xd8", b"PK\x03\x04", b"\x1f\x8b", b"SQLite format", b"#ROSBAG")
 
 
@@ -47,7 +49,9 @@ def looks_like_text(sample: bytes) -> bool:
         text = head[mark:].rstrip(b"\0")  # after a power failure a file system may pad the end of a file
     # NUL bytes between lines result from a power failure; a binary file has other control characters, too.
     first_line = text.lstrip(b"\r\n").partition(b"\n")[0].partition(b"\r")[0]
-    if not text or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"[")):
+    begin = text.lstrip()
+    is_other = begin.startswith(b"[") and kind_of(begin) not in _TABLES  # JSON, or a file of cdtool
+    if not text or b"\0" in first_line or is_other or begin.startswith((b"<", b"{")):
         return False
     controls = len(text.translate(None, _ALLOWED))
     return not controls or (b"\0" not in text and controls <= max(_FEW, _SHARE * len(text)))

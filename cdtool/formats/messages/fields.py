@@ -75,7 +75,8 @@ class Field:
     def _in_order(self, array: Any, names: Sequence[str], joints: Sequence[str]) -> Sequence[float]:
         """Return a whole array's numbers, in the order of the joints if its elements are named."""
         # A range stands for the numbers of a message with its layout: those of an image are not listed.
-        numbers = array if isinstance(array, range) else [_number(item, self.text) for item in array]
+        plain = isinstance(array, range) or {*map(type, array)} == {float}  # much quicker for long arrays
+        numbers = array if plain else [_number(item, self.text) for item in array]
         order = joint_order(len(numbers), names, joints)
         return numbers if order is None else [numbers[element] for element in order]
 
@@ -115,7 +116,7 @@ def parse_field(text: str, where: str) -> Field:
 
 
 def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[float]]:
-    """Return every numeric field of a message except the header stamp; arrays of up to 16 numbers as `name[:]`."""
+    """Return every numeric field of a message except the header stamp; arrays as `name[:]`, cut after 17 numbers."""
     found: dict[str, float | list[float]] = {}
     for name in _member_names(message):
         value = _member(message, name)
@@ -123,8 +124,8 @@ def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[flo
         if full == "header.stamp":
             continue
         if _is_array(value):
-            if len(value) <= LONGEST_ARRAY and all(_is_number(item) for item in value):
-                found[f"{full}[:]"] = [_float(item) for item in value]
+            if all(_is_number(item) for item in value[: LONGEST_ARRAY + 1]):  # longer ones are only named
+                found[f"{full}[:]"] = [_float(item) for item in value[: LONGEST_ARRAY + 1]]
         elif _is_number(value):
             found[full] = _float(value)
         elif _member_names(value):

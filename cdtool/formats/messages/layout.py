@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from cdtool.formats.messages.fields import LONGEST_ARRAY, Field, FieldMissingError
+from cdtool.formats.messages.fields import Field, FieldMissingError
 
 TEXT = "text"  # the kind of a string
 
@@ -72,7 +72,7 @@ class Layout:
         return FieldMissingError(f"'{field.text}' is a string, not a number") if kind == TEXT else None
 
     def numeric_names(self, prefix: str = "", above: tuple[Layout, ...] = ()) -> Iterator[str]:
-        """Yield every numeric field except the header's stamp, in schema order; arrays only if they may be short."""
+        """Yield every numeric field except the header's stamp, in schema order; arrays as `name[:]`."""
         if self in above:  # protobuf messages may contain themselves
             return
         for member in self.members:
@@ -80,9 +80,6 @@ class Layout:
             if full == "header.stamp":
                 continue
             if member.is_number:
-                if not member.array:
-                    yield full
-                elif (member.length or 0) <= LONGEST_ARRAY:
-                    yield f"{full}[:]"
+                yield f"{full}[:]" if member.array else full
             elif isinstance(member.kind, Layout) and not member.array:
                 yield from member.kind.numeric_names(f"{full}.", (*above, self))

@@ -29,6 +29,7 @@ class TopicSurvey:
         self.decoders = Decoders()
         self._fields: dict[str, Field] = {}
         self._widths: dict[str, Counter[int]] = {}
+        self._longest: Counter[str] = Counter()  # of arrays, also of those that are too long
         self._shapes: dict[str, tuple[int, ...]] = {}  # of a field's row, from its first message on
         self._late = Distribution()
         self._orders = StampOrders(topic)
@@ -75,6 +76,7 @@ class TopicSurvey:
         values, present, widths = field_values.values[whole], field_values.state[whole] != ABSENT, self._widths[name]
         if field_values.count is not None:
             count = field_values.count[whole]
+            self._longest[name] = max(self._longest[name], int(count.max(initial=0)))
             present &= (count >= 0) & (count <= LONGEST_ARRAY)
             filled = count_values(count[present & (count > 0)])
             if filled:
@@ -98,11 +100,14 @@ class TopicSurvey:
         findings = self.decoders.failure(self.topic) + self._orders.findings()
         for name in self._fields:
             widths, full = self._widths[name], f"{self.topic} {name}"
-            if len(widths) > 1:
-                findings.append(Finding("array_lengths_differ", full, {"lengths": tuple(sorted(widths))}))
+            lengths = sorted({*widths, self._longest[name]} - {0})
+            if len(lengths) > 1:
+                findings.append(Finding("array_lengths_differ", full, {"lengths": tuple(lengths)}))
             elif widths:
                 findings += rounding_finding(full, self._rounded[name], "note")
                 columns[full] = Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
+            elif lengths:
+                findings.append(Finding("long_arrays", full, {"longest": lengths[0], "most": LONGEST_ARRAY}))
         return columns, findings + self._header()
 
     def _header(self) -> list[Finding]:

@@ -52,6 +52,29 @@ def facts_above_notes(source):
     return [fact_of(finding) for finding in source.findings if finding.severity != "note"]
 
 
+@pytest.mark.parametrize("encoding", ["cdr", "json"])
+@pytest.mark.parametrize(
+    ("lengths", "kind", "numbers"),
+    [
+        ([20, 18], "long_arrays", {"longest": 20, "most": 16}),
+        ([6, 20], "array_lengths_differ", {"lengths": (6, 20)}),
+        ([20, 6], "array_lengths_differ", {"lengths": (6, 20)}),
+    ],
+)
+def test_long_arrays_that_a_survey_leaves_out_are_named(tmp_path, encoding, lengths, kind, numbers):
+    def payload(size):
+        names, position = ["j"] * size, [0.5] * size
+        if encoding == "json":
+            return json_state(names, position)
+        return b"\0\1\0\0" + struct.pack(f"<2I{size}d", 0, size, *position)
+
+    messages = [(0, (i + 1) * MS, payload(lengths[i >= 10])) for i in range(20)]
+    source = Mcap().columns(write(tmp_path / "log.mcap", messages, STATE, encoding))
+    assert "/a position[:]" not in source.columns
+    found = [(each.kind, each.numbers) for each in source.findings if each.channel == "/a position[:]"]
+    assert found == [(kind, numbers)]
+
+
 @pytest.mark.parametrize(("late", "severity"), [(2, "note"), (300, "warning")])
 @pytest.mark.parametrize("survey", [True, False])
 def test_backward_stamps_are_reported_with_the_message(tmp_path, late, severity, survey):
