@@ -43,11 +43,11 @@ mass_before_cell_kg = {mass}
 @pytest.fixture(autouse=True)
 def learn_once(monkeypatch):
     """Learn the threshold once per file and detector instead of in each command."""
-    anew = prepared_benchmark.prepare_benchmark
-    known = cache(anew)
+    prepare_again = prepared_benchmark.prepare_benchmark
+    prepare_once = cache(prepare_again)
 
     def prepare(file, settings, **given):
-        return anew(file, settings=settings, **given) if settings else known(file, **given)
+        return prepare_again(file, settings=settings, **given) if settings else prepare_once(file, **given)
 
     monkeypatch.setattr(prepared_benchmark, "prepare_benchmark", prepare)
 
