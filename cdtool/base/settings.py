@@ -229,14 +229,14 @@ def _is_scalar(hint: Any) -> bool:
 class Place:
     """Where in a file values stand, and the mistakes that were found in the file so far.
 
-    `misspelt`: full keys that unknown ones are probably meant to be. `by_option`: full keys that --set gave.
-    `root`: the model of the whole file, to say where a key belongs.
+    `excused`: full keys that are missing because of another mistake, such as a misspelt name. `by_option`: full keys
+    that --set gave. `root`: the model of the whole file, to say where a key belongs.
     """
 
     where: str
     prefix: str = ""
     mistakes: list[ConfigurationError] = field(default_factory=list)
-    misspelt: list[str] = field(default_factory=list)
+    excused: list[str] = field(default_factory=list)
     by_option: Collection[str] = ()
     root: type[Any] | None = None
 
@@ -284,12 +284,14 @@ class Place:
         self._add(self.fault(name, problem, hint))
 
     def _add(self, mistake: ConfigurationError) -> None:
-        """Remember a mistake, unless it only follows from one about the same key, misspelt, or a part of it."""
+        """Remember a mistake, unless it only follows from one about the same key or a part of it."""
         key = mistake.key
-        if key in self.misspelt:
-            return
-        if not key or not any(f"{known.key}.".replace("[", ".").startswith(f"{key}.") for known in self.mistakes):
+        if not key or not (key in self.excused or self.has_mistake(key)):
             self.mistakes.append(mistake)
+
+    def has_mistake(self, key: str) -> bool:
+        """Whether a mistake is about a full key or a part of it."""
+        return any(f"{known.key}.".replace("[", ".").startswith(f"{key}.") for known in self.mistakes)
 
     def tried(self, otherwise: Made, make: Callable[..., Made], *given: Any) -> Made:
         """Return what `make` makes of what is given; after an error, which is remembered, `otherwise`."""
@@ -299,9 +301,15 @@ class Place:
 
     @contextmanager
     def at(self, name: str, value: Any = None) -> Iterator[None]:
-        """Name the key in an error that is raised inside; with a value, that it is this one is what is wrong."""
+        """Name the key in an error that is raised inside; with a value, that it is this one is what is wrong.
+
+        An error of a file that the key names stays as it is.
+        """
         try:
             yield
+        except ConfigurationError as fault:
+            fault.key = fault.key or f"{self.prefix}{name}"
+            raise
         except UsageError as fault:
             problem = fault.message if value is None else f"is {value_in_words(value)}"
             raise self.fault(name, problem, fault.hint) from fault
@@ -331,8 +339,9 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
 
     `filled_in` are fields that are not keys.
 
-    A wrong value is replaced by its default, so that what depends on it can still be checked. A single value stands for
-    a list with one. None if a key that must be given is missing or wrong, or if the values do not fit together.
+    A wrong value is replaced by its default, or by some value of its type, so that what depends on it can still be
+    checked: use the model only if `place` has no mistakes. A single value stands for a list with one. None if the
+    values do not fit together.
     """
     keys, known = keys_of(model), len(place.mistakes)
     given = {}
@@ -340,7 +349,7 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
         if name not in keys:
             home = place.home_of(name)
             meant = get_close_matches(name, keys.keys() - values.keys(), n=1)
-            place.misspelt.extend(f"{place.prefix}{key}" for key in meant)
+            place.excused.extend(f"{place.prefix}{key}" for key in meant)
             where = f"write {home}.{name}" if place.is_option(name) else f"it belongs in [{home}]"
             place.note(name, "unknown key", where if home else nearest(name, keys))
         elif (found := _value(keys[name], keys[name].hint, name, value, place)) is not _WRONG:
@@ -348,9 +357,25 @@ def read(model: type[Model], values: Mapping[str, Any], place: Place, **filled_i
     for name, key in keys.items():
         if key.required and name not in values and place.is_whole:
             place.note(name, "is missing", key.allowed)
-    if any(key.required and key.attribute not in given for key in keys.values()):
-        return None
+        elif key.required and name not in values:  # perhaps on a line that is not TOML
+            place.excused.append(f"{place.prefix}{name}")
+        if key.required and key.attribute not in given:
+            given[key.attribute] = _stand_in(key.hint)
     return _made(model, {**given, **filled_in}, place, known)
+
+
+def _stand_in(hint: Any) -> Any:
+    """Return some value of a type."""
+    bare = bare_type(alternatives(hint)[0])
+    if is_model(bare):
+        return read(bare, {}, Place(""))
+    if get_origin(bare) is Literal:
+        return get_args(bare)[0]
+    if get_origin(bare) in (tuple, list):
+        return tuple(_stand_in(part) for part in get_args(bare) if part is not Ellipsis)
+    if isinstance(bare, type) and issubclass(bare, Enum):
+        return next(iter(bare))
+    return {bool: False, str: "?"}.get(bare, 1)
 
 
 def _made(model: type[Model], given: Mapping[str, Any], place: Place, known: int) -> Model | None:
@@ -363,12 +388,13 @@ def _made(model: type[Model], given: Mapping[str, Any], place: Place, known: int
     except FieldsError as fault:
         names = {key.attribute: name for name, key in keys_of(model).items()}
         concerned = [names[attribute] for attribute in fault.fields]
-        wrong = {mistake.key for mistake in place.mistakes[known:]}
-        if not any(f"{place.prefix}{name}" in wrong for name in concerned):  # else it follows from the default
+        if not any(
+            place.has_mistake(f"{place.prefix}{name}") for name in concerned
+        ):  # else it follows from the default
             place.note(concerned[0], fault.problem, fault.hint)
         others = {name: value for name, value in given.items() if name not in fault.fields}
         if len(others) < len(given) and not any(keys_of(model)[name].required for name in concerned):
-            _made(model, others, place, known)
+            return _made(model, others, place, known)
     except CdtoolError as fault:
         if len(place.mistakes) == known:  # else it may only follow from a value that was replaced
             place.mistakes.append(place.whole(fault))

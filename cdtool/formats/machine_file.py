@@ -9,7 +9,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,20 +16,19 @@ from cdtool.base.derived import StoresDerived
 from cdtool.base.errors import ConfigurationError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.remote.remote_path import location
-from cdtool.base.settings import Place, read, setting
+from cdtool.base.settings import Place, keys_of, read, setting
 from cdtool.base.value_words import value_in_words
 from cdtool.detectors import DETECTORS
 from cdtool.formats.channels.channel_map import (
+    AcceptedUnits,
     ChannelMap,
     ChannelSource,
-    ColumnsTable,
     TablePins,
-    TimeSource,
     channel_maps,
 )
 from cdtool.machines import MACHINES
 from cdtool.machines.dynamics import Gain, Machine
-from cdtool.machines.joint_machine import per_joint
+from cdtool.machines.joint_machine import JointTable, per_joint
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,23 +135,15 @@ def read_machine_file(path: str | Path) -> MachineFile:
     machine = place.tried(None, _machine, values, place)
     written = {name: value for name, value in values.items() if name not in ("machine", "operations")}
     table = read(MachineTable, written, place)
-    joints = machine.joints if machine else ()
-    columns = topics = ChannelMap(TimeSource(), (), joints)
-    if table is not None and machine is not None:
-        given, below, units = written.get("channels", {}), place.below("channels"), machine.accepted_units
-        columns, topics = channel_maps(given, below, joints, units)
-        topics = replace(topics, named=len(joints) > 1 or "joints" in values["machine"])
-    elif isinstance(given := written.get("channels"), dict):  # how many columns and which units needs the machine
-        read(ColumnsTable, given, place.below("channels"))
-    pins, model = TablePins(), None
-    gains: dict[str, dict[str, Gain]] = {}
-    if table is not None:
-        pins = _read_pins(table.csv, place.below("csv"))
-        gains = _read_gains(table.detectors, len(joints), place.below("detectors"))
-        model = _read_model(table.model, len(joints), place.below("model"))
+    assert table is not None
+    joints, units = (machine.joints, machine.accepted_units) if machine else _of_any_axis(values.get("machine"))
+    columns, topics = channel_maps(written.get("channels", {}), place.below("channels"), joints, units)
+    gains = _read_gains(table.detectors, len(joints), place.below("detectors"))
+    model = _read_model(table.model, len(joints), place.below("model"))
+    columns = replace(columns, pins=_read_pins(table.csv, place.below("csv")))
     place.finish()
     assert machine is not None
-    columns = replace(columns, pins=pins)
+    topics = replace(topics, named=len(joints) > 1 or "joints" in values["machine"])
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
     return MachineFile(file, machine, columns, topics, gains, digest, model)
 
@@ -170,25 +160,30 @@ def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:
         if "operations" in part:
             hint = "set it there, or give detect --set operations=motion"
             raise at.fault("operations", "is a key of the benchmark file", hint)
-    kind = table.get("type")
-    if kind is None and not place.is_whole:
-        return None
+    below, kind = place.below("machine"), table.get("type")
     known = MACHINES.names_for(kind)
-    if kind not in known:
+    if kind in known:
+        machine: Machine | None = MACHINES.load(kind).read(table, below)
+        return machine
+    if kind is not None or place.is_whole:
         problem = "is missing" if kind is None else f"is {value_in_words(kind)}"
-        place.below("machine").note("type", problem, nearest(str(kind), known))
-        close = get_close_matches(str(kind), known, n=1, cutoff=0.7)
-        if not close:
-            return None
-        kind = close[0]  # to check the rest of the file
-    machine: Machine | None = MACHINES.load(kind).read(table, place.below("machine"))
-    return machine or MACHINES.load(kind).read(_least(table), Place(""))
+        below.note("type", problem, nearest(str(kind), known))
+    closest = max(map(MACHINES.load, known), key=lambda item: len(table.keys() & keys_of(item.table)))
+    closest.read(table, below)  # for the mistakes of its keys
+    return None
 
 
-def _least(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of [machine] that make an axis to check the channels with, whatever is wrong with the others."""
-    ratio = {} if table.get("coordinates") == "load" else {"transmission_ratio": 1.0}
-    return {**ratio, **{key: table[key] for key in ("name", "joints", "coordinates") if key in table}}
+def _of_any_axis(table: Any) -> tuple[tuple[str, ...], AcceptedUnits]:
+    """Return joints and units to check the channels with if the machine is wrong: as named, and of every machine.
+
+    The joints are empty if they are not named.
+    """
+    named = read(JointTable, table if isinstance(table, dict) else {}, Place(""))
+    axes = [MACHINES.load(kind).of({"transmission_ratio": 1.0}) for kind in ("linear_axis", "rotary_axis")]
+    return named.joints if named else (), lambda channel: (
+        *dict.fromkeys(name for axis in axes for name in axis.accepted_units(channel)),
+        "SI",
+    )
 
 
 def fingerprint(machine: Machine) -> str:

@@ -33,7 +33,7 @@ class Axis(JointMachine):
 
     @classmethod
     def parameters(cls, table: Any, place: Place) -> dict[str, Any]:
-        """Return the parameters of the machine, one per joint; raises ConfigurationError naming the key."""
+        """Return the parameters of the machine, one per joint, with the mistakes in `place`."""
         found = super().parameters(table, place)
         return {**found, "load_inertia": per_joint(table, cls.inertia_key, len(found["joints"]), place)}
 

@@ -95,10 +95,11 @@ class JointTable:
 
 
 def per_joint(table: Any, key: str, count: int, place: Place) -> tuple[float, ...]:
-    """Return the values of a key, one for each joint; raises ConfigurationError for another number of them."""
+    """Return the values of a key, one for each joint; another number of them is a mistake in `place`."""
     values: tuple[float, ...] = getattr(table, key)
-    if len(values) not in (1, count) and values:
-        raise place.fault(key, f"has {len(values)} values", f"give one number, or {count}: one per joint")
+    if len(values) not in (0, 1, count):
+        place.note(key, f"has {len(values)} values", f"give one number, or {count}: one per joint")
+        values = values[:1]
     return values * count if len(values) == 1 else values
 
 
@@ -148,25 +149,22 @@ class JointMachine:
         """Return the machine, with the mistakes in `place`; None if it cannot be made."""
         if (table := read(cls.table, values, place)) is None:
             return None
-        with place.noting():
-            return cls(**cls.parameters(table, place))
-        return None
+        return place.tried(None, lambda: cls(**cls.parameters(table, place)))
 
     @classmethod
     def parameters(cls, table: Any, place: Place) -> dict[str, Any]:
-        """Return the parameters that every machine has, one per joint; raises ConfigurationError naming the key."""
+        """Return the parameters that every machine has, one per joint, with the mistakes in `place`."""
         joints = table.joints or cls.joints_by_default or (table.name,)
-        if len(set(joints)) != len(joints):
-            raise place.fault("joints", "names a joint twice", "joint names must differ")
         coordinates = table.coordinates or cls.coordinates_by_default
         if coordinates == "load":
             for key in ("motor_inertia", "transmission_ratio"):
                 if getattr(table, key):
-                    raise place.fault(key, "has no meaning with coordinates = 'load'", "remove the key or coordinates")
+                    place.note(key, "has no meaning with coordinates = 'load'", "remove the key or coordinates")
         elif not table.transmission_ratio:
-            raise place.fault("transmission_ratio", "is missing", "give a number")
+            place.note("transmission_ratio", "is missing", "give a number")
         if 0.0 in table.transmission_ratio:
-            raise place.fault("transmission_ratio", "is 0", f"load travel per motor angle [{cls.ratio_unit}]")
+            place.note("transmission_ratio", "is 0", f"load travel per motor angle [{cls.ratio_unit}]")
+            table = replace(table, transmission_ratio=())
         every = {
             item.name: per_joint(table, item.name, len(joints), place)
             for item in fields(JointMachine)
@@ -174,6 +172,8 @@ class JointMachine:
         }
         every["transmission_ratio"] = every["transmission_ratio"] or (1.0,) * len(joints)
         every["motor_inertia"] = every["motor_inertia"] or _ZERO * len(joints)
+        if len(set(joints)) != len(joints):
+            raise place.fault("joints", "names a joint twice", "joint names must differ")
         return {"name": table.name, "joints": joints, "coordinates": coordinates, **every}
 
     @property

@@ -82,11 +82,12 @@ class UrdfRobot(CoupledMachine):
         drives = drives + np.array(found["motor_inertia"]) / np.array(found["transmission_ratio"]) ** 2
         for name in table.joint_map:
             if name not in joints:
-                raise place.below("joint_map").fault(name, "is not a joint of the log", nearest(name, joints))
+                place.below("joint_map").note(name, "is not a joint of the log", nearest(name, joints))
         names = [table.joint_map.get(name, name) for name in joints]
         gravity = table.gravity if isinstance(table.gravity, tuple) else (0.0, 0.0, -table.gravity)
         path = joined(location(place.where).parent, table.urdf)
-        tree = read_urdf(path, names, table.locked, drives.tolist(), gravity)
+        with place.at("urdf"):
+            tree = read_urdf(path, names, table.locked, drives.tolist(), gravity)
         return {**found, "tree": tree, "home": per_joint(table, "home", len(joints), place)}
 
     @property

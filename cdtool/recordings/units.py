@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from cdtool.base.errors import ConfigurationError, nearest
+from cdtool.base.errors import UsageError, nearest
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,11 @@ _DIMENSIONS = {si: {si: 1} for si in ("s", "rad", "m", "N", *RAW_UNITS)} | {
 }  # fmt: skip
 
 
-def unit(name: str, where: str) -> Unit:
-    """Return the unit of that name. Raises ConfigurationError, naming `where`, if it is unknown."""
+def unit(name: str) -> Unit:
+    """Return the unit of that name. Raises UsageError if it is unknown."""
     known = find_unit(name)
     if known is None:
-        raise ConfigurationError(f"{where}: unknown unit '{name}'", nearest(name, UNITS))
+        raise UsageError(f"unknown unit '{name}'", nearest(name, UNITS))
     return known
 
 
@@ -157,4 +157,4 @@ _LISTED = (
     "daN m, kN m, kgf m, kp m, lbf ft, lbf in, ozf in, Pa, hPa, kPa, MPa, mbar, bar, N/cm2, N/mm2, daN/cm2, kgf/cm2, "
     "psi, SI, A, mA, V, mV, %, 1, count"
 )
-UNITS = {name: unit(name, "units") for name in _LISTED.split(", ")}
+UNITS = {name: unit(name) for name in _LISTED.split(", ")}

@@ -52,6 +52,7 @@ def limit_rules(
     detectors: Sequence[tuple[str, str]],
     groups: Sequence[str],
     kinds: Sequence[str] = (),
+    complete: bool = True,
 ) -> tuple[LimitRule, ...]:
     """Return the rules of [limits], with the mistakes in `place`.
 
@@ -67,6 +68,9 @@ def limit_rules(
         Names of the groups.
     kinds : sequence of str
         Names of the kinds of contacts in the groups, as GROUP/KIND; `*` does not stand for them.
+    complete : bool
+        Whether these are all detectors, groups and kinds; if not, because of another mistake, only the metrics are
+        checked.
 
     Returns
     -------
@@ -81,18 +85,20 @@ def limit_rules(
     """
     full = {name: name for name, _ in detectors} | {short: name for name, short in detectors} | {ALL: ALL}
     rules = []
-    for key, bounds in limits.items() if place.is_whole else ():
+    for key, bounds in limits.items():
         detector, _, rest = key.partition(".")
         group, _, figure = rest.rpartition(".")  # the name of a group may contain dots
         group = group or ALL
         if not rest:
             place.note(key, "does not name a metric", 'give "detector.group.metric", e.g. "*.stiff.p95_ms"')
+        elif figure not in FIGURES:
+            place.note(key, f"unknown metric '{figure}'", nearest(figure, FIGURES))
+        elif not complete:
+            continue
         elif detector not in full:
             place.note(key, f"unknown detector '{detector}'", nearest(detector, full))
         elif group != ALL and group not in (*groups, *kinds):
             place.note(key, f"unknown group '{group}'", nearest(group, [ALL, *groups, *kinds]))
-        elif figure not in FIGURES:
-            place.note(key, f"unknown metric '{figure}'", nearest(figure, FIGURES))
         elif group in kinds and group not in groups and figure in COUNTED_ALWAYS:
             place.note(key, f"{figure} of one kind of contacts", "set this limit for the whole group")
         else:

@@ -218,3 +218,51 @@ def test_without_a_machine_the_keys_of_the_channels_are_checked(tmp_path):
         read(tmp_path, '[machine]\ntype = "planar_arm"\ngravity = "low"\n' + wrong)
     keys = [fault.key for fault in caught.value.mistakes]
     assert {"machine.gravity", "channels.acceleration.time_offse", "channels.speed.unit"} < set(keys)
+
+
+MISTAKEN = """
+name = 3
+joints = ["a", "a"]
+motor_inertia = [1.0, 2.0, 3.0]
+transmission_ratio = 0
+load_inertia = "heavy"
+[channels]
+time = { column = "t", unit = "furlong" }
+torque = { columns = ["a", "b", "c"], unit = "A" }
+speed = { columns = ["a", "b"], unit = "kg", scale = 0 }
+position = { columns = ["a", "b"], unit = "rad", min = 5, max = 1, saturation = [3, 1] }
+force = { columns = ["x", "x"], unit = "N", direction = [0, 0] }
+acceleration = { unit = "rad/s2", scale = [1, 2, 3] }
+[detectors]
+gm = { gain = 3 }
+[model.friction]
+viscous = [1, 2, 3]
+"""
+
+
+@pytest.mark.parametrize("kind", ['type = "rotary_axis"', "type = rotary_axis", 'type = "rotary"', ""])
+def test_no_mistake_hides_another_nor_leads_to_a_false_one(tmp_path, kind):
+    with pytest.raises(MistakesError) as caught:
+        read(tmp_path, f"[machine]\n{kind}{MISTAKEN}")
+    keys = {fault.key for fault in caught.value.mistakes}
+    assert keys - {"machine.type", ""} == {
+        "machine.name",
+        "machine.joints",
+        "machine.motor_inertia",
+        "machine.transmission_ratio",
+        "machine.load_inertia",
+        "channels.time.unit",
+        "channels.torque.columns",
+        "channels.torque.scale",
+        "channels.speed.unit",
+        "channels.speed.scale",
+        "channels.position.min",
+        "channels.position.saturation",
+        "channels.force.columns",
+        "channels.force.direction",
+        "channels.acceleration.column",
+        "channels.acceleration.scale",
+        "detectors.gm.gain",
+        "model.friction.viscous",
+    }
+    assert len(caught.value.mistakes) == len(keys)

@@ -161,7 +161,7 @@ def identify(
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
     payload, press_logs = _for_this_machine(other_logs, machine_file)
-    paths, reading = read_until(logs, "LOGS", workers)
+    paths, reading = read_until(logs, workers)
     runs, recordings = _impact_free(paths, machine_file, replace(reading, progress=progress))
     given = read_toml(path, "a machine file")
     robot = _identify_robot(machine_file, recordings, given, payload, reading)
@@ -217,7 +217,7 @@ def _for_this_machine(
     return None, logs
 
 
-def read_until(logs: Sequence[str | Path], key: str, workers: Workers | None = None) -> tuple[list[Path], RunReading]:
+def read_until(logs: Sequence[str | Path], workers: Workers | None = None) -> tuple[list[Path], RunReading]:
     """Return the paths of the logs and how they are read: each up to its first contact, if its load cell shows one.
 
     In place of logs one benchmark file may be given: its [learn] logs are read as `cdtool benchmark` reads them, with
@@ -228,7 +228,7 @@ def read_until(logs: Sequence[str | Path], key: str, workers: Workers | None = N
         benchmark = read_benchmark_file(given[0])
         return list(benchmark.learn), replace(benchmark.run_reading(workers), operations="whole")
     reading = RunReading("whole", onset=OnsetRule(), part=_up_to_contact, workers=workers or Workers())
-    return find_logs(map(str, logs), Path(), key), reading
+    return find_logs(map(str, logs), Path()), reading
 
 
 def _up_to_contact(listed: Path, recording: Recording) -> tuple[Recording, Sequence[Contact]]:
@@ -263,7 +263,7 @@ def _identify_robot(
     loaded = None
     if payload is not None:
         body = payload.payload(machine)
-        paths, _ = read_until(payload.logs, "payload")
+        paths, _ = read_until(payload.logs)
         loaded = _impact_free(paths, machine_file, reading)[1], body
     return identify_joints(recordings, machine, given, machine_file.path.parent, loaded)
 

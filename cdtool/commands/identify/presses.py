@@ -53,7 +53,7 @@ def read_presses(logs: PressLogs, machine_file: MachineFile) -> Presses:
     if is_rotary and logs.lever_arm is None:
         raise UsageError("a rotary axis needs the lever arm of its load cell", "give it in m")
     recordings, skipped = [], []
-    for path in find_logs(logs.logs, Path(), "presses"):
+    for path in find_logs(logs.logs, Path()):
         try:
             recordings.append(_with_contact(path, machine_file))
         except CdtoolError as fault:

@@ -203,7 +203,7 @@ def init_study(
     """
     target, paths = location(folder), [location(log) for log in several_logs(logs)]
     file = target / "benchmark.toml"
-    impact_free = find_logs(free, Path(), "--free") if free else []
+    impact_free = find_logs(free, Path()) if free else []
     known = {path.resolve() for path in impact_free}
     paths = [*(path for path in paths if path.resolve() not in known), *impact_free]
     if urdf is not None and machine is not None:

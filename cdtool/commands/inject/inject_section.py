@@ -287,7 +287,7 @@ def inject_section(table: InjectTable, place: Place, found: LogsOf, groups: tupl
     if table.joint and table.joint not in joints:
         place.note("joint", f"is '{table.joint}'", nearest(table.joint, joints))
     return InjectSection(
-        logs=place.tried((), found.of, table.logs, place.key("logs")),
+        logs=place.tried((), found.of, table.logs, place),
         obstacles=_obstacles(table, place, shipped, groups),
         positions=_positions(table.positions, place, machine),
         duration=table.duration_s,

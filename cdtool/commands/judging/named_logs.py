@@ -113,9 +113,10 @@ class LogsOf:
     machine_file: MachineFile
     runs: bool = False
 
-    def of(self, logs: Sequence[str], key: str) -> tuple[Path, ...]:
-        """Return the files that the patterns `logs` of the `key` name; raises ConfigurationError for no match."""
-        return self._without_files_beside(find_logs(logs, self.base, key, runs=self.runs))
+    def of(self, logs: Sequence[str], place: Place) -> tuple[Path, ...]:
+        """Return the files that the patterns of the key `logs` name; raises ConfigurationError for no match."""
+        with place.at("logs"):
+            return self._without_files_beside(find_logs(logs, self.base, runs=self.runs))
 
     def sections(self, table: LogsTable, place: Place) -> dict[Path, LogSection]:
         """Return the files that a table names, with the part of each that is used.
@@ -129,7 +130,9 @@ class LogsOf:
             pattern, section = entry, common
             if isinstance(entry, LogEntry):
                 pattern, section = entry.path, entry.section(place.below(f"logs[{number}]"), common)
-            for path in find_logs([str(pattern)], self.base, place.key("logs"), runs=self.runs):
+            with place.at("logs"):
+                matching = find_logs([str(pattern)], self.base, runs=self.runs)
+            for path in matching:
                 if found.setdefault(path, section) != section:
                     raise place.fault("logs", f"names {path} with two different parts", "name each log once")
         if not found and place.is_whole:
@@ -158,7 +161,7 @@ def named_logs(
     for name, table in tables.items():
         if not name.strip():
             raise place.fault(name, "has no name", "give it a name")
-        for log in found_logs.of(table.logs, place.below(name).key("logs")):
+        for log in found_logs.of(table.logs, place.below(name)):
             path = known.get(log.resolve())
             if path is None:
                 raise place.fault(name, f"names {log}, which is not in a group of [impacts]", "name only scored logs")

@@ -10,7 +10,7 @@ from glob import escape
 from os import PathLike
 from pathlib import Path
 
-from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, is_lasting
+from cdtool.base.errors import CdtoolError, RecordingError, UsageError, is_lasting
 from cdtool.base.findings import Finding
 from cdtool.base.remote.remote_path import is_remote, joined, location
 from cdtool.commands.judging.impact_free import contacts_shown, unchecked, without_contacts
@@ -50,8 +50,8 @@ class Runs:
     lasts: bool = True
 
 
-def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = False) -> list[Path]:
-    """Return the logs that the patterns name below `base`, each once, in order; ConfigurationError for none.
+def find_logs(patterns: Iterable[str], base: Path, *, runs: bool = False) -> list[Path]:
+    """Return the logs that the patterns name below `base`, each once, in order; UsageError for none.
 
     A log is a file, or a folder that rosbag2 wrote.
 
@@ -63,10 +63,10 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
         of_runs = [] if matches else _runs_matching(pattern, base)
         if not matches and not (runs and of_runs):
             hint = 'to name runs of a file, set operations = "column:NAME"' if of_runs else "check the path"
-            raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", hint)
+            raise UsageError(f"no file matches '{pattern}' in {base}", hint)
         found.update(dict.fromkeys(matches or of_runs))
     if not found:
-        raise ConfigurationError(f"{key}: is empty", "name at least one log")
+        raise UsageError("is empty", "name at least one log")
     return list(found)
 
 

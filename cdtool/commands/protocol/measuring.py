@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cdtool.base.errors import ConfigurationError, nearest
+from cdtool.base.errors import UsageError, nearest
+from cdtool.base.settings import Place
 from cdtool.commands.judging.matched_log import CutLog, force_curves
 from cdtool.commands.judging.runs import absent_truth, find_logs, resolve_all
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, Repetition, Unmeasured, assess_point
@@ -95,29 +96,29 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
     groups = dict(zip(resolve_all(log for _, log in scored), scored, strict=True))
     excluded: dict[Path, str] = {}
     absent: list[Reason] = []
+    protocol = Place(str(file.path), "protocol.")
     for number, item in enumerate(file.plan.exclusions, 1):
-        found, missing = _found(item.logs, file, f"exclusion[{number}]")
+        place = protocol.below(f"exclusion[{number}]")
+        found, missing = _found(item.logs, file, place)
         absent += missing
-        for log in found:
-            excluded[_scored_log(log, groups, file, f"exclusion[{number}]")[1]] = item.reason
+        excluded |= {path: item.reason for _, path in _scored_logs(found, groups, place)}
     owner: dict[Path, int] = {}
     points = []
     for number, point in enumerate(file.plan.points, 1):
-        key = f"point[{number}]"
+        place = protocol.below(f"point[{number}]")
         if point.group:
-            logs = _of_group(point, setup, f"{file.path}: protocol.{key}.group")
+            logs = _of_group(point, setup, place)
         else:
-            found, missing = _found(point.logs, file, key)
+            found, missing = _found(point.logs, file, place)
             absent += missing if found else []
             # Two patterns may name one file: it is one recording.
-            logs = list(dict.fromkeys(_scored_log(log, groups, file, key) for log in found))
+            logs = list(dict.fromkeys(_scored_logs(found, groups, place)))
         for _, log in logs:
             if owner.setdefault(log, number) != number:
-                raise ConfigurationError(
-                    f"{file.path}: protocol.{key}: {log} is also of the point {owner[log]}",
-                    "a recording belongs to one point",
-                )
+                problem = f"{log} is also of the point {owner[log]}"
+                protocol.note(f"point[{number}]", problem, "a recording belongs to one point")
         points.append(PointLogs(point, tuple((group, log) for group, log in logs if log not in excluded)))
+    protocol.finish()
     return Assignment(tuple(points), excluded, tuple(absent))
 
 
@@ -127,34 +128,33 @@ def profiles_of(item: PointLogs, file: ProtocolFile, setup: BenchmarkFile) -> Fo
     return file.profile_of(item.point, setup.impacts[names[0]].force if names else None)
 
 
-def _found(patterns: Sequence[str], file: ProtocolFile, key: str) -> tuple[list[Path], list[Reason]]:
+def _found(patterns: Sequence[str], file: ProtocolFile, place: Place) -> tuple[list[Path], list[Reason]]:
     """Return the files that patterns name, and the patterns without one; before the test there may be none."""
     found: list[Path] = []
     missing: list[Reason] = []
     for pattern in patterns:
         try:
-            found += find_logs([pattern], file.path.parent, f"{file.path}: protocol.{key}.logs", runs=True)
-        except ConfigurationError:
-            values = {"entry": f"protocol.{key}.logs", "pattern": pattern}
+            found += find_logs([pattern], file.path.parent, runs=True)
+        except UsageError:
+            values = {"entry": f"{place.prefix}logs", "pattern": pattern}
             missing.append(Reason("no_file", values, due="test_day"))
     return found, missing
 
 
-def _scored_log(log: Path, groups: Mapping[Path, tuple[str, Path]], file: ProtocolFile, key: str) -> tuple[str, Path]:
-    """Return the group and the path of a log in the benchmark file."""
-    known = groups.get(log.resolve())
-    if known is None:
-        raise ConfigurationError(
-            f"{file.path}: protocol.{key}.logs: {log} is not in a group of [impacts] of the benchmark file",
-            "add it to a group there",
-        )
-    return known
+def _scored_logs(logs: Sequence[Path], groups: Mapping[Path, tuple[str, Path]], place: Place) -> list[tuple[str, Path]]:
+    """Return the group and the path of each log in the benchmark file."""
+    for log in logs:
+        if log.resolve() not in groups:
+            problem = f"{log} is not in a group of [impacts] of the benchmark file"
+            place.note("logs", problem, "add it to a group there")
+    return [groups[log.resolve()] for log in logs if log.resolve() in groups]
 
 
-def _of_group(point: MeasuringPoint, setup: BenchmarkFile, key: str) -> list[tuple[str, Path]]:
+def _of_group(point: MeasuringPoint, setup: BenchmarkFile, place: Place) -> list[tuple[str, Path]]:
     names = [name for name, group in setup.impacts.items() if not group.is_impact_free]
     if point.group not in names:
-        raise ConfigurationError(f"{key}: no group '{point.group}' in {setup.path}", nearest(point.group, names))
+        place.note("group", f"no group '{point.group}' in {setup.path}", nearest(point.group, names))
+        return []
     return [(point.group, log) for log in setup.impacts[point.group].logs]
 
 

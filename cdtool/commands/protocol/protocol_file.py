@@ -108,8 +108,11 @@ def read_protocol_file(path: str | Path) -> ProtocolFile:
         below.note("benchmark", "is only for a file of its own", "remove the key")
     for number, point in enumerate(table.points, 1):
         if point.profile and profiles:
-            with place.noting(), below.at(f"point[{number}].profile"):
-                profile_of(profiles, point.profile)
+            at = below.below(f"point[{number}]")
+            with place.noting(), at.at("profile"):
+                profile = profile_of(profiles, point.profile)
+                with at.at("body_area"):
+                    profile.pressure_limit(point.body_area)
     place.finish()
     base = file if is_benchmark else joined(file.parent, table.benchmark) if table.benchmark else None
     return ProtocolFile(file, table, base, profiles, limits)

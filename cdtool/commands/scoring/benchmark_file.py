@@ -375,20 +375,16 @@ def read_benchmark_file(
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
-    given, machine_file = apply_settings(values, settings or {}), None
-    table = read(BenchmarkTable, given, place)
-    if table is not None:
-        named = joined(file.parent, table.machine)
-        machine_file = place.tried(None, lambda: read_machine_file(named_file(place, "machine", named)))
-    else:  # perhaps only for want of a machine
-        table = read(BenchmarkTable, {**given, "machine": ""}, replace(place, mistakes=[], misspelt=[]))
+    table = read(BenchmarkTable, apply_settings(values, settings or {}), place)
     if table is None:
         place.finish()
     assert table is not None
+    named = joined(file.parent, table.machine)
+    machine_file = place.tried(None, lambda: read_machine_file(named_file(place, "machine", named)))
     stated = {key: value for key, value in (settings or {}).items() if key.partition(".")[0] != "execution"}
     wanted = _Wanted(learning, tuple(also_known), tuple(detectors), stated)
     if machine_file is None:  # the rest is checked with another one, but for what depends on its channels and model
-        table, machine_file = replace(table, limits={}), _other_machine(table.joints)
+        machine_file = _other_machine(table.joints)
     benchmark = _resolved(file, table, place, machine_file, wanted)
     place.finish()
     if learning:
@@ -431,9 +427,11 @@ def _resolved(
     learn: dict[Path, LogSection] = place.tried({}, _learned, table, place, found, needs_runs)
     impacts, sections = _groups(table, place, found)
     scored, with_impacts = _scored(impacts, impact_free=True), _scored(impacts)
-    made = None
-    if table.inject is not None and machine_file.digest:  # a machine file in place of another has none
+    made, machine_known = None, bool(machine_file.digest)  # one in place of another has none
+    if table.inject is not None and machine_known:
         made = place.tried(None, SECTIONS.load("inject").read, table.inject, place, found, table.operations, impacts)
+    elif table.inject is not None:
+        read(SECTIONS.load("inject").table, table.inject, place.below("inject"))
     learn = _under_scored_paths(learn, scored)
     onset = place.below("onset")
     labels = place.tried(None, labels_of, table.onset, onset, found, scored, tuple(learn))
@@ -468,6 +466,7 @@ def _resolved(
                 if not group.condition
                 for kind in _kinds(machine_file, labels)
             ],
+            complete=place.is_whole and machine_known,
         ),
         digest=_digest(file, settings),
         window=table.window_s,

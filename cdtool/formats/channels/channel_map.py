@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from cdtool.base.errors import ConfigurationError, nearest
+from cdtool.base.errors import nearest
 from cdtool.base.log_names import log_stem
 from cdtool.base.settings import CountFromZero, NotNegative, Place, Positive, Text, read, setting
 from cdtool.base.value_words import value_in_words
@@ -320,7 +319,7 @@ def channel_maps(
 ) -> tuple[ChannelMap, ChannelMap]:
     """Return the maps of columns, [channels], and of topics, [channels.mcap], with the mistakes in `place`.
 
-    `accepted`: SI units per channel.
+    `accepted`: SI units per channel. `joints`: empty if they are not known, because the machine is wrong.
     """
     nothing = ChannelMap(TimeSource(), (), joints)
     if not isinstance(given, dict):
@@ -357,7 +356,8 @@ def _column_time(table: ClockTable | None, above: Place) -> TimeSource:
         raise place.fault("column", "is missing", _COLUMN_HINT)
     if not table.unit:
         raise place.fault("unit", "is missing", "give s, ms, us, ns or min")
-    found = unit(table.unit, place.key("unit"))
+    with place.at("unit"):
+        found = unit(table.unit)
     if found.si != "s":
         raise place.fault("unit", f"'{table.unit}' is not a unit of time", "give s, ms, us, ns or min")
     return TimeSource(column=table.column, factor=found.factor, unit=table.unit, nanoseconds=table.nanoseconds)
@@ -376,12 +376,15 @@ class _Sources:
         found = []
         for name in given:
             if name in CHANNELS and (channel := getattr(table, name)) is not None:
-                with place.noting(), _about(name):
+                known = len(place.mistakes)
+                with place.noting():
                     found.append(self.source(name, channel, given[name], place.below(name)))
+                for fault in place.mistakes[known:]:
+                    fault.channel = name
         return found
 
     def source(self, channel: str, table: ChannelTable, given: Mapping[str, Any], place: Place) -> ChannelSource:
-        """Return the source of a channel; raises ConfigurationError for keys that do not fit together."""
+        """Return the source of a channel, with the mistakes in `place`; raises ConfigurationError for some of them."""
         if channel not in RIG_UNITS:
             table = replace(table, file=None)
         self._refuse_others(channel, table, given, place)
@@ -390,22 +393,23 @@ class _Sources:
         fields: tuple[str, ...] = ()
         topics = self.topics and table.file is None
         if topics:
-            fields = _fields(table, place)
+            fields = place.tried((), _fields, table, place)
         else:
-            columns = _columns(table, channel, count, place)
-            count = len(columns)
+            columns = place.tried((), _columns, table, channel, count, place)
+            count = len(columns) or count
         if len(fields) > 1:
             count = len(fields)
-        duty = _duty(table, place) if table.kind == "duty" else None
+        duty = place.tried(None, _duty, table, place) if table.kind == "duty" else None
         scaled = _Scaled(channel, self.accepted(channel), count, topics)
-        stated, si, factor = scaled.unit_and_factor(table, duty, place)
+        nothing: tuple[str, str, tuple[float, ...]] = ("", "", ())
+        stated, si, factor = place.tried(nothing, scaled.unit_and_factor, table, duty, place)
         least = -math.inf if table.min is None else table.min
         most = math.inf if table.max is None else table.max
         if least >= most:
-            raise place.fault("min", f"is {least:g}, max is {most:g}", "give the sensor's smallest and largest value")
+            place.note("min", f"is {least:g}, max is {most:g}", "give the sensor's smallest and largest value")
         if table.saturation and table.saturation[0] >= table.saturation[1]:
             hint = "give [lowest, highest] reading of the sensor, in the log's unit"
-            raise place.fault("saturation", f"is {value_in_words(table.saturation)}", hint)
+            place.note("saturation", f"is {value_in_words(table.saturation)}", hint)
         return ChannelSource(
             channel=channel,
             columns=columns,
@@ -420,7 +424,7 @@ class _Sources:
             most=most,
             duty=duty,
             fields=fields if len(fields) > 1 else (),
-            direction=() if table.direction is None else _direction(table.direction, count, place),
+            direction=() if table.direction is None else place.tried((), _direction, table.direction, count, place),
             own_file=None if table.file is None else _own_file(table, place, in_messages=self.topics),
             kinds=() if table.kinds is None else _kinds(table.kinds, place),
             unit_confirmed=table.unit_confirmed,
@@ -447,16 +451,6 @@ class _Sources:
             place.note("kind", "'duty' is only for the torque channel", "remove it")
 
 
-@contextmanager
-def _about(channel: str) -> Iterator[None]:
-    """State the channel in an error that is raised inside, for code that can do without one."""
-    try:
-        yield
-    except ConfigurationError as fault:
-        fault.channel = channel
-        raise
-
-
 def _kinds(given: Mapping[str, str], place: Place) -> tuple[tuple[float, str], ...]:
     """Return the values of a label that are contacts, each with its kind: { 1 = "hard", 2 = "soft" }."""
     below, kinds = place.below("kinds"), []
@@ -467,12 +461,12 @@ def _kinds(given: Mapping[str, str], place: Place) -> tuple[tuple[float, str], .
             code = math.nan
         if not math.isfinite(code):
             hint = 'give values of the column: kinds = { 1 = "hard", 2 = "soft" }'
-            raise below.fault(value, "is not a number", hint)
+            below.note(value, "is not a number", hint)
         if not kind.strip():
-            raise below.fault(value, "has no name", "name the kind; leave out values that are not contacts")
+            below.note(value, "has no name", "name the kind; leave out values that are not contacts")
         kinds.append((code, kind.strip()))
     if not kinds or len({code for code, _ in kinds}) < len(kinds):
-        raise place.fault("kinds", "is empty, or has a value twice", 'give each value once: { 1 = "hard", 2 = "soft" }')
+        place.note("kinds", "is empty, or has a value twice", 'give each value once: { 1 = "hard", 2 = "soft" }')
     return tuple(kinds)
 
 
@@ -504,7 +498,7 @@ def _own_file(table: ChannelTable, place: Place, *, in_messages: bool) -> OwnFil
 
 
 def _columns(table: ChannelTable, channel: str, count: int, place: Place) -> tuple[str | int, ...]:
-    """Return the columns of a channel: `count`, or for a force up to one per axis."""
+    """Return the columns of a channel: `count` unless that is 0, or for a force up to one per axis."""
     if table.columns is not None and table.column is not None:
         raise place.fault("columns", "cannot be combined with 'column'", "remove one of the two")
     if table.columns is None and table.column is None:
@@ -512,8 +506,8 @@ def _columns(table: ChannelTable, channel: str, count: int, place: Place) -> tup
     columns = (table.column,) if table.columns is None else table.columns
     if channel == "force" and table.columns is not None:
         _check_axes("columns", columns, place)
-    elif len(columns) != count:
-        raise place.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
+    elif count and len(columns) != count:
+        place.note("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
     return tuple(column for column in columns if column is not None)
 
 
@@ -535,9 +529,9 @@ def _fields(table: ChannelTable, place: Place) -> tuple[str, ...]:
 
 def _check_axes(key: str, names: Sequence[object], place: Place) -> None:
     if not 1 <= len(names) <= len(AXES):
-        raise place.fault(key, f"names {len(names)} axes", "give up to three: the axes of the force")
+        place.note(key, f"names {len(names)} axes", "give up to three: the axes of the force")
     if len(set(names)) < len(names):
-        raise place.fault(key, "names an axis twice", "name each axis once")
+        place.note(key, "names an axis twice", "name each axis once")
 
 
 def _direction(given: str | tuple[float, ...], count: int, place: Place) -> tuple[float, ...]:
@@ -572,16 +566,17 @@ class _Scaled:
         """Return the unit as stated, the channel's own unit, and the factors between them."""
         if len(table.scale) not in (0, 1, self.count):
             hint = f"give one number, or {self.count}: one per joint"
-            raise place.fault("scale", f"has {len(table.scale)} values", hint)
+            place.note("scale", f"has {len(table.scale)} values", hint)
         scale = (table.scale or (1.0,)) * (1 if len(table.scale) == self.count else self.count)
         if 0.0 in scale:
-            raise place.fault("scale", "is 0", "give a factor other than 0, e.g. N m per A")
+            place.note("scale", "is 0", "give a factor other than 0, e.g. N m per A")
         if self.channel in UNITLESS:  # a unit is meaningless and refused as an unknown key
             return "", "1", scale
         if not table.unit and (not self.topics or duty is not None):
             raise place.fault("unit", "is missing", f"give the unit of the log, e.g. {self.accepted[0]}")
         name = table.unit or self.accepted[0]
-        found = unit(name, place.key("unit"))
+        with place.at("unit"):
+            found = unit(name)
         factor = tuple(found.factor * item for item in scale)
         if duty is not None:
             if found.si not in ("1", "V"):

@@ -87,9 +87,7 @@ class ModelTable:
             below = place.below(name)
             given = read(_SECTIONS[name], values, below)
             keys = [key for key in values if joints and key in _NUMBERS[name]]
-            found: dict[str, tuple[float, ...]] = {
-                key: place.tried((), per_joint, given, key, joints, below) for key in keys
-            }
+            found: dict[str, tuple[float, ...]] = {key: per_joint(given, key, joints, below) for key in keys}
             if getattr(given, "rigid", False):
                 found["stated_rigid"] = (True,) * joints
             sections[name] = found

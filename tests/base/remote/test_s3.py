@@ -103,9 +103,9 @@ def test_patterns_and_hidden_names(bucket):
     base = location(f"{bucket.url}/2026")
     from cdtool.commands.judging.runs import find_logs
 
-    assert [path.name for path in find_logs(["*/*.csv"], base, "logs")] == ["1.csv", "2.csv"]
-    assert [path.name for path in find_logs(["**/*.csv"], base, "logs")] == ["4.csv", "1.csv", "2.csv"]
-    assert [path.name for path in find_logs([f"{bucket.url}/2026/*.csv"], Path(), "logs")] == ["4.csv"]
+    assert [path.name for path in find_logs(["*/*.csv"], base)] == ["1.csv", "2.csv"]
+    assert [path.name for path in find_logs(["**/*.csv"], base)] == ["4.csv", "1.csv", "2.csv"]
+    assert [path.name for path in find_logs([f"{bucket.url}/2026/*.csv"], Path())] == ["4.csv"]
 
 
 def test_a_missing_object_or_bucket_is_one_line(bucket):

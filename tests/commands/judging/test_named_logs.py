@@ -36,7 +36,7 @@ def logs(folder: Path) -> LogsOf:
 def test_the_file_of_a_logs_load_cell_is_not_a_log(tmp_path, force, names):
     for name in ("01.csv", "01_cell.csv", "02.csv", "03_cell.csv"):  # the last one has no log
         (tmp_path / name).write_text("t\n", encoding="utf-8")
-    found = LogsOf(tmp_path, machine(tmp_path, force)).of(["*.csv"], "b.toml: learn.logs")
+    found = LogsOf(tmp_path, machine(tmp_path, force)).of(["*.csv"], Place("b.toml", "learn."))
     assert [path.name for path in found] == names
 
 

@@ -154,13 +154,13 @@ def test_runs_are_named_only_where_logs_are_cut_and_the_file_may_contain_the_mar
         cdtool.benchmark(path)
     (tmp_path / "a#1.csv").touch()
     (tmp_path / "b.csv").touch()
-    assert find_logs(["a#1.csv#7*", "a#1.csv", "?.csv#x"], tmp_path, "logs", runs=True) == [
+    assert find_logs(["a#1.csv#7*", "a#1.csv", "?.csv#x"], tmp_path, runs=True) == [
         tmp_path / "a#1.csv#7*",
         tmp_path / "a#1.csv",
         tmp_path / "b.csv#x",
     ]
-    with pytest.raises(ConfigurationError, match=r"no file matches 'c\.csv#7' .*check the path"):
-        find_logs(["c.csv#7"], tmp_path, "logs", runs=True)
+    with pytest.raises(UsageError, match=r"no file matches 'c\.csv#7' .*check the path"):
+        find_logs(["c.csv#7"], tmp_path, runs=True)
 
 
 def test_labels_name_runs_and_one_without_a_run_is_reported(folder, together):

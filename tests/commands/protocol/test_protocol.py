@@ -246,3 +246,28 @@ def test_a_deviation_without_its_point_and_a_point_twice_are_named_in_one_run(tm
     with pytest.raises(MistakesError) as caught:
         read_protocol_file(tmp_path / "protocol.toml")
     assert [fault.key for fault in caught.value.mistakes] == ["protocol.deviation", "protocol.point"]
+
+
+def test_an_unknown_group_and_a_body_area_without_a_limit_hide_nothing(tmp_path):
+    write_rig(tmp_path, FORCES)
+    points = [
+        'name = "a"\nprofile = "en_12453"\nbody_area = "palm"\n',
+        'name = "b"\nprofile = "en_12453_reducing_gap"\nbody_area = "palm"\n',
+    ]
+    text = '[protocol]\nbenchmark = "benchmark.toml"\n' + "".join(f"[[protocol.point]]\n{point}" for point in points)
+    (tmp_path / "protocol.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(MistakesError) as caught:
+        read_protocol_file(tmp_path / "protocol.toml")
+    assert [fault.key for fault in caught.value.mistakes] == [
+        "protocol.point[1].profile",
+        "protocol.point[2].body_area",
+    ]
+    groups = "".join(f'[[protocol.point]]\nname = "{name}"\ngroup = "{name}"\n' for name in ("none", "neither"))
+    (tmp_path / "protocol.toml").write_text(f'[protocol]\nbenchmark = "benchmark.toml"\n{groups}', encoding="utf-8")
+    outcome = cdtool("protocol", "check", tmp_path / "protocol.toml")
+    assert outcome.status == 2
+    lines = outcome.err.splitlines()
+    assert [line.split("protocol.toml: ")[1].split(":")[0] for line in lines] == [
+        "protocol.point[1].group",
+        "protocol.point[2].group",
+    ]

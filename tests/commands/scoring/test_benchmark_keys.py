@@ -231,10 +231,13 @@ def test_a_missing_machine_file_hides_no_other_mistake(gate):
         HEAD.replace("machine.toml", "machin.toml").replace('"gm"', '"gmm"')
         + 'threshold = "cusun"\njoints = ["gate"]\n'
     )
+    limits = '[limits]\n"gmm.stif.p95_ms" = { max = 3 }\n"*.stiff.p96_ms" = { max = 3 }\n[inject]\nseed = -1\n'
     with pytest.raises(ConfigurationError) as fault:
-        run(gate, wrong, '[learn]\nlogs = ["fre/*.csv"]\n', STIFF)
+        run(gate, wrong, '[learn]\nlogs = ["fre/*.csv"]\n', STIFF, limits)
     said = [line.split("b.toml: ")[1].split(" (")[0] for line in str(fault.value).splitlines()]
-    assert [line.split(": ")[0] for line in said] == ["machine", "detectors", "threshold", "learn.logs"]
+    of_inject = ["inject.seed", "inject.logs", "inject.positions"]
+    expected = ["machine", "detectors", "threshold", "learn.logs", *of_inject, "limits.*.stiff.p96_ms"]
+    assert [line.split(": ")[0] for line in said] == expected
     assert "machin.toml: no such file" in said[0] and "unknown detector 'gmm'" in said[1]
 
 

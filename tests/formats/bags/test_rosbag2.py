@@ -233,10 +233,10 @@ def test_a_folder_is_a_log_of_a_benchmark_where_its_metadata_says_so(tmp_path):
 
     first, second = bag_folder(tmp_path / "bag_1", 1), bag_folder(tmp_path / "bag_2", 2)
     (tmp_path / "bag_3").mkdir()
-    assert find_logs(["bag_*"], tmp_path, "logs") == [first, second]
-    assert find_logs(["bag_1"], tmp_path, "logs") == [first]
-    with pytest.raises(cdtool.base.errors.ConfigurationError, match="no file matches 'bag_3'"):
-        find_logs(["bag_3"], tmp_path, "logs")
+    assert find_logs(["bag_*"], tmp_path) == [first, second]
+    assert find_logs(["bag_1"], tmp_path) == [first]
+    with pytest.raises(cdtool.base.errors.UsageError, match="no file matches 'bag_3'"):
+        find_logs(["bag_3"], tmp_path)
 
 
 @pytest.mark.parametrize("version", [8, 9])
