@@ -237,7 +237,7 @@ def _levels(series: Series) -> FloatArray:
     about = values.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     first = np.searchsorted(series.time, series.time - LEVEL_SECONDS, side="right")
     sums = (np.cumsum(part, axis=0) for part in (np.where(known, values - about, 0.0), known))
-    before = (np.concatenate((np.zeros((1, series.joint_count)), part)) for part in sums)
-    total, count = (part[1:] - part[first] for part in before)
+    until = (np.concatenate((np.zeros((1, series.joint_count)), part)) for part in sums)
+    total, count = (part[1:] - part[first] for part in until)
     enough = max(FILLED * min(LEVEL_SECONDS / series.period, len(series)), 1.0) if len(series) > 1 else 1.0
     return np.where(count >= enough, total / np.maximum(count, 1.0) + about, np.nan)
