@@ -235,9 +235,9 @@ def _levels(series: Series) -> FloatArray:
     values = np.where(np.isfinite(median), median, np.where(known, own, 0.0))
     # Sums about the mean keep their digits at any offset.
     about = values.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    sums = np.cumsum((np.where(known, values - about, 0.0), known), axis=1)
-    sums = np.concatenate((np.zeros((2, 1, series.joint_count)), sums), axis=1)
     first = np.searchsorted(series.time, series.time - LEVEL_SECONDS, side="right")
-    total, count = sums[:, 1:] - sums[:, first]
+    sums = (np.cumsum(part, axis=0) for part in (np.where(known, values - about, 0.0), known))
+    until = (np.concatenate((np.zeros((1, series.joint_count)), part)) for part in sums)
+    total, count = (part[1:] - part[first] for part in until)
     enough = max(FILLED * min(LEVEL_SECONDS / series.period, len(series)), 1.0) if len(series) > 1 else 1.0
     return np.where(count >= enough, total / np.maximum(count, 1.0) + about, np.nan)

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.detectors.detection import WHOLE_MACHINE
 from cdtool.recordings.recording import REFERENCES, Recording
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, NormalMotion, levels_of
@@ -111,13 +111,14 @@ def departures(
             continue
         series = recording[channel]
         rows = slice(*np.searchsorted(series.time, (begin - PAST_SECONDS, end)))
-        time, course = series.time[rows], normal.compare(recording, channel) if normal else (levels_of(series),)
+        time = series.time[rows]
         for j, name in enumerate(recording.joints):
             if normal is not None and channel in POSITIONS and name == leading:
                 continue  # the position of the leading joint is the location itself
-            columns = [part[rows, j] for part in course]
             if normal is None:
-                columns = own_past(time, columns[0], begin)
+                columns = own_past(time, levels_of(series)[rows, j], begin)
+            else:
+                columns = [part[rows, j] for part in normal.compare(recording, channel)]
             # The assumed start of the motion shifts a whole position: only a change of its distance counts.
             offset = 0.0 if normal is None else math.inf if channel in POSITIONS else OWN_OFFSET
             item = _departure(Departure(channel, name, series.unit), time, columns, begin, offset)
@@ -169,8 +170,9 @@ def _departure(
             channel, value=float(value[start + k]), mean=float(mean[start + k]), spread=float(spread[start + k]), **more
         )
 
-    outside = [np.flatnonzero(_lasts(sign * off > LEFT))[:1] for sign in (1.0, -1.0)]
-    firsts = [(int(found[0]), sign) for found, sign in zip(outside, (1.0, -1.0), strict=True) if len(found)]
+    # Where so many consecutive samples begin that are all outside: each is a byte 1.
+    firsts = [((sign * off > LEFT).tobytes().find(b"\1" * LASTING), sign) for sign in (1.0, -1.0)]
+    firsts = [(found, sign) for found, sign in firsts if found >= 0]
     if not firsts:
         return at(int(np.nanargmax(np.abs(off))), reason=STAYED)
     first, sign = min(firsts)
@@ -182,13 +184,6 @@ def _departure(
     # The line through half of the limit and the limit meets the normal band where the departure began.
     began = float(half - min(left - half, RESOLUTION))
     return at(farthest, time=began, direction="up" if sign > 0 else "down")
-
-
-def _lasts(outside: BoolArray) -> BoolArray:
-    """Return where `LASTING` consecutive samples (n,), of at least so many, begin that are all outside."""
-    count = np.concatenate(([0], np.cumsum(outside)))
-    lasts: BoolArray = count[LASTING:] - count[:-LASTING] == LASTING
-    return lasts
 
 
 def _in_order(found: Sequence[Departure], joint: str) -> tuple[Departure, ...]:

@@ -106,10 +106,9 @@ def _dropouts(series: Series, channel: str, begin: float, end: float) -> Iterato
     """Yield gaps of the clock, and samples without a value."""
     time = series.time[np.isfinite(series.values).all(axis=1)]
     steps = np.diff(time)
-    if len(steps) < MEDIAN_SAMPLES:
+    long = np.flatnonzero((steps > MISSING * series.period) & (time[1:] >= begin) & (time[:-1] <= end))
+    if len(steps) < MEDIAN_SAMPLES or not len(long):
         return
-    usual = max(MISSING * series.period, 1.2 * float(np.percentile(steps, 99.0)))
-    for k in np.flatnonzero(steps > usual):
-        if begin <= time[k + 1] and time[k] <= end:
-            missing = max(round(float(steps[k]) / series.period) - 1, 1)
-            yield Glitch("dropout", channel, "", series.unit, float(time[k]), float(time[k + 1]), missing, np.nan)
+    for k in long[steps[long] > 1.2 * float(np.percentile(steps, 99.0))]:
+        missing = max(round(float(steps[k]) / series.period) - 1, 1)
+        yield Glitch("dropout", channel, "", series.unit, float(time[k]), float(time[k + 1]), missing, np.nan)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import heapq
-from copy import deepcopy
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 
 # Operations with a miss or a false alarm, the slowest ones, and those taken evenly from all.
 MOST_STRIKING, MOST_SLOW, MOST_SAMPLED = 70, 20, 20
@@ -71,4 +71,4 @@ class TraceChoice:
 
     def copy(self) -> TraceChoice:
         """Return a choice that continues alone."""
-        return deepcopy(self)
+        return replace(self, **{name: copy(value) for name, value in vars(self).items()})
