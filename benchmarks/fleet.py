@@ -94,12 +94,14 @@ def child(file: str, store: str, jobs: str, output: str, *flags: str) -> None:
     times: list[float] = []
 
     def progress(done: int, _: int) -> None:
+        if done == 1:  # of the runs that are learned from, then of the logs that are scored
+            times.clear()
         times.append(perf_counter())
         if "report" in flags:
             os.write(1, b"%d\n" % done)
 
     use = Store(Path(store), trust_times="trust" in flags) if store else None
-    done = benchmark(file, workers=Workers(int(jobs)), store=use, progress=progress)
+    done = benchmark(file, workers=Workers(int(jobs), progress=progress), store=use)
     write_outputs(Report(done.evaluated, done.traces), [Path(output)], force=True, inputs=done.inputs)
     of = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
     skip = min(len(times) - 1, 40)  # workers start with the first recordings

@@ -27,6 +27,7 @@ from timing import Spread, main, ratio, table, verdict
 
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.commands.simulate.gate_recordings import simulate_gate
+from cdtool.execution.workers import Workers
 
 COUNTS = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
 COPIES = 10
@@ -50,11 +51,13 @@ def run(folder: str, jobs: int) -> dict[str, float]:
     import resource
 
     seen: list[tuple[int, float, float]] = []
-    done = benchmark(
-        Path(folder) / "benchmark.toml",
-        jobs=jobs,
-        progress=lambda number, _: seen.append((number, process_time(), perf_counter())),
-    )
+
+    def progress(number: int, _: int) -> None:
+        if number == 1:  # of the runs that are learned from, then of the logs that are scored
+            seen.clear()
+        seen.append((number, process_time(), perf_counter()))
+
+    done = benchmark(Path(folder) / "benchmark.toml", workers=Workers(jobs, progress=progress))
     # Workers start with the first logs; afterwards each log that comes back took its share of the time.
     first, last = seen[2 * jobs], seen[-1]
     logs = last[0] - first[0]

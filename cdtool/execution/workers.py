@@ -52,13 +52,15 @@ class Workers:
 
     An item that takes longer than `timeout` [s], or ends its worker, is tried `retries` times more. With one job and no
     timeout the work is done in this process, which an item can end. `cluster` is the address of a scheduler, or "local"
-    for one that is started here with `jobs` worker processes.
+    for one that is started here with `jobs` worker processes. `progress` is called after each item with the number done
+    and the total.
     """
 
     jobs: Count = 1
     timeout: Positive | None = None
     retries: CountFromZero = 1
     cluster: str | None = None
+    progress: Progress | None = None
 
     def __post_init__(self) -> None:
         check(self)
@@ -125,7 +127,6 @@ def in_order(
     total: int,
     workers: Workers | None = None,
     *,
-    progress: Progress | None = None,
     of_lost: OfLost | None = None,
 ) -> Iterator[Made]:
     """Yield `work` of each item, in order, whatever the workers.
@@ -143,8 +144,6 @@ def in_order(
         Their number.
     workers : Workers, optional
         Who does the work; this process if it is None, or if there are few items.
-    progress : callable, optional
-        Called after each item with the number done and the total.
     of_lost : callable, optional
         Returns the result of an item that ended its workers or took too long, given the item and the reason.
 
@@ -170,8 +169,8 @@ def in_order(
     with _without_earlier_garbage():
         for number, result in enumerate(made, 1):
             yield result
-            if progress:
-                progress(number, total)
+            if workers.progress:
+                workers.progress(number, total)
 
 
 def _made(

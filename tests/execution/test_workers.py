@@ -43,7 +43,7 @@ def refused(number):
 def test_results_come_in_the_order_of_the_items_whatever_the_number_of_jobs(jobs):
     shown = []
     made = list(
-        in_order(doubled, range(13), 13, Workers(jobs), progress=lambda done, total: shown.append((done, total)))
+        in_order(doubled, range(13), 13, Workers(jobs, progress=lambda done, total: shown.append((done, total))))
     )
     assert made == [2 * number for number in range(13)]
     assert shown == [(number, 13) for number in range(1, 14)]

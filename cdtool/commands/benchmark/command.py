@@ -94,17 +94,16 @@ def benchmark(
         "detectors": _named(detectors),
         "false_alarm_budget": false_alarm_budget,
         "settings": given_settings(settings or ()),
-        "workers": Workers(jobs, cluster=cluster),
         "store": None if store is None else Store(store),
     }
     if dry_run:
-        _show_dry_run(file, given, as_json=as_json)
+        _show_dry_run(file, {**given, "workers": Workers(jobs, cluster=cluster)}, as_json=as_json)
         return
     documents = SECTIONS.load("protocol")(file, protocol, output or [], force)
     check_outputs(documents.reports, force=force)
     documents.check()
     with progress("benchmark", quiet=quiet) as advance:
-        done = run(file, **given, progress=advance)
+        done = run(file, **given, workers=Workers(jobs, cluster=cluster, progress=advance))
     evaluated: Evaluated = done.evaluated
     try:
         command = _command(file, protocol, output or [], detectors, false_alarm_budget, settings or [])

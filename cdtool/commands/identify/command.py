@@ -145,7 +145,7 @@ def _identify_machine(
     from cdtool.commands.judging.runs import find_logs
 
     with progress("identifying", quiet=quiet) as advance:
-        done = run(logs, machine, workers=workers, progress=advance, other_logs=other_logs)
+        done = run(logs, machine, workers=replace(workers, progress=advance), other_logs=other_logs)
     written = write_identification(done, targets, find_logs(logs, Path()))
     done = replace(done, written=", ".join(str(path) for path in written if path.suffix.lower() == MACHINE))
     print_skipped(done.skipped, done.findings)

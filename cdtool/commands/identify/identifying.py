@@ -32,7 +32,7 @@ from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.commands.judging.settings_table import GUARD
 from cdtool.commands.judging.true_contacts import any_contacts
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.axis_model.model_table import ModelTable
@@ -105,7 +105,6 @@ def identify(
     *,
     force: bool = False,
     workers: Workers | None = None,
-    progress: Progress | None = None,
     other_logs: LoadedRuns | PressLogs | None = None,
 ) -> IdentifiedMachine:
     """Identify the parameters of a machine's model from impact-free logs, and update its machine file.
@@ -125,8 +124,6 @@ def identify(
         Overwrite an existing file other than `machine`.
     workers : Workers, optional
         How the logs are read.
-    progress : callable, optional
-        Called after each log with the number done and the total.
     other_logs : LoadedRuns or PressLogs, optional
         Of a robot: logs of motion with a known payload, which show the torque constants of its joints. Of an axis: logs
         of slow presses on a load cell, which show the scale of its torque.
@@ -162,7 +159,7 @@ def identify(
     machine_file = read_machine_file(path)
     payload, press_logs = _for_this_machine(other_logs, machine_file)
     paths, reading = read_until(logs, workers)
-    runs, recordings = _impact_free(paths, machine_file, replace(reading, progress=progress))
+    runs, recordings = _impact_free(paths, machine_file, reading)
     given = read_toml(path, "a machine file")
     robot = _identify_robot(machine_file, recordings, given, payload, reading)
     presses = read_presses(press_logs, machine_file) if press_logs else Presses()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -72,7 +73,7 @@ def inject(
         raise UsageError(f"--output is {plain(folders[0])} and others", "give one folder, or the files of a map")
     if folders:
         with progress("injecting", quiet=quiet) as advance:
-            made = write_logs(file, folders[0], settings=given, workers=workers, progress=advance)
+            made = write_logs(file, folders[0], settings=given, workers=replace(workers, progress=advance))
         print_skipped(made.skipped, ())
         if as_json:
             print_json(made)
@@ -83,7 +84,7 @@ def inject(
     check_coverage_files(targets, [file], force=force)
     with_traces = any(target.suffix.lower() == PAGE for target in targets)
     with progress("coverage", quiet=quiet) as advance:
-        done = coverage(file, settings=given, with_traces=with_traces, workers=workers, progress=advance)
+        done = coverage(file, settings=given, with_traces=with_traces, workers=replace(workers, progress=advance))
     print_skipped(done.skipped, done.findings)
     write_coverage(done, targets)
     if as_json:

@@ -31,7 +31,7 @@ from cdtool.commands.inject.robot_contact import RobotLog
 from cdtool.commands.inject.struck_machine import StruckAxis, StruckRobot, struck_machine
 from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.runs import shown_path, unread
-from cdtool.execution.workers import Progress, Workers, in_order
+from cdtool.execution.workers import Workers, in_order
 from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.columns import Column
@@ -339,7 +339,6 @@ def write_injected(
     folder: Path,
     base: Path,
     workers: Workers | None = None,
-    progress: Progress | None = None,
 ) -> InjectedLogs:
     """Write every injected recording below `folder`, which exists and is empty, with contacts.csv and the manifest.
 
@@ -349,9 +348,7 @@ def write_injected(
     struck = struck_machine(section, machine_file)
     work = _Work(section, machine_file, struck, assumptions_of(struck.deciding_model), onset, base, folder)
     items = list(enumerate(section.logs))
-    done: list[_OfLog] = list(
-        in_order(work, items, len(items), workers or Workers(), progress=progress, of_lost=_Lost(base))
-    )
+    done: list[_OfLog] = list(in_order(work, items, len(items), workers, of_lost=_Lost(base)))
     cases = _without_needless(work, [case for item in done for case in item.cases])
     skipped = tuple(left for item in done for left in item.skipped)
     if not cases:

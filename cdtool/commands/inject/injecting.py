@@ -17,7 +17,7 @@ from cdtool.commands.inject.injected_logs import CONTACTS, InjectedLogs, write_i
 from cdtool.commands.inject.with_injected import mark_as_made, section_of
 from cdtool.commands.judging.settings_table import apply_settings
 from cdtool.commands.scoring.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.written_files import require_free_folder
@@ -53,7 +53,6 @@ def inject(
     *,
     settings: Mapping[str, Any] | None = None,
     workers: Workers | None = None,
-    progress: Progress | None = None,
 ) -> Injected:
     """Put the contacts of a benchmark file's section [inject] into its impact-free logs, and write them as logs.
 
@@ -68,8 +67,6 @@ def inject(
         Values in place of keys of the file, as {"inject.format": "mcap", "detectors": ["gm"]}.
     workers : Workers, optional
         How the work is done; in this process by default.
-    progress : callable, optional
-        Called after each log with the number done and the total.
 
     Returns
     -------
@@ -98,7 +95,7 @@ def inject(
     folder = location(output)
     require_free_folder(folder)
     with replaced_folder(folder) as part:
-        injected = write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
+        injected = write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers)
         copied = _copy_learned(setup, section, part)
         _write_benchmark(setup, injected, copied, part)
         mark_as_made(part, setup, section)

@@ -24,7 +24,7 @@ from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, ImpactGroup
 from cdtool.detectors import DETECTORS
 from cdtool.execution.store.digest import code_version, digest_of
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.machines.axis_model.parameters import AxisModel
@@ -86,13 +86,13 @@ class InjectedGroups:
         """Return the names of the groups: one per obstacle, and per assumption about the machine."""
         return tuple(self.section.groups(assumptions_of(model_of(self.section, machine_file))))
 
-    def added(self, setup: BenchmarkFile, workers: Workers, progress: Progress | None) -> BenchmarkFile:
+    def added(self, setup: BenchmarkFile, workers: Workers) -> BenchmarkFile:
         """Return the benchmark with a group per injected obstacle.
 
         The recordings are kept in the folder that [inject] names and used again as long as nothing they depend on has
         changed. Raises OutputError if that folder holds something else.
         """
-        return with_groups(setup, self.section, injected_logs(setup, self.section, workers, progress))
+        return with_groups(setup, self.section, injected_logs(setup, self.section, workers))
 
     def found(self, setup: BenchmarkFile) -> tuple[BenchmarkFile, int]:
         """Return the benchmark with the recordings that are there, or else how many contacts are not."""
@@ -110,9 +110,7 @@ def section_of(setup: BenchmarkFile) -> InjectSection:
     return setup.made.section
 
 
-def injected_logs(
-    setup: BenchmarkFile, section: InjectSection, workers: Workers, progress: Progress | None = None
-) -> InjectedLogs:
+def injected_logs(setup: BenchmarkFile, section: InjectSection, workers: Workers) -> InjectedLogs:
     """Return the injected recordings of a section, from its folder if it has them already."""
     if (found := made_before(setup, section)) is not None:
         return found
@@ -121,7 +119,7 @@ def injected_logs(
         other = "contacts that cdtool inject made with other settings" if (folder / _DIGEST).exists() else "other files"
         raise OutputError(f"{folder}: exists and holds {other}", "set another [inject] folder, or remove it")
     with replaced_folder(folder, _may_replace) as part:
-        write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
+        write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers)
         mark_as_made(part, setup, section)
     return read_injected(folder)
 

@@ -15,7 +15,7 @@ from cdtool.base.findings import Finding
 from cdtool.base.remote.remote_path import is_remote, joined, location
 from cdtool.commands.judging.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.commands.judging.log_findings import before_contact, log_warnings
-from cdtool.execution.workers import Progress, Workers, in_order
+from cdtool.execution.workers import Workers, in_order
 from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.channels.reading import is_bag_folder, read_as_logged, read_recording
 from cdtool.formats.channels.run_reading import LogRuns, read_runs, split_run
@@ -231,8 +231,7 @@ class RunReading:
     """How impact-free logs are read: cut by `operations`, contacts refused by the `onset` rule, named below `base`.
 
     `part` returns the part of a log that is learned from and the contacts in it; None: the whole log. `scored` are the
-    logs and runs that are also scored, each by what is learned from the others. `workers` read the logs;
-    `progress` is called after each.
+    logs and runs that are also scored, each by what is learned from the others. `workers` read the logs.
     """
 
     operations: str
@@ -242,7 +241,6 @@ class RunReading:
     part: PartOfLog | None = None
     scored: Callable[[Path], bool] | None = None
     workers: Workers = field(default_factory=Workers)
-    progress: Progress | None = None
 
 
 def several_logs(logs: Sequence[str | Path]) -> list[str | Path]:
@@ -279,9 +277,7 @@ def load_runs(
     cut = RunCut.of(reading.operations)
     as_logged = _AsLogged(machine_file, cut)
     with reading.workers.ready(to_be_seen(paths)):
-        logs = list(
-            in_order(as_logged, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_lost_run)
-        )
+        logs = list(in_order(as_logged, paths, len(paths), reading.workers, of_lost=_lost_run))
     logged: list[tuple[Path, Path, LoggedRecording | CdtoolError]] = []  # as listed, the log or its run
     for path, log in zip(paths, logs, strict=True):
         if isinstance(log, _NotRead):

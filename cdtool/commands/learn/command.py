@@ -65,8 +65,7 @@ def learn_signature(
             one_detector(detectors),
             settings=given_settings(settings or ()),
             false_alarm_budget=false_alarm_budget,
-            workers=Workers(jobs, cluster=cluster),
-            progress=advance,
+            workers=Workers(jobs, cluster=cluster, progress=advance),
         )
     write_signature(output, learned.signature)
     for motion, runs in learned.runs:

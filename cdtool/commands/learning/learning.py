@@ -21,7 +21,7 @@ from cdtool.commands.learning.fitting import fitting, for_machine, signals_of, w
 from cdtool.commands.learning.normal_runs import normal_motions
 from cdtool.commands.learning.threshold_settings import set_by_hand, threshold_of
 from cdtool.detectors.base import Detector
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.formats.machine_file import MachineFile, fingerprint, machine_parameters, read_machine_file
 from cdtool.formats.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.formats.signature_store import read_signature, write_signature
@@ -73,7 +73,6 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
     false_alarm_budget: str | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
-    progress: Progress | None = None,
 ) -> LearnedSignature:
     """Learn the threshold of one detector from impact-free logs.
 
@@ -96,8 +95,6 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
         Number of logs read at a time.
     workers : Workers, optional
         In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
-    progress : callable, optional
-        Called after each log with the number done and the total.
 
     Returns
     -------
@@ -144,7 +141,6 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
         onset=rules.onset,
         part=part if guard is not None or section or rules.labels else None,
         workers=workers,
-        progress=progress,
     )
     runs = load_runs(paths, machine_file, reading)
     setting = Setting(table.joints, table.operations, table.activation, budget, table.learn.split)

@@ -68,8 +68,7 @@ def score(
             triggers,
             benchmark,
             settings=given_settings(settings or ()),
-            workers=Workers(jobs, cluster=cluster),
-            progress=advance,
+            workers=Workers(jobs, cluster=cluster, progress=advance),
         )
     results = done.evaluated.results
     report = Report(done.evaluated, done.traces)

@@ -27,7 +27,7 @@ from cdtool.commands.scoring.pieces import PieceScoring
 from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import Detections, ScoredLog, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.recordings.operations import Operation
@@ -50,7 +50,6 @@ def score(
     settings: Mapping[str, Any] | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
-    progress: Progress | None = None,
 ) -> BenchmarkResult:
     """Score the trigger times of any program against the contacts of a benchmark file's recordings.
 
@@ -66,8 +65,6 @@ def score(
         Number of logs processed at a time; the results do not depend on it.
     workers : Workers, optional
         In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
-    progress : callable, optional
-        Called after each log with the number done and the total.
 
     Returns
     -------
@@ -92,10 +89,10 @@ def score(
     setup = read_benchmark_file(benchmark, learning=False, also_known=tuple(given.rows), settings=settings)
     workers = (workers or Workers(jobs)).limited_by(setup.execution)
     with workers.ready(to_be_seen([path for item in setup.impacts.values() for path in item.logs])):
-        return _run(setup, given, workers, progress)
+        return _run(setup, given, workers)
 
 
-def _run(setup: BenchmarkFile, given: TriggerFile, workers: Workers, progress: Progress | None) -> BenchmarkResult:
+def _run(setup: BenchmarkFile, given: TriggerFile, workers: Workers) -> BenchmarkResult:
     names = tuple(given.rows)
     setup, measured = with_synchronisation(setup, workers)
     base = setup.path.parent
@@ -120,7 +117,7 @@ def _run(setup: BenchmarkFile, given: TriggerFile, workers: Workers, progress: P
     findings += unchecked(setup.limits, names, str(setup.path))
     before = results_before(setup, _provenance(setup, given), names, findings=findings)
     scoring = _TriggerScoring(setup, given.path, said)
-    scored = ScoredLogs(setup, PieceScoring(setup, scoring), work, workers, progress)
+    scored = ScoredLogs(setup, PieceScoring(setup, scoring), work, workers)
     results = results_of(setup, before, scored, {}, {})
     without = _without_run(said, known, results) if runs else []
     results = replace(results, skipped=(*results.skipped, *without), findings=(*results.findings, *scored.left_out))

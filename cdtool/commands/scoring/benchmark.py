@@ -39,7 +39,7 @@ from cdtool.commands.scoring.store.stored_learned import learned_with_store
 from cdtool.commands.scoring.store.stored_scoring import StoredScoring
 from cdtool.detectors.base import Detector
 from cdtool.execution.store.store import Store
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.plausible import LearnedRanges
 from cdtool.results.curves.false_alarm_budget import Budget
@@ -51,7 +51,7 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.normal_motion import NormalMotions
 
 
-def benchmark(  # noqa: PLR0913  # the public function: a keyword for each setting
+def benchmark(  # the public function: a keyword for each setting
     file: str | Path | BenchmarkFile,
     *,
     detectors: Sequence[str | Detector] = (),
@@ -60,7 +60,6 @@ def benchmark(  # noqa: PLR0913  # the public function: a keyword for each setti
     jobs: int = 1,
     workers: Workers | None = None,
     store: Store | None = None,
-    progress: Progress | None = None,
 ) -> BenchmarkResult:
     """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
 
@@ -83,8 +82,6 @@ def benchmark(  # noqa: PLR0913  # the public function: a keyword for each setti
         or a Dask cluster.
     store : Store, optional
         Where outcomes are kept: a log is computed only if something that determines its outcome has changed.
-    progress : callable, optional
-        Called after each log with the number done and the total.
 
     Returns
     -------
@@ -112,12 +109,12 @@ def benchmark(  # noqa: PLR0913  # the public function: a keyword for each setti
     """
     work = BenchmarkWork.of(file, detectors, false_alarm_budget, settings)
     workers, store = work.executed_by(workers or Workers(jobs), store)
-    work = replace(work, setup=work.setup.with_made(workers, progress))
+    work = replace(work, setup=work.setup.with_made(workers))
     if store is not None:
         store.create()
     logs = [path for item in work.setup.impacts.values() for path in item.logs]
     with workers.ready([*to_be_seen([*work.setup.learn, *logs]), *([store.mark] if store else [])]):
-        return _run(work, workers, store, progress)
+        return _run(work, workers, store)
 
 
 @dataclass(frozen=True)
@@ -155,7 +152,7 @@ class BenchmarkWork:
         return workers.limited_by(how), store
 
 
-def _run(work: BenchmarkWork, workers: Workers, store: Store | None, progress: Progress | None) -> BenchmarkResult:
+def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> BenchmarkResult:
     begin = perf_counter()
     setup, measured = with_synchronisation(work.setup, workers)
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
@@ -180,7 +177,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: Store | None, progress: P
     logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     scoring = scoring_of(setup, learned, teaching, factors)
     with_store = StoredScoring(scoring, store, Determinants(setup, learned, runs, factors)) if store else None
-    scored = ScoredLogs(setup, with_store or scoring, logs, workers, progress)
+    scored = ScoredLogs(setup, with_store or scoring, logs, workers)
     results = results_of(setup, before, scored, factors, learned.about.sources)
     results = replace(
         results,

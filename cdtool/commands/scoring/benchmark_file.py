@@ -35,7 +35,7 @@ from cdtool.commands.judging.settings_table import (
 from cdtool.commands.learning.threshold_settings import threshold_of
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.formats.channels.channel_map import ChannelMap, TimeSource
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.labels import Labels
@@ -92,7 +92,7 @@ class MadeGroups(Protocol):
         """Return the names of the groups."""
         ...
 
-    def added(self, setup: BenchmarkFile, workers: Workers, progress: Progress | None) -> BenchmarkFile:
+    def added(self, setup: BenchmarkFile, workers: Workers) -> BenchmarkFile:
         """Return the benchmark with the groups, whose logs are made if they are not there; without `made`."""
         ...
 
@@ -221,9 +221,9 @@ class BenchmarkFile:
     triggers: TriggersTable = field(default_factory=TriggersTable)
     execution: ExecutionTable = field(default_factory=ExecutionTable)
 
-    def with_made(self, workers: Workers, progress: Progress | None = None) -> BenchmarkFile:
+    def with_made(self, workers: Workers) -> BenchmarkFile:
         """Return the benchmark with the groups that a command makes for it; unchanged without one."""
-        return self if self.made is None else self.made.added(self, workers, progress)
+        return self if self.made is None else self.made.added(self, workers)
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:

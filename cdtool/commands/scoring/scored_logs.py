@@ -12,7 +12,7 @@ from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.log_outcome import LogOutcome, slowest_of, striking_of
 from cdtool.commands.scoring.pieces import Piece, PieceOutcome, lost, same_content
 from cdtool.execution.store.sources import SourceFile
-from cdtool.execution.workers import Progress, Workers, in_order
+from cdtool.execution.workers import Workers, in_order
 from cdtool.results.results import RecordingFinding
 from cdtool.results.traces.choice import TraceChoice
 from cdtool.results.traces.trace import Trace
@@ -48,14 +48,10 @@ class ScoredLogs:
         Group and path of each log.
     workers : Workers
         What scores them; a log that ends its workers is left out.
-    progress : callable, optional
-        Called after each log with the number done and the total.
     """
 
-    def __init__(
-        self, setup: BenchmarkFile, scoring: Scoring, logs: Logs, workers: Workers, progress: Progress | None = None
-    ) -> None:
-        self.setup, self.scoring, self.logs, self.workers, self.progress = setup, scoring, logs, workers, progress
+    def __init__(self, setup: BenchmarkFile, scoring: Scoring, logs: Logs, workers: Workers) -> None:
+        self.setup, self.scoring, self.logs, self.workers = setup, scoring, logs, workers
         self._traces: dict[int, Trace] = {}
         # Where each trace is from that is kept, made or not.
         self._places: dict[int, _Place] = {}
@@ -70,7 +66,7 @@ class ScoredLogs:
         """Yield the outcomes of all logs, in order."""
         of_lost = partial(lost, self.setup)
         count = len(self.logs)
-        made = in_order(self.scoring, self._pieces(), count, self.workers, progress=self.progress, of_lost=of_lost)
+        made = in_order(self.scoring, self._pieces(), count, self.workers, of_lost=of_lost)
         for number, (log, piece) in enumerate(zip(self.logs, made, strict=True)):
             self.stored += piece.is_stored
             place = _Place(number, log, piece.sources)

@@ -114,8 +114,7 @@ def check(
             machine,
             target=target,
             settings=given_settings(settings or ()),
-            workers=Workers(jobs, cluster=cluster),
-            progress=advance,
+            workers=Workers(jobs, cluster=cluster, progress=advance),
         )
     names = _plot_names(plot, checked, force=force)
     print_skipped(checked.skipped, [*checked.findings, *notes_on(checked.file)])
@@ -167,8 +166,7 @@ def update(
             cap=CAP if cap is None else cap,
             reserve=RESERVE if reserve is None else reserve,
             settings=given_settings(settings or ()),
-            workers=Workers(jobs, cluster=cluster),
-            progress=advance,
+            workers=Workers(jobs, cluster=cluster, progress=advance),
         )
     print_skipped(done.refused, [*done.findings, *notes_on(done.file)])
     if as_json:

@@ -24,7 +24,7 @@ from cdtool.commands.signature.audit import DriftAudit
 from cdtool.commands.signature.coverage import SignatureCoverage, check_coverage
 from cdtool.commands.signature.drift import audit_drift
 from cdtool.commands.signature.words import place_of
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.formats.signature_file import SignatureFile, with_run
 from cdtool.formats.signature_store import read_signature, rewrite_signature
@@ -176,7 +176,7 @@ def no_signature_for(motion: MotionClass, signatures: Sequence[FittedSignature])
     return f"no signature for its class: runs {motion.described}"
 
 
-def check_signature(  # noqa: PLR0913  # the public function: a keyword for each setting
+def check_signature(  # the public function: a keyword for each setting
     path: str | Path,
     logs: Sequence[str | Path],
     machine: str | Path | MachineFile,
@@ -185,7 +185,6 @@ def check_signature(  # noqa: PLR0913  # the public function: a keyword for each
     settings: Mapping[str, Any] | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
-    progress: Progress | None = None,
 ) -> Checked:
     """Check a signature against impact-free logs: do its runs suffice, and has the machine drifted since?
 
@@ -206,8 +205,6 @@ def check_signature(  # noqa: PLR0913  # the public function: a keyword for each
         Number of logs read at a time.
     workers : Workers, optional
         In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
-    progress : callable, optional
-        Called after each log with the number done and the total.
 
     Returns
     -------
@@ -242,7 +239,7 @@ def check_signature(  # noqa: PLR0913  # the public function: a keyword for each
     signatures = signatures_in(file)
     detector = machine_file.detector(file.detector)
     file.check(machine_file.machine, detector)
-    reading = _reading(file, settings, workers or Workers(jobs), progress)
+    reading = _reading(file, settings, workers or Workers(jobs))
     runs = load_runs([location(log) for log in several_logs(logs)], machine_file, reading, file.plausible)
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     skipped = [*runs.skipped, *unusable]
@@ -304,7 +301,6 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
     settings: Mapping[str, Any] | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
-    progress: Progress | None = None,
 ) -> Updated:
     """Add impact-free runs to a signature file.
 
@@ -329,8 +325,6 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
         Number of logs read at a time.
     workers : Workers, optional
         In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
-    progress : callable, optional
-        Called after each log with the number done and the total.
 
     Returns
     -------
@@ -368,7 +362,7 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     stored = read_signature(path)
     detector = machine_file.detector(stored.detector)
-    reading = _reading(stored, settings, workers or Workers(jobs), progress)
+    reading = _reading(stored, settings, workers or Workers(jobs))
     runs = load_runs([location(log) for log in several_logs(logs)], machine_file, reading, stored.plausible)
     added: list[str] = []
     refused = list(runs.skipped)
@@ -387,14 +381,12 @@ def update_signature(  # noqa: PLR0913  # the public function: a keyword for eac
     return Updated(rewrite_signature(path, change), tuple(added), tuple(refused), runs.findings)
 
 
-def _reading(
-    file: SignatureFile, settings: Mapping[str, Any] | None, workers: Workers, progress: Progress | None
-) -> RunReading:
+def _reading(file: SignatureFile, settings: Mapping[str, Any] | None, workers: Workers) -> RunReading:
     """Return how logs are read: cut as for learning, since strokes cut differently are not comparable."""
     table, place = read_settings(UpkeepTable, settings or {})
     place.finish()
     workers = workers.limited_by(table.execution)
-    return RunReading(file.operations, onset=table.onset, workers=workers, progress=progress)
+    return RunReading(file.operations, onset=table.onset, workers=workers)
 
 
 def _with_operation(

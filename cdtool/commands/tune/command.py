@@ -66,8 +66,8 @@ def tune(
     watch = _unwatched if quiet else _watch
     options = TuningOptions.of(setup, false_alarm_budget, detectors=names, workers=Workers(jobs), watch=watch)
     searches = open_folder(output, setup.inputs, setup.detectors, force=force)
-    with progress("reading", quiet=quiet) as advance:
-        done = tune_detectors(setup, replace(options, journals=searches, progress=advance))
+    with progress("tuning", quiet=quiet) as advance:
+        done = tune_detectors(setup, replace(options, journals=searches, workers=Workers(jobs, progress=advance)))
     written = write_tuning(done, output)
     left_out = [*done.left_out, *(Skipped(name, f"not tuned: {reason}") for name, reason in done.unusable.items())]
     print_skipped(left_out, done.findings)

@@ -12,7 +12,7 @@ from cdtool.base.settings import CountFromZero, NotNegative, setting
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.tune.search.grid import SHORTEST_DEBOUNCE
 from cdtool.commands.tune.search.objective import WORSE_AT_MOST, Goal
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.thresholds import THRESHOLDS
 
@@ -60,7 +60,6 @@ class TuningOptions(TuneTable):
     detectors: Sequence[str] = ()
     journals: Path | None = None
     workers: Workers | None = None
-    progress: Progress | None = None
     watch: Watch = unwatched
 
     table: ClassVar[type[TuneTable]] = TuneTable

@@ -17,7 +17,7 @@ from cdtool.commands.judging.runs import Runs, load_runs
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.scoring import logs_to_score
 from cdtool.commands.tune.search.recordings import FreeRun, StruckLog, TuningRecordings
-from cdtool.execution.workers import Progress, Workers, in_order
+from cdtool.execution.workers import Workers, in_order
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.recording import Contact
 from cdtool.results.curves.false_alarm_budget import Budget
@@ -38,9 +38,7 @@ class ReadRecordings:
     findings: tuple[RecordingFinding, ...]
 
 
-def read_recordings(
-    setup: BenchmarkFile, budget: Budget, seed: int, workers: Workers, progress: Progress | None = None
-) -> ReadRecordings:
+def read_recordings(setup: BenchmarkFile, budget: Budget, seed: int, workers: Workers) -> ReadRecordings:
     """Read the impact-free runs and the logs with contacts of a benchmark file.
 
     The hold-out and changed conditions of the machine are not touched: they show what was tuned as it is for others.
@@ -50,7 +48,7 @@ def read_recordings(
     runs = load_runs(setup.learn, setup.machine_file, setup.run_reading(workers))
     check_enough(budget, runs.operations)
     listed = [(name, path) for name in setup.groups_of_impacts for path in setup.impacts[name].logs]
-    read = in_order(_Reading(setup), listed, len(listed), workers, progress=progress)
+    read = in_order(_Reading(setup), listed, len(listed), workers)
     struck: list[StruckLog] = []
     skipped: list[Skipped] = []
     for made in read:

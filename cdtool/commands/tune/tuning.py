@@ -47,7 +47,7 @@ from cdtool.commands.tune.search.tuned import (
     tried_costs_of,
 )
 from cdtool.execution.store.digest import code_version, digest_of
-from cdtool.execution.workers import Progress, Workers, in_order
+from cdtool.execution.workers import Workers, in_order
 from cdtool.recordings.motion.applicable import HOLD
 from cdtool.recordings.operations import Operation
 from cdtool.results.results import Skipped
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
 _SPARE = 1.1
 
 
-def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
+def tune(  # the public function: a keyword for each setting
     file: str | Path | BenchmarkFile,
     false_alarm_budget: str,
     *,
@@ -70,7 +70,6 @@ def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
     settings: Mapping[str, Any] | None = None,
     journals: Path | None = None,
     workers: Workers | None = None,
-    progress: Progress | None = None,
     watch: Watch = unwatched,
 ) -> TuningResult:
     """Search gains, threshold and debounce of the detectors of a benchmark file at a false-alarm budget.
@@ -90,8 +89,6 @@ def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
         A folder for what is measured, from which an interrupted search goes on.
     workers : Workers, optional
         How many candidates are measured at a time; the result does not depend on it.
-    progress : callable, optional
-        Called while logs are read.
     watch : callable, optional
         Called after each round of a search with the detector, the number of candidates and the best one so far.
 
@@ -116,19 +113,19 @@ def tune(  # noqa: PLR0913  # the public function: a keyword for each setting
     """
     if not isinstance(file, BenchmarkFile):
         file = read_benchmark_file(file, detectors=detectors, settings=settings)
-    more = {"journals": journals, "workers": workers, "progress": progress, "watch": watch}
+    more = {"journals": journals, "workers": workers, "watch": watch}
     return tune_detectors(file, TuningOptions.of(file, false_alarm_budget, detectors=detectors, **more))
 
 
 def tune_detectors(setup: BenchmarkFile, options: TuningOptions) -> TuningResult:
     """Search gains, threshold and debounce of the detectors of a benchmark; `cdtool.tune` states the errors."""
-    workers, progress = options.workers or Workers(), options.progress
+    workers = options.workers or Workers()
     setup = with_detectors(setup, options.detectors) if options.detectors else setup
     refuse_limits_by_hand(replace(setup, budget=options.budget))
     readers = workers.limited_by(setup.execution)
-    setup = _with_impacts(setup, options.impacts, readers, progress)
+    setup = _with_impacts(setup, options.impacts, readers)
     with workers.ready():
-        read = read_recordings(setup, options.budget, options.seed, readers, progress)
+        read = read_recordings(setup, options.budget, options.seed, readers)
         if options.objective is Goal.FORCE and not np.isfinite(read.recordings.peak_of).any():
             raise UsageError("objective is 'force', but no log has the force of its contact", "map the load cell")
         made: list[TunedDetector] = []
@@ -163,9 +160,7 @@ def _counts(recordings: TuningRecordings) -> list[int]:
     return [int(count) for count in np.bincount(recordings.group_of, minlength=len(recordings.groups))]
 
 
-def _with_impacts(
-    setup: BenchmarkFile, impacts: str | None, workers: Workers, progress: Progress | None
-) -> BenchmarkFile:
+def _with_impacts(setup: BenchmarkFile, impacts: str | None, workers: Workers) -> BenchmarkFile:
     """Return the benchmark with the contacts to tune on; raises UsageError if two kinds would be mixed unasked."""
     real = setup.groups_of_impacts
     if impacts is None and real and setup.made is not None:
@@ -179,7 +174,7 @@ def _with_impacts(
         raise UsageError(
             f"impacts is 'injected', but {setup.path} has no section [inject]", "add one: docs/injection.md"
         )
-    setup = setup.with_made(workers, progress)
+    setup = setup.with_made(workers)
     if impacts != "injected":
         return setup
     left_out = [name for name in setup.groups_of_impacts if setup.impacts[name].injected is None]

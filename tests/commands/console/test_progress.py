@@ -28,5 +28,5 @@ def test_the_bar_starts_no_thread_that_would_keep_processes_from_being_forked(mo
     threads = set(threading.enumerate())
     with progress("benchmark") as advance:
         assert set(threading.enumerate()) <= threads, "other tests may have left threads, the bar adds none"
-        assert list(in_order(abs, range(6), 6, Workers(2), progress=advance)) == list(range(6))
+        assert list(in_order(abs, range(6), 6, Workers(2, progress=advance))) == list(range(6))
     assert "6/6" in stderr.text

@@ -10,7 +10,7 @@ import pytest
 
 import cdtool
 from cdtool.commands.scoring import learned_thresholds
-from cdtool.execution.workers import in_order
+from cdtool.execution.workers import Workers, in_order
 from cdtool.results.files.results_file import to_json
 from cdtool.results.traces.file import encode_traces
 
@@ -77,11 +77,11 @@ def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
         done = cdtool.benchmark(
             file,
             detectors=["momentum"],
-            jobs=jobs,
-            progress=lambda number, total, shown=shown: shown.append((number, total)),
+            workers=Workers(jobs, progress=lambda number, total, shown=shown: shown.append((number, total))),
         )
         made.add(to_json(done.results).encode() + encode_traces(done.traces))
-        assert shown == [(number, 65) for number in range(1, 66)]
+        assert shown[-65:] == [(number, 65) for number in range(1, 66)]
+        assert shown[:-65] == [(number, 5) for number in range(1, 6)]
     assert len(made) == 1
 
 

@@ -343,9 +343,10 @@ def killed_run(gate):
     """Kill a benchmark with a store after four of its logs."""
     code = (
         "import os; from pathlib import Path; import cdtool; from cdtool.execution.store.store import Store\n"
+        "from cdtool.execution.workers import Workers\n"
         "def progress(done, total):\n"
-        "    if done == 4: os.kill(os.getpid(), 9)\n"
-        "cdtool.benchmark('b.toml', store=Store(Path('../s')), progress=progress)"
+        "    if (done, total) == (4, 6): os.kill(os.getpid(), 9)\n"
+        "cdtool.benchmark('b.toml', store=Store(Path('../s')), workers=Workers(progress=progress))"
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(cdtool.__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", code], check=False, cwd=gate, env=environment)

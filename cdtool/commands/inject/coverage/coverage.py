@@ -21,7 +21,7 @@ from cdtool.commands.inject.with_injected import injected_logs, section_of, with
 from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.execution.workers import Progress, Workers
+from cdtool.execution.workers import Workers
 from cdtool.machines.dynamics import has_links
 from cdtool.results.results import RecordingFinding, Skipped
 from cdtool.results.traces.choice import MOST_SAMPLED, MOST_SLOW
@@ -57,7 +57,6 @@ def coverage(
     settings: Mapping[str, Any] | None = None,
     with_traces: bool = False,
     workers: Workers | None = None,
-    progress: Progress | None = None,
 ) -> Coverage:
     """Score the injected contacts of a benchmark file, and return latency and force over position and stiffness.
 
@@ -71,8 +70,6 @@ def coverage(
         Also return the trigger plot of the worst contact of each cell: missed, otherwise the slowest. At most 200.
     workers : Workers, optional
         How the work is done; in this process by default.
-    progress : callable, optional
-        Called after each piece of work with the amount done and the total.
 
     Returns
     -------
@@ -105,11 +102,11 @@ def coverage(
             f"{setup.path}: [inject] positions are in {' and '.join(sorted(units))}", "use one unit"
         )
     _require_different_stiffness(setup.path, section)
-    injected = injected_logs(setup, section, workers, progress)
+    injected = injected_logs(setup, section, workers)
     scored = with_groups(setup, section, injected)
     impacts = {name: group for name, group in scored.impacts.items() if name.startswith(f"{INJECTED}_")}
     scored = replace(scored, impacts=impacts, limits=())
-    done = benchmark(scored, workers=workers, progress=progress)
+    done = benchmark(scored, workers=workers)
     names = {shown_path(injected.folder / case.file, setup.path.parent): case for case in injected.cases}
     machine = setup.machine_file.machine
     speed_unit = "m/s" if has_links(machine) else machine.speed_unit
