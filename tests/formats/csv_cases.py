@@ -418,7 +418,7 @@ def _(table: Table) -> Content:
     return "\n".join([*lines, *(",".join(row) + ",," for row in table.rows)]) + "\n", truth
 
 
-@_case("LabVIEW measurement", kind="words_above_rows")
+@_case("LabVIEW measurement")
 def _(table: Table) -> Content:
     head = "LabVIEW Measurement\t\nWriter_Version\t2\nDate\t2025/04/03\n***End_of_Header***\t\n\nChannels\t2\t\n"
     head += "X_Dimension\tTime\tTime\nDelta_X\t0.001\t0.001\n***End_of_Header***\t\t\nX_Value\tTorque\tSpeed\tComment\n"

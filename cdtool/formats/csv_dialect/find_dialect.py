@@ -17,14 +17,14 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding, lines_of
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.alike_rows import shorter_sample
-from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
+from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, number, split_line
 from cdtool.formats.csv.encoding import open_table
 from cdtool.formats.csv.lines import Line, SplitLine, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import Text
 from cdtool.formats.csv_dialect.ambiguous_marks import refuse_commas_that_may_be_decimal, resolve_marks
 from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
-from cdtool.formats.csv_dialect.foreign_heads import MEASUREMENT, refuse_measurement
+from cdtool.formats.csv_dialect.foreign_heads import MEASUREMENT, MEASUREMENT_END, MEASUREMENT_HINT, measurement_head
 from cdtool.formats.csv_dialect.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell, find_marks
@@ -245,10 +245,23 @@ def find_dialect(path: Path, pins: TablePins) -> Dialect:
     Raises RecordingError if the file is not a table, or is ambiguous.
     """
     text, stream = open_table(path, pins.encoding)
-    if stream.startswith(MEASUREMENT) and not pins.skip_lines:
-        refuse_measurement(text.decode(stream))
-    dialect = _dialect(text, stream, pins)
+    measurement = stream.startswith(MEASUREMENT) and not pins.skip_lines
+    dialect = _measurement(text, stream, pins) if measurement else _dialect(text, stream, pins)
     return dialect if dialect.marks.sure else replace(dialect, marks=resolve_marks(dialect))
+
+
+def _measurement(text: Text, stream: bytes, pins: TablePins) -> Dialect:
+    """Return the dialect of a measurement file of LabVIEW, whose head states names, units and the count of rows."""
+    line, keys = measurement_head(text.decode(stream).split(text.line_end.decode()))
+    # One end is that of the file's own head.
+    if (segments := sum(block.count(MEASUREMENT_END) for block in text.blocks(0)) - 1) > 1:
+        raise RecordingError(f"LabVIEW: it has {segments} segments", MEASUREMENT_HINT)
+    header = line if pins.header is None else pins.header
+    dialect = _dialect(text, stream, replace(pins, skip_lines=line - 1, header=header))
+    findings = tuple(each for each in dialect.findings if each.kind != "pinned_lines_skipped")
+    rows = number(next(filter(None, keys.get("Samples", ())), ""), ".") or 0.0
+    units = ("", *keys.get("Y_Unit_Label", ()))
+    return replace(dialect, pins=pins, units=units, stated_rows=rows, findings=findings)
 
 
 def _dialect(text: Text, stream: bytes, pins: TablePins) -> Dialect:

@@ -11,6 +11,8 @@ _MARK = b"\xef\xbb\xbf"
 # In any encoding: a name is within the first bytes once NUL bytes and byte order marks are removed.
 _FIRST_BYTES = 96
 MEASUREMENT = b"LabVIEW Measurement"
+MEASUREMENT_END = b"***End_of_Header***"
+MEASUREMENT_HINT = "write TDMS, or one segment with all channels at one rate and one X column"
 _ALIKE = ("Samples", "Date", "Time", "X_Dimension", "X0", "Delta_X")
 # Later stamps [s] are absolute.
 _ABSOLUTE = 1e9
@@ -25,10 +27,17 @@ _FIRST_LINES = 20
 _FEWEST_KEYS = 2
 
 
-def refuse_measurement(head: str) -> None:
-    """Raise RecordingError if the column X_Value does not have the times of all channels of a measurement file."""
-    for line in head.splitlines():
+def measurement_head(lines: Sequence[str]) -> tuple[int, dict[str, list[str]]]:
+    """Return the line of names (from 1) of a measurement file, and the cells after each key above it.
+
+    Raises RecordingError if the column X_Value does not have the times of all channels.
+    """
+    keys: dict[str, list[str]] = {}
+    for i, line in enumerate(lines, start=1):
         key, *cells = (cell.strip() for cell in line.split("\t" if "\t" in line else ","))
+        if key == "X_Value":
+            return i, keys
+        keys[key] = cells
         stated = sorted({*cells} - {""})
         reason = f"its channels differ in {key}: {', '.join(stated)[:60]}" if key in _ALIKE and len(stated) > 1 else ""
         if key == "X_Columns" and stated == ["No"]:
@@ -38,9 +47,7 @@ def refuse_measurement(head: str) -> None:
         if key == "X0" and stated and (number(stated[0].replace(",", "."), ".") or 0.0) > _ABSOLUTE:
             reason = "its times count from 1904 (Time_Pref Absolute)"
         if reason:
-            raise RecordingError(f"LabVIEW: {reason}", "write TDMS, or all channels at one rate with one X column")
-        if key == "X_Value":
-            return
+            raise RecordingError(f"LabVIEW: {reason}", MEASUREMENT_HINT)
     raise RecordingError(
         "LabVIEW: its head has no line that begins with X_Value", "was the copy cut off? copy it again"
     )
