@@ -324,9 +324,14 @@ def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
 
 
 def _refuse_other_readings(sample: Sample, pins: TablePins) -> None:
-    """Raise RecordingError if the commas may be decimal marks, or if another table is above this one."""
+    """Raise RecordingError if the commas may be decimal marks, or if there are several tables, above or in the rows."""
     if sample.head.header is None and sample.separator == "," and not pins.separator and not sample.named:
         refuse_commas_that_may_be_decimal(sample.data, sample.kinds)
+    if {"VarName", "VarValue"} <= {*(sample.head.header or ())}:
+        raise RecordingError(
+            f"line {sample.head.header_line}: Siemens writes the values of all tags into one column, VarValue",
+            "give each tag a column; in pandas: pivot(index='Time_ms', columns='VarName', values='VarValue')",
+        )
     if pins.header is None:  # a pinned header selects the table, and rows above it are reported as a loss
         refuse_table_above(sample.head, sample.width)
 

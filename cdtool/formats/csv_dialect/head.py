@@ -16,6 +16,8 @@ from cdtool.recordings.units import find_unit
 
 _LOOKED_BELOW = 4
 _SINGLE_CELL = 1
+# R's write.table writes the number of each row in quotes.
+_ROW_OF_R = re.compile(r'"1"[^"]+')
 # A single line of numbers above the names may be a setting; this many lines are rows of another table.
 _ROWS_OF_A_TABLE = 2
 
@@ -74,6 +76,11 @@ class HeadFinder:
         units = next((row for row in above if row.number == self.pins.units), None)
         above = [row for row in above if row is not units]
         names = self._names(above[-1]) if above else None
+        if above and len(above[-1].cells) == self.width - 1 and _ROW_OF_R.fullmatch(cut[start].text):
+            raise RecordingError(
+                f"line {above[-1].number} names all columns but the first, as R does",
+                "write.table(..., col.names = NA) names that, too",
+            )
         if names is None:
             if above:
                 self._refuse_other_width(above, cut[start])
