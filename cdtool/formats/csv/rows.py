@@ -263,7 +263,7 @@ def _parsed(
         low_memory=False,
         **_EXACT,
     )
-    if np.isin(frame[[*numeric]], [*pinned.values()]).any():
+    if pinned and np.isin(frame[[*numeric]], [*pinned.values()]).any():
         raise ValueError("a number may be a missing value")
     cells = {column: [cell.strip(" \t") for cell in frame.pop(column).fillna("").tolist()] for column in texts}
     return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True)), cells

@@ -8,8 +8,6 @@ from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.cells import number
 
 _MARK = b"\xef\xbb\xbf"
-# In any encoding: a name is within the first bytes once NUL bytes and byte order marks are removed.
-_FIRST_BYTES = 96
 MEASUREMENT = b"LabVIEW Measurement"
 MEASUREMENT_END = b"***End_of_Header***"
 MEASUREMENT_HINT = "write TDMS, or one segment with all channels at one rate and one X column"
@@ -54,11 +52,11 @@ def measurement_head(lines: Sequence[str]) -> tuple[int, dict[str, list[str]]]:
 
 
 def is_scope_export(head: bytes) -> bool:
-    """Return whether the first bytes of a file are those of an export of TwinCAT Scope."""
-    if not _begin(head).startswith((NAME.encode(), SCOPE_TITLE.encode())):
+    """Return whether the first bytes of a file are those of an export of TwinCAT Scope, in any encoding."""
+    text = head.replace(b"\0", b"").removeprefix(_MARK).lstrip(b"\xff\xfe").decode("utf-8", errors="replace")
+    if not text.startswith((NAME, SCOPE_TITLE)):
         return False
-    lines = head.replace(b"\0", b"").removeprefix(_MARK).lstrip(b"\xff\xfe").decode("utf-8", errors="replace")
-    first = lines.splitlines()[:_FIRST_LINES]
+    first = text.splitlines()[:_FIRST_LINES]
     separator = scope_separator(first)
     if separator is None:
         return False
@@ -74,7 +72,3 @@ def scope_separator(lines: Sequence[str]) -> str | None:
         if text.startswith(NAME) and text[len(NAME) : len(NAME) + 1] in (*_SCOPE_SEPARATORS,):
             return text[len(NAME)]
     return None
-
-
-def _begin(head: bytes) -> bytes:
-    return head[:_FIRST_BYTES].replace(b"\0", b"").removeprefix(_MARK).lstrip(b"\xff\xfe")
