@@ -224,7 +224,9 @@ def _full_width(rows: Sequence[SplitLine], width: int) -> int:
     wider = len(names.cells)
     if not wider == len(first.cells) > width or not any(names.cells[width:]) or wider * len(rows) > MOST_CELLS:
         return width
-    return wider if {*names.kinds} <= {*"XM"} and {*first.kinds} <= {*"NTM"} else width
+    # LabVIEW writes a comment into the first row only.
+    kinds = first.kinds[:width] if names.cells[-1] == "Comment" else first.kinds
+    return wider if {*names.kinds} <= {*"XM"} and {*kinds} <= {*"NTM"} else width
 
 
 def _completed(row: SplitLine, separator: str, width: int) -> SplitLine:
@@ -252,12 +254,12 @@ def find_dialect(path: Path, pins: TablePins) -> Dialect:
 
 def _measurement(text: Text, stream: bytes, pins: TablePins) -> Dialect:
     """Return the dialect of a measurement file of LabVIEW, whose head states names, units and the count of rows."""
-    line, keys = measurement_head(text.decode(stream).split(text.line_end.decode()))
+    line, separator, keys = measurement_head(text.decode(stream).split(text.line_end.decode()))
     # One end is that of the file's own head.
     if (segments := sum(block.count(MEASUREMENT_END) for block in text.blocks(0)) - 1) > 1:
         raise RecordingError(f"LabVIEW: it has {segments} segments", MEASUREMENT_HINT)
-    header = line if pins.header is None else pins.header
-    dialect = _dialect(text, stream, replace(pins, skip_lines=line - 1, header=header))
+    stated = replace(pins, skip_lines=line - 1, separator=pins.separator or separator)
+    dialect = _dialect(text, stream, replace(stated, header=line if pins.header is None else pins.header))
     findings = tuple(each for each in dialect.findings if each.kind != "pinned_lines_skipped")
     rows = number(next(filter(None, keys.get("Samples", ())), ""), ".") or 0.0
     units = ("", *keys.get("Y_Unit_Label", ()))

@@ -25,16 +25,17 @@ _FIRST_LINES = 20
 _FEWEST_KEYS = 2
 
 
-def measurement_head(lines: Sequence[str]) -> tuple[int, dict[str, list[str]]]:
-    """Return the line of names (from 1) of a measurement file, and the cells after each key above it.
+def measurement_head(lines: Sequence[str]) -> tuple[int, str, dict[str, list[str]]]:
+    """Return the line of names (from 1) of a measurement file, its separator, and the cells after each key above it.
 
     Raises RecordingError if the column X_Value does not have the times of all channels.
     """
     keys: dict[str, list[str]] = {}
     for i, line in enumerate(lines, start=1):
-        key, *cells = (cell.strip() for cell in line.split("\t" if "\t" in line else ","))
+        separator = "\t" if "\t" in line else ","
+        key, *cells = (cell.strip() for cell in line.split(separator))
         if key == "X_Value":
-            return i, keys
+            return i, separator, keys
         keys[key] = cells
         stated = sorted({*cells} - {""})
         reason = f"its channels differ in {key}: {', '.join(stated)[:60]}" if key in _ALIKE and len(stated) > 1 else ""

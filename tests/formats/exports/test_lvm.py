@@ -84,6 +84,24 @@ def test_fewer_rows_than_the_head_states_are_a_loss(log, machine, rows):
         assert not source.findings and len(source.columns["Force"].values) == rows
 
 
+def test_a_comment_in_the_first_row_is_no_channel(log):
+    text = measurement(Style(comment="gate 3, stiff"), [FORCE, TORQUE])
+    source = survey(log(text, "gate.lvm"))
+    assert list(source.columns) == ["X_Value", "Force", "Torque"]
+    assert source.columns["Force"].values.tolist() == FORCE.values
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 9])
+@pytest.mark.parametrize("decimal", [",", "."])
+def test_the_line_of_names_states_the_separator(log, rows, decimal):
+    channel = Channel("V", [1000.0 * i for i in range(rows)])
+    columns = survey(log(measurement(Style(decimal=decimal), [channel]), "gate.lvm")).columns
+    assert {name: column.values.tolist() for name, column in columns.items()} == {
+        "X_Value": channel.seconds,
+        "V": channel.values,
+    }
+
+
 LATER = replace(TORQUE, time="12:00:01")
 REFUSED = {
     "another rate": (Style(), [FORCE, replace(TORQUE, step=0.004)], "differ in Delta_X"),
