@@ -418,7 +418,7 @@ def _(table: Table) -> Content:
     return "\n".join([*lines, *(",".join(row) + ",," for row in table.rows)]) + "\n", truth
 
 
-@_case("LabVIEW measurement", kind="words_above_rows")
+@_case("LabVIEW measurement")
 def _(table: Table) -> Content:
     head = "LabVIEW Measurement\t\nWriter_Version\t2\nDate\t2025/04/03\n***End_of_Header***\t\n\nChannels\t2\t\n"
     head += "X_Dimension\tTime\tTime\nDelta_X\t0.001\t0.001\n***End_of_Header***\t\t\nX_Value\tTorque\tSpeed\tComment\n"
@@ -574,3 +574,26 @@ for _unit, _start, _step in (
         return f"stamp,a\n{body}", {"stamp": [float(x) for x in stamps], "a": [float(x) for x in table.a]}
 
     _MAKERS.append((f"epoch in {_unit}", _epoch, {}))
+
+# --- tables that are refused with what to do
+
+
+def _of_r(table: Table, separator: str, last: str = "") -> str:
+    """Return a table as R's write.table writes it: the number of each row, in quotes, has no name."""
+    rows = [separator.join((f'"{i}"', *row[:-1], last or row[-1])) for i, row in enumerate(table.rows, start=1)]
+    return "\n".join([separator.join(f'"{name}"' for name in table.names), *rows, ""])
+
+
+_refused("R's names of rows", lambda table: _of_r(table, " "), "all columns but the first")
+_refused(
+    "R's names of rows, a column of missing values", lambda table: _of_r(table, ",", " "), "all columns but the first"
+)
+_plain(
+    "cells in quotes, with a separator at the end", lambda table: '"' + table.text('","').replace("\n", '",\n"')[:-1]
+)
+_refused(
+    "tags of Siemens in one column",
+    lambda table: "VarName;VarValue;Time_ms\n" + "".join(f'"tag";{a};{t}\n' for t, a, _ in table.rows),
+    "VarName",
+)
+_refused("a line break in a cell", lambda table: _with_row(table, '1,"2\n3",4'), "no line break in a cell")

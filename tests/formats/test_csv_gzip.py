@@ -153,6 +153,14 @@ def test_a_truncated_file_is_one_line(rows, kept, tmp_path):
     assert done.status == 2 and done.err.count("\n") == 1 and "Traceback" not in done.err
 
 
+@pytest.mark.parametrize("more", [b"a", b"trailing"])
+def test_bytes_after_the_end_are_not_called_a_missing_end_only(more, tmp_path):
+    _, packed = written(tmp_path, table(200))
+    packed.write_bytes(packed.read_bytes() + more)
+    with pytest.raises(RecordingError, match=r"a\.csv\.gz: .*(a few bytes follow it|Not a gzipped file)"):
+        survey(packed)
+
+
 @pytest.mark.parametrize("rows", [200, 60_000], ids=["small", "several blocks"])
 @pytest.mark.parametrize("place", [0.3, 0.9, -5], ids=["early", "late", "checksum"])
 def test_a_damaged_file_is_one_line(rows, place, tmp_path):

@@ -160,6 +160,15 @@ def test_a_cut_file_is_one_clear_error(tmp_path, size):
     assert "\n" not in str(fault.value)
 
 
+@pytest.mark.parametrize("at", [700, 1500, -1])
+def test_a_file_with_inserted_bytes_is_refused(tmp_path, at):
+    path = save_v73(tmp_path / "a.mat", {"t": np.arange(500.0), "q": np.arange(500.0)})
+    whole = path.read_bytes()
+    path.write_bytes(whole[:at] + bytes(37) + whole[at:])
+    with pytest.raises(RecordingError, match=r"a\.mat: damaged"):
+        survey(path)
+
+
 def test_damaged_bytes_are_one_line_or_the_remaining_values(tmp_path):
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(50.0), "q": np.ones((50, 3))}, compression="gzip")
     whole, random = path.read_bytes(), np.random.default_rng(8)

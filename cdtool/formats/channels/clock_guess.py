@@ -127,7 +127,7 @@ def _usual_step(stamps: Iterable[FloatArray], near: tuple[float, float]) -> floa
 
 def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     known = find_unit(column.unit) if column.unit else None
-    evidence: Literal["header", "epoch", "excel", "steps"]
+    evidence: Literal["header", "epoch", "excel", "digits", "steps"]
     start = _start(stamps())
     epoch = unit_since_1970(start)
     wrong: tuple[Finding, ...] = ()
@@ -144,12 +144,20 @@ def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], 
         unit, evidence = "days", "excel"
     else:
         unit, evidence = next(name for most, name in _UNITS if step < most), "steps"
+        if unit == "s" and start > _DAY and all(map(_may_be_digits_of_a_day, stamps())):
+            evidence = "digits"
     factor = _DAY if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
     # An epoch is subtracted before scaling, so that no digit is lost.
     origin = start if epoch or unit == "days" else 0.0
     assumed = Finding("assumed_clock", column.name, {"unit": unit, "evidence": evidence, "start": start, "step": step})
     clock = TableClock(column.name, origin, factor, ClockStatistics(), (assumed, *wrong))
     return _with_findings(clock, first_row, stamps)
+
+
+def _may_be_digits_of_a_day(stamps: FloatArray) -> bool:
+    """Return whether time stamps may be written as HHMMSS: 235959.98 is 23:59:59.98."""
+    known = stamps[np.isfinite(stamps)]
+    return bool(np.all((known < 240000.0) & (known % 10000.0 < 6000.0) & (known % 100.0 < 60.0)))
 
 
 def _start(stamps: Iterable[FloatArray]) -> float:

@@ -50,6 +50,22 @@ def check_chunks(path: Path, name: str, dataset: Any) -> None:
 
 
 @contextmanager
+def open_hdf5(path: Path, kind: str) -> Iterator[tuple[Any, Any]]:
+    """Yield h5py and an open file; raises RecordingError if it is damaged, or longer than it states."""
+    h5py = library("h5py", "hdf5")
+    with one_line_errors(kind), h5py.File(path, "r") as file:
+        with path.open("rb") as raw:
+            raw.seek(file.userblock_size + 8)  # behind the signature
+            head = raw.read(40)
+        # HDF5 itself refuses a shorter file only.
+        more = path.stat().st_size - int.from_bytes(head[20:28] if head[0] > 1 else head[32:], "little")
+        if more > 0:
+            hint = "copy it again; if its writer was killed, h5clear --increment=0 keeps what was flushed before"
+            raise RecordingError(f"damaged: {more} bytes longer than it states", hint)
+        yield h5py, file
+
+
+@contextmanager
 def one_line_errors(kind: str) -> Iterator[None]:
     """Raise any error of a library as one RecordingError."""
     try:

@@ -14,11 +14,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.formats.columns import Categories
-from cdtool.formats.containers.container_checks import (
-    check_chunks,
-    library,
-    one_line_errors,
-)
+from cdtool.formats.containers.container_checks import check_chunks, open_hdf5
 from cdtool.formats.epoch_clock import EpochClock, with_plausible_unit
 from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat
 from cdtool.recordings.units import find_unit
@@ -54,8 +50,7 @@ class Hdf5(SlicedFormat):
 
     @contextmanager
     def _open(self, container: Container) -> Iterator[None]:
-        h5py = library("h5py", "hdf5")
-        with one_line_errors("an HDF5 file"), h5py.File(container.path, "r") as file:
+        with open_hdf5(container.path, "an HDF5 file") as (h5py, file):
             datasets = _Datasets(container, h5py, file)
             container.details = {"datasets": str(len(datasets.paths))}
             yield

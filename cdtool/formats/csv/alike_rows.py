@@ -16,7 +16,6 @@ from cdtool.formats.csv.cells import NULLS, kind, split_line
 from cdtool.formats.csv.lines import COMMENTS
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 from cdtool.formats.csv_dialect.dialect import Dialect
-from cdtool.formats.csv_dialect.head import LABVIEW_UNITS
 from cdtool.formats.csv_dialect.marks import Marks
 
 # Samples with fewer rows, or with more lines above the rows, are not shortened.
@@ -49,7 +48,7 @@ class ShorterSample:
         names, cells = split_line(line, self.separator), {cell for row in rows for cell in row.split(self.separator)}
         if self.first != 2 or not 2 < len({*names}) == self.width == len(names) or text.encoding != "utf-8":
             return None
-        if {*map(kind, cells)} != {"N"} or '"' in line or names[0] == LABVIEW_UNITS:
+        if {*map(kind, cells)} != {"N"} or '"' in line:
             return None
         if not all(name[:1].isalpha() and kind(name) == "X" for name in names):
             return None

@@ -37,7 +37,7 @@ def open_text(path: Path) -> Iterator[IO[bytes]]:
             with unpack(fileobj=file, mode="rb") as unpacked:
                 yield unpacked
         except EOFError as fault:
-            raise RecordingError("truncated: its gzip data have no end", hint) from fault
+            raise RecordingError("truncated: its gzip data have no end, or a few bytes follow it", hint) from fault
         except (BadGzipFile, zlib.error, error) as fault:
             raise RecordingError(f"damaged: its gzip data: {fault}", hint) from fault
 

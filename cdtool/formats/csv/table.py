@@ -186,9 +186,8 @@ def _plain_table(dialect: Dialect, keys: Collection[str]) -> Source | None:
     if plain is None:
         return None
     values = {names[column]: plain[1][column] for column in columns}
-    return _source(
-        dialect, values, [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))]
-    )
+    rounded = [note for key in values for note in rounding_finding(key, rounded_integers(values[key]))]
+    return _source(dialect, values, plain[0], rounded)
 
 
 def table_pieces(
@@ -215,7 +214,7 @@ def table_pieces(
     if wanted is None and not remaining:
         raise RecordingError("no column has only numbers", str(findings[0]) if findings else "")
     findings += [note for key in remaining for note in rounding_finding(key, rounded[key])]
-    table = _source(dialect, dict.fromkeys(remaining, np.empty(0)), findings)
+    table = _source(dialect, dict.fromkeys(remaining, np.empty(0)), reader.lines.rows, findings)
     known = {**table.columns}
     known |= {key: replace(known[key], unit="s") for key in stamped.names}
     known |= {names[i]: replace(known[names[i]], words=each.words) for i, each in categories.items()}
@@ -224,14 +223,16 @@ def table_pieces(
     return replace(table, columns=known, first_row=first, origin=origin)
 
 
-def _source(dialect: Dialect, values: Mapping[str, FloatArray], findings: Sequence[Finding]) -> Source:
+def _source(dialect: Dialect, values: Mapping[str, FloatArray], rows: int, findings: Sequence[Finding]) -> Source:
     """Return columns of numbers, of which every line below the head is a row."""
+    fact = {"rows": rows, "stated": dialect.stated_rows}
+    lost = [Finding("fewer_rows", "", fact)] if rows < dialect.stated_rows else []
     return Source(
         path=dialect.text.path,
         format="csv",
         columns={key: Column(key, column, unit=unit_from_header(dialect, key)) for key, column in values.items()},
         origin=dialect.origin,
-        findings=(*dialect.findings, *findings),
+        findings=(*dialect.findings, *lost, *findings),
         details=dialect.details,
         names=dialect.names,
         first_row=dialect.first_line,

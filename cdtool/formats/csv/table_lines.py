@@ -146,7 +146,9 @@ class TableLines:
             )
         fits = len(cells) == width or (len(cells) in self.dialect.short_rows and not unfinished)
         if text.count('"') % 2 and (len(cells) != width or has_open_quote(text, self.dialect.separator)):
-            raise RecordingError(f"line {line} has a quote that is not closed", "write quotes in pairs")
+            raise RecordingError(
+                f"line {line} has a quote that is not closed", "write quotes in pairs, and no line break in a cell"
+            )
         words = next((each for each in self._footer if len(each.cells) != width), None)
         if words is not None:
             raise RecordingError(

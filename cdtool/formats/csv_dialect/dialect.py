@@ -27,7 +27,7 @@ class Dialect(Head):
     X, by number. `commented`: the sample has comments other than commented rows; `sampled` is the number of its rows.
     `blank_is_missing`: a blank line is a row whose only cell is empty.
     `short_rows`: how many cells a row may have that ends early; its other cells are empty.
-    `origin` [s] is stated by the head of a file that cdtool wrote.
+    `origin` [s] is stated by the head of a file that cdtool wrote, `stated_rows` by that of LabVIEW (0: none are).
     """
 
     text: Text
@@ -48,6 +48,7 @@ class Dialect(Head):
     findings: tuple[Finding, ...] = ()
     short_rows: range = range(0)
     origin: float = 0.0
+    stated_rows: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -17,14 +17,14 @@ from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding, lines_of
 from cdtool.formats.channels.channel_map import TablePins
 from cdtool.formats.csv.alike_rows import shorter_sample
-from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
+from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, number, split_line
 from cdtool.formats.csv.encoding import open_table
 from cdtool.formats.csv.lines import Line, SplitLine, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import Text
 from cdtool.formats.csv_dialect.ambiguous_marks import refuse_commas_that_may_be_decimal, resolve_marks
 from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
-from cdtool.formats.csv_dialect.foreign_heads import MEASUREMENT, refuse_measurement
+from cdtool.formats.csv_dialect.foreign_heads import MEASUREMENT, MEASUREMENT_END, MEASUREMENT_HINT, measurement_head
 from cdtool.formats.csv_dialect.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv_dialect.head_words import column_kinds
 from cdtool.formats.csv_dialect.marks import Marks, SampleCell, find_marks
@@ -224,7 +224,9 @@ def _full_width(rows: Sequence[SplitLine], width: int) -> int:
     wider = len(names.cells)
     if not wider == len(first.cells) > width or not any(names.cells[width:]) or wider * len(rows) > MOST_CELLS:
         return width
-    return wider if {*names.kinds} <= {*"XM"} and {*first.kinds} <= {*"NTM"} else width
+    # LabVIEW writes a comment into the first row only.
+    kinds = first.kinds[:width] if names.cells[-1] == "Comment" else first.kinds
+    return wider if {*names.kinds} <= {*"XM"} and {*kinds} <= {*"NTM"} else width
 
 
 def _completed(row: SplitLine, separator: str, width: int) -> SplitLine:
@@ -245,10 +247,23 @@ def find_dialect(path: Path, pins: TablePins) -> Dialect:
     Raises RecordingError if the file is not a table, or is ambiguous.
     """
     text, stream = open_table(path, pins.encoding)
-    if stream.startswith(MEASUREMENT) and not pins.skip_lines:
-        refuse_measurement(text.decode(stream))
-    dialect = _dialect(text, stream, pins)
+    measurement = stream.startswith(MEASUREMENT) and not pins.skip_lines
+    dialect = _measurement(text, stream, pins) if measurement else _dialect(text, stream, pins)
     return dialect if dialect.marks.sure else replace(dialect, marks=resolve_marks(dialect))
+
+
+def _measurement(text: Text, stream: bytes, pins: TablePins) -> Dialect:
+    """Return the dialect of a measurement file of LabVIEW, whose head states names, units and the count of rows."""
+    line, separator, keys = measurement_head(text.decode(stream).split(text.line_end.decode()))
+    # One end is that of the file's own head.
+    if (segments := sum(block.count(MEASUREMENT_END) for block in text.blocks(0)) - 1) > 1:
+        raise RecordingError(f"LabVIEW: it has {segments} segments", MEASUREMENT_HINT)
+    stated = replace(pins, skip_lines=line - 1, separator=pins.separator or separator)
+    dialect = _dialect(text, stream, replace(stated, header=line if pins.header is None else pins.header))
+    findings = tuple(each for each in dialect.findings if each.kind != "pinned_lines_skipped")
+    rows = number(next(filter(None, keys.get("Samples", ())), ""), ".") or 0.0
+    units = ("", *keys.get("Y_Unit_Label", ()))
+    return replace(dialect, pins=pins, units=units, stated_rows=rows, findings=findings)
 
 
 def _dialect(text: Text, stream: bytes, pins: TablePins) -> Dialect:
@@ -311,9 +326,14 @@ def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
 
 
 def _refuse_other_readings(sample: Sample, pins: TablePins) -> None:
-    """Raise RecordingError if the commas may be decimal marks, or if another table is above this one."""
+    """Raise RecordingError if the commas may be decimal marks, or if there are several tables, above or in the rows."""
     if sample.head.header is None and sample.separator == "," and not pins.separator and not sample.named:
         refuse_commas_that_may_be_decimal(sample.data, sample.kinds)
+    if {"VarName", "VarValue"} <= {*(sample.head.header or ())}:
+        raise RecordingError(
+            f"line {sample.head.header_line}: Siemens writes the values of all tags into one column, VarValue",
+            "give each tag a column; in pandas: pivot(index='Time_ms', columns='VarName', values='VarValue')",
+        )
     if pins.header is None:  # a pinned header selects the table, and rows above it are reported as a loss
         refuse_table_above(sample.head, sample.width)
 

@@ -8,9 +8,9 @@ from cdtool.base.errors import RecordingError
 from cdtool.formats.csv.cells import number
 
 _MARK = b"\xef\xbb\xbf"
-# In any encoding: a name is within the first bytes once NUL bytes and byte order marks are removed.
-_FIRST_BYTES = 96
 MEASUREMENT = b"LabVIEW Measurement"
+MEASUREMENT_END = b"***End_of_Header***"
+MEASUREMENT_HINT = "write TDMS, or one segment with all channels at one rate and one X column"
 _ALIKE = ("Samples", "Date", "Time", "X_Dimension", "X0", "Delta_X")
 # Later stamps [s] are absolute.
 _ABSOLUTE = 1e9
@@ -25,10 +25,18 @@ _FIRST_LINES = 20
 _FEWEST_KEYS = 2
 
 
-def refuse_measurement(head: str) -> None:
-    """Raise RecordingError if the column X_Value does not have the times of all channels of a measurement file."""
-    for line in head.splitlines():
-        key, *cells = (cell.strip() for cell in line.split("\t" if "\t" in line else ","))
+def measurement_head(lines: Sequence[str]) -> tuple[int, str, dict[str, list[str]]]:
+    """Return the line of names (from 1) of a measurement file, its separator, and the cells after each key above it.
+
+    Raises RecordingError if the column X_Value does not have the times of all channels.
+    """
+    keys: dict[str, list[str]] = {}
+    for i, line in enumerate(lines, start=1):
+        separator = "\t" if "\t" in line else ","
+        key, *cells = (cell.strip() for cell in line.split(separator))
+        if key == "X_Value":
+            return i, separator, keys
+        keys[key] = cells
         stated = sorted({*cells} - {""})
         reason = f"its channels differ in {key}: {', '.join(stated)[:60]}" if key in _ALIKE and len(stated) > 1 else ""
         if key == "X_Columns" and stated == ["No"]:
@@ -38,20 +46,18 @@ def refuse_measurement(head: str) -> None:
         if key == "X0" and stated and (number(stated[0].replace(",", "."), ".") or 0.0) > _ABSOLUTE:
             reason = "its times count from 1904 (Time_Pref Absolute)"
         if reason:
-            raise RecordingError(f"LabVIEW: {reason}", "write TDMS, or all channels at one rate with one X column")
-        if key == "X_Value":
-            return
+            raise RecordingError(f"LabVIEW: {reason}", MEASUREMENT_HINT)
     raise RecordingError(
         "LabVIEW: its head has no line that begins with X_Value", "was the copy cut off? copy it again"
     )
 
 
 def is_scope_export(head: bytes) -> bool:
-    """Return whether the first bytes of a file are those of an export of TwinCAT Scope."""
-    if not _begin(head).startswith((NAME.encode(), SCOPE_TITLE.encode())):
+    """Return whether the first bytes of a file are those of an export of TwinCAT Scope, in any encoding."""
+    text = head.replace(b"\0", b"").removeprefix(_MARK).lstrip(b"\xff\xfe").decode("utf-8", errors="replace")
+    if not text.startswith((NAME, SCOPE_TITLE)):
         return False
-    lines = head.replace(b"\0", b"").removeprefix(_MARK).lstrip(b"\xff\xfe").decode("utf-8", errors="replace")
-    first = lines.splitlines()[:_FIRST_LINES]
+    first = text.splitlines()[:_FIRST_LINES]
     separator = scope_separator(first)
     if separator is None:
         return False
@@ -67,7 +73,3 @@ def scope_separator(lines: Sequence[str]) -> str | None:
         if text.startswith(NAME) and text[len(NAME) : len(NAME) + 1] in (*_SCOPE_SEPARATORS,):
             return text[len(NAME)]
     return None
-
-
-def _begin(head: bytes) -> bytes:
-    return head[:_FIRST_BYTES].replace(b"\0", b"").removeprefix(_MARK).lstrip(b"\xff\xfe")

@@ -16,10 +16,10 @@ from cdtool.recordings.units import find_unit
 
 _LOOKED_BELOW = 4
 _SINGLE_CELL = 1
+# R's write.table writes the number of each row in quotes.
+_ROW_OF_R = re.compile(r'"1"[^"]+')
 # A single line of numbers above the names may be a setting; this many lines are rows of another table.
 _ROWS_OF_A_TABLE = 2
-# In LabVIEW's measurement files a line of the preamble has the units of Y; its first cell is this word.
-LABVIEW_UNITS = "Y_Unit_Label"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +76,11 @@ class HeadFinder:
         units = next((row for row in above if row.number == self.pins.units), None)
         above = [row for row in above if row is not units]
         names = self._names(above[-1]) if above else None
+        if above and len(above[-1].cells) == self.width - 1 and _ROW_OF_R.fullmatch(cut[start].text):
+            raise RecordingError(
+                f"line {above[-1].number} names all columns but the first, as R does",
+                "write.table(..., col.names = NA) names that, too",
+            )
         if names is None:
             if above:
                 self._refuse_other_width(above, cut[start])
@@ -129,8 +134,6 @@ class HeadFinder:
         header: SplitLine | None = None,
         units: SplitLine | None = None,
     ) -> Head:
-        if header is not None and units is None and self.pins.units is None:
-            units = next((row for row in above if row.cells[0] == LABVIEW_UNITS), None)
         texts: Sequence[str] = () if units is None or are_types(units.cells) else units.cells
         used = [row.number if row is not None else 0 for row in (header, units)]
         return Head(
@@ -138,7 +141,7 @@ class HeadFinder:
             offset=first.start,
             header=None if names is None else tuple(names),
             header_line=used[0],
-            units=tuple("" if cell == LABVIEW_UNITS else cell for cell in texts),
+            units=tuple(texts),
             units_line=used[1],
             preamble=tuple(row.number for row in above if row.number not in used),
         )
@@ -214,7 +217,7 @@ class HeadFinder:
             width = (
                 f"has {counted(len(header.cells), 'cell')}, the rows have {self.width}" if header else "has no cells"
             )
-            raise RecordingError(f"line {number}, [csv] header, {width}", "correct or remove header in [csv]")
+            raise RecordingError(f"line {number}, the header, {width}", "repair the line, or correct header in [csv]")
         below = [i for i, row in enumerate(cut) if row.number > header.number]
         units = next((cut[i] for i in below if cut[i].number == self.pins.units), None)
         types = [i for i in below[:2] if are_types(cut[i].cells)]

@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.containers.container_checks import library, one_line_errors
+from cdtool.formats.containers.container_checks import library, open_hdf5
 from cdtool.formats.epoch_clock import EpochClock
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.clock_beside import assumed_clock, is_clock_name
@@ -107,11 +107,11 @@ def _variables(path: Path) -> Iterator[Variables]:
         yield version_5.read_variables(path)
         return
     try:
-        h5py = library("h5py", "hdf5")
+        library("h5py", "hdf5")
     except RecordingError as fault:
         raise RecordingError(
             "is a MATLAB 7.3 (HDF5) file, and h5py is not installed",
             f"{fault.hint}; or save it in MATLAB with save(name, ..., '-v7')",
         ) from fault
-    with one_line_errors("a MATLAB 7.3 file"), h5py.File(path, "r") as file:
+    with open_hdf5(path, "a MATLAB 7.3 file") as (h5py, file):
         yield version_73.read_variables(path, h5py, file)

@@ -36,3 +36,25 @@ def test_uneven_steps_are_those_of_a_clock_only_if_its_name_says_so(tmp_path, na
     path = tmp_path / "log.csv"
     path.write_text(f"{name},torque\n" + "".join(f"{time:.3f},{i % 7}\n" for i, time in enumerate(np.cumsum(steps))))
     assert any(finding.numbers.get("evidence", "") == "steps" for finding in info(path).findings) is is_one
+
+
+@pytest.mark.parametrize(
+    ("first", "evidence"),
+    [("23:59:5", "digits"), ("12:00:0", "digits"), ("08:30:0", "steps")],
+    ids=["near midnight", "noon", "fewer seconds than a day has"],
+)
+def test_times_of_day_without_colons_are_said(tmp_path, first, evidence):
+    start = first.replace(":", "")
+    path = tmp_path / "log.csv"
+    path.write_text("Time,torque\n" + "".join(f"{start}{i / 100:.2f},{i % 7}\n" for i in range(900)))
+    assert [finding.numbers["evidence"] for finding in info(path).findings if finding.kind == "assumed_clock"] == [
+        evidence
+    ]
+
+
+def test_seconds_of_more_than_a_day_are_no_times_of_day(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("Time,torque\n" + "".join(f"{120000 + i / 10:.1f},{i % 7}\n" for i in range(900)))
+    assert [finding.numbers["evidence"] for finding in info(path).findings if finding.kind == "assumed_clock"] == [
+        "steps"
+    ]

@@ -146,6 +146,10 @@ def test_damaged_files_are_one_line(two_groups):
         with pytest.raises(RecordingError) as caught:
             Hdf5().columns(two_groups)
         assert "\n" not in str(caught.value)
+    for at in (len(data) // 2, len(data)):
+        two_groups.write_bytes(data[:at] + b"inserted" + data[at:])
+        with pytest.raises(RecordingError, match="damaged: 8 bytes longer than it states"):
+            Hdf5().columns(two_groups)
     for at in random.integers(8, len(data), 150).tolist():
         wrong = bytearray(data)
         wrong[at] ^= 1 << int(random.integers(8))

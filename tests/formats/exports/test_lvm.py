@@ -54,6 +54,54 @@ def test_a_column_of_times_for_each_channel_is_read(log):
     assert columns["Torque"].values.tolist() == TORQUE.values
 
 
+@pytest.mark.parametrize("names", [["V"], ["N"], ["V", "A"], ["m/s", "Torque"], ["1", "2"], ["Channels", "Samples"]])
+@pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 6, 40, 400])
+@pytest.mark.parametrize("x_columns", ["One", "Multi"])
+def test_the_names_are_in_the_line_of_x_value_whatever_they_are(log, names, rows, x_columns):
+    channels = [Channel(name, [1.5 + i for i in range(rows)], unit="Nm") for name in names]
+    source = survey(log(measurement(Style(x_columns=x_columns), channels), "gate.lvm"))
+    columns = {name: column for name, column in source.columns.items() if not name.startswith("X_Value")}
+    assert {name: column.values.tolist() for name, column in columns.items()} == {
+        channel.name: channel.values for channel in channels
+    }
+    assert {column.unit for column in columns.values()} == {"Nm"}
+    assert not source.findings or x_columns == "Multi"
+
+
+@pytest.mark.parametrize("rows", [3, 40, 20_000])
+def test_fewer_rows_than_the_head_states_are_a_loss(log, machine, rows):
+    force = replace(FORCE, values=[1.5 * i for i in range(rows)])
+    text = measurement(Style(), [force])
+    short = text.replace(f"Samples\t{rows}", f"Samples\t{rows + 7}")
+    expected = f"the file has {rows} of the {rows + 7} rows that its head states"
+    path = log(short, "gate.lvm")
+    assert [str(each) for each in survey(path).findings if each.severity == "loss"] == [expected]
+    channels = '[channels]\ntime = { column = "X_Value", unit = "s" }\nforce = { column = "Force", unit = "N" }\n'
+    recording = read_recording(path, machine(channels))
+    assert expected in [str(each) for each in recording.findings]
+    for stated in (rows - 1, "", "many"):
+        source = survey(log(text.replace(f"Samples\t{rows}", f"Samples\t{stated}"), "gate.lvm"))
+        assert not source.findings and len(source.columns["Force"].values) == rows
+
+
+def test_a_comment_in_the_first_row_is_no_channel(log):
+    text = measurement(Style(comment="gate 3, stiff"), [FORCE, TORQUE])
+    source = survey(log(text, "gate.lvm"))
+    assert list(source.columns) == ["X_Value", "Force", "Torque"]
+    assert source.columns["Force"].values.tolist() == FORCE.values
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 9])
+@pytest.mark.parametrize("decimal", [",", "."])
+def test_the_line_of_names_states_the_separator(log, rows, decimal):
+    channel = Channel("V", [1000.0 * i for i in range(rows)])
+    columns = survey(log(measurement(Style(decimal=decimal), [channel]), "gate.lvm")).columns
+    assert {name: column.values.tolist() for name, column in columns.items()} == {
+        "X_Value": channel.seconds,
+        "V": channel.values,
+    }
+
+
 LATER = replace(TORQUE, time="12:00:01")
 REFUSED = {
     "another rate": (Style(), [FORCE, replace(TORQUE, step=0.004)], "differ in Delta_X"),
@@ -106,8 +154,14 @@ def test_several_segments_are_refused(log, machine, data):
     ]
     path = log(measurement(style, *segments), "gate.lvm")
     channels = '[channels]\ntime = { column = 0, unit = "s" }\nforce = { column = 1, unit = "N" }\n'
-    with pytest.raises(RecordingError):
+    with pytest.raises(RecordingError, match=f"it has {len(segments)} segments .write TDMS"):
         read_recording(path, machine(channels))
+
+
+def test_a_segment_that_begins_below_the_first_lines_is_seen(log):
+    long = [replace(FORCE, values=np.arange(20_000) / 8.0)]
+    with pytest.raises(RecordingError, match="it has 2 segments"):
+        survey(log(measurement(Style(headings="Yes"), long, [FORCE]), "gate.lvm"))
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
