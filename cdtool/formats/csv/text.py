@@ -22,7 +22,7 @@ from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
 SAMPLE_BYTES = 1 << 17
 BLOCK_BYTES = 1 << 20
 # So many of them are read at once: pandas takes as long to start as to read some ten kilobytes.
-_BLOCKS = 2
+_BLOCKS = 4
 TAIL_BYTES = 1 << 16
 UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 
