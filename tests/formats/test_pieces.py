@@ -94,7 +94,7 @@ def test_a_table_read_in_many_blocks_has_the_same_columns(end, tmp_path, monkeyp
     path.write_text("day,clock,a,b\n" + "\n".join(lines[:6000]) + end)
     found = choose_format(path)
     at_once = found.columns(path)
-    monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
+    monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 11)
     assert len(pieces_of(path)) > 20
     assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
