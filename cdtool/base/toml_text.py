@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 
-def opened_table(document: Any, section: str) -> Any:
-    """Return a section of a TOML document; one on a single line in braces is spread first: it cannot hold comments."""
+def opened_table(document: Any, *names: str) -> Any:
+    """Return the section under these names; one on a single line in braces is spread first: it cannot hold comments."""
     import tomlkit
     from tomlkit.items import InlineTable
 
     table = document
-    for name in section.split("."):
+    for name in names:
         if name not in table:
             table[name] = tomlkit.table(is_super_table=name in ("model", "detectors"))
         elif isinstance(table[name], InlineTable):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import FieldsError, UsageError, nearest
 from cdtool.base.files.bounded_loading import ContentError, parse_toml
-from cdtool.base.settings import Model, NotNegative, Place, Positive, read, setting
+from cdtool.base.settings import Model, NotNegative, Place, Positive, read, setting, tables_of
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.named_logs import LogPart, OnsetTable, read_label_file
 from cdtool.commands.judging.scoring_rules import ScoringRules
@@ -20,6 +21,9 @@ from cdtool.machines.dynamics import Machine
 from cdtool.recordings.operations import RunCut
 from cdtool.thresholds.signature import Signature
 from cdtool.truth.onset_rule import OnsetRule
+
+#: A detector, by its name or as an object.
+Named = TypeVar("Named")
 
 # How long before its first contact a log is no longer learned from [s].
 GUARD = 0.2
@@ -191,7 +195,7 @@ def read_settings(model: type[Model], settings: Mapping[str, Any]) -> tuple[Mode
 
     Raises ConfigurationError with all mistakes if there is no model, as for values that do not fit together.
     """
-    place = Place("--set", by_option=full_keys(settings), root=model)
+    place = Place("--set", by_option=full_keys(settings), tables=partial(tables_of, model))
     table = read(model, apply_settings({}, settings), place)
     if table is None:
         place.finish()
@@ -214,7 +218,7 @@ def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> di
     """
     found = dict(values)
     for key, value in settings.items():
-        *tables, name = _names_in(key)
+        *tables, name = names_in(key)
         table = found
         for above in tables:
             inner = table.get(above)
@@ -227,12 +231,33 @@ def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> di
 
 def full_keys(settings: Mapping[str, Any] | None) -> frozenset[str]:
     """Return the full keys of settings, as a message names them."""
-    return frozenset(".".join(_names_in(key)) for key in settings or ())
+    return frozenset(".".join(names_in(key)) for key in settings or ())
 
 
-def _names_in(key: str) -> list[str]:
-    """Return the tables and the name of a key; one with a dot is in quotes, as in impacts."stiff 1.5".window_s."""
-    return [quoted or bare for _, quoted, bare in _NAME.findall(key)] or [key]
+def names_in(key: str) -> list[str]:
+    """Return the tables and the name of a key; one with a dot is in quotes, as in impacts."stiff 1.5".window_s.
+
+    >>> names_in("limits.gm.stiff.p95_ms.max")  # the name of a limit always has dots
+    ['limits', 'gm.stiff.p95_ms', 'max']
+    """
+    first, *names = [quoted or bare for _, quoted, bare in _NAME.findall(key)] or [key]
+    if first != "limits" or not names:
+        return [first, *names]
+    bound = names[-1:] if names[-1] in ("min", "max") else []
+    return [first, ".".join(names[: len(names) - len(bound)]), *bound]
+
+
+def detectors_of(given: Sequence[Named], settings: Mapping[str, Any] | None) -> tuple[Sequence[Named], dict[str, Any]]:
+    """Return the detectors in place of the file's, `given` or by the setting `detectors`, and the other settings.
+
+    Raises UsageError if both are there.
+    """
+    others = dict(settings or {})
+    named = others.pop("detectors", ())
+    if given and named:
+        raise UsageError("--set detectors: cannot be combined with --detectors", "omit one of the two")
+    named = [part.strip() for part in named.split(",")] if isinstance(named, str) else named
+    return given or named, others
 
 
 def given_settings(texts: Iterable[str]) -> dict[str, Any]:

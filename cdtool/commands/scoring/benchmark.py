@@ -15,6 +15,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.registry import plugin_packages
 from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import to_be_seen
+from cdtool.commands.judging.settings_table import detectors_of
 from cdtool.commands.learning.normal_runs import normals_for
 from cdtool.commands.learning.threshold_settings import set_by_hand
 from cdtool.commands.scoring.benchmark_file import (
@@ -138,7 +139,8 @@ class BenchmarkWork:
     ) -> BenchmarkWork:
         """Read a benchmark file unless it has been read; raises as `benchmark`."""
         if not isinstance(file, BenchmarkFile):
-            file = read_benchmark_file(file, detectors=detectors, settings=settings)
+            detectors, others = detectors_of(detectors, settings)
+            file = read_benchmark_file(file, detectors=detectors, settings=others)
         setup = file
         limits = setup.limits
         setup = with_detectors(setup, detectors) if detectors else setup

@@ -52,7 +52,7 @@ def tune(
 
     Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
     """
-    from cdtool.commands.judging.settings_table import given_settings
+    from cdtool.commands.judging.settings_table import detectors_of, given_settings
     from cdtool.commands.scoring.benchmark_file import read_benchmark_file
     from cdtool.commands.tune.files import open_folder, write_tuning
     from cdtool.commands.tune.options import TuningOptions
@@ -61,8 +61,8 @@ def tune(
     from cdtool.execution.workers import Workers
     from cdtool.results.results import Skipped
 
-    names = listed(detectors or "")
-    setup = read_benchmark_file(file, detectors=names, settings=given_settings(settings or ()))
+    names, others = detectors_of(listed(detectors or ""), given_settings(settings or ()))
+    setup = read_benchmark_file(file, detectors=names, settings=others, command="tune")
     watch = _unwatched if quiet else _watch
     options = TuningOptions.of(setup, false_alarm_budget, detectors=names, workers=Workers(jobs), watch=watch)
     searches = open_folder(output, setup.inputs, setup.detectors, force=force)
