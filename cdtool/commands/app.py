@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from cdtool.base.errors import CdtoolError, UsageError
+from cdtool.base.errors import CdtoolError
 from cdtool.base.exit_status import ExitStatus, Fact, help_epilog, status_of, statuses_words
 from cdtool.base.plain_text import counted, one_line
 from cdtool.base.remote import session
@@ -145,12 +145,10 @@ _CLICK_ERROR = typer.BadParameter.__mro__[2]
 
 def _print_usage_error(fault: Any) -> None:
     from cdtool.commands.console.console import print_error
+    from cdtool.commands.console.wrong_words import usage_error
 
-    if type(fault).__name__ == "NoArgsIsHelpError":  # its constructor has printed the help
-        return
-    command = fault.ctx.command_path if getattr(fault, "ctx", None) else "cdtool"
-    message = " ".join(fault.format_message().split()).rstrip(".")
-    print_error(UsageError(message, f"see {command} --help"))
+    if type(fault).__name__ != "NoArgsIsHelpError":  # its constructor has printed the help
+        print_error(usage_error(fault))
 
 
 @contextmanager
