@@ -136,7 +136,9 @@ def _options(
 def _show_note(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
     """Show a warning that is meant for the user; those of NumPy and other libraries are about our code."""
     if category is UserWarning:
-        typer.echo(one_line(f"note: {message}"), err=True)
+        from cdtool.commands.console.console import print_line
+
+        print_line(one_line(f"note: {message}"), err=True)
 
 
 # Base class of click's errors for a wrong option or argument. typer uses its own copy of click or the installed one.
