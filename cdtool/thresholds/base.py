@@ -230,3 +230,8 @@ def with_limits(signal: Signal, lower: FloatArray, upper: FloatArray) -> tuple[S
     unknown = (np.isnan(lower) | np.isnan(upper)) & (status == Status.VALID)
     status[unknown] = Status.NO_LIMIT
     return signal.changed(status=status), Band(lower, upper)
+
+
+def set_by_hand(rule: Threshold) -> bool:
+    """Whether the rule's limits or its safety factor differ from the default."""
+    return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor

@@ -31,8 +31,8 @@ from cdtool.commands.judging.settings_table import (
     TriggersTable,
     apply_settings,
     full_keys,
+    note_other_units,
 )
-from cdtool.commands.learning.threshold_settings import threshold_of
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
 from cdtool.execution.workers import Progress, Workers
@@ -216,7 +216,6 @@ class BenchmarkFile:
     detectors: tuple[str, ...]
     watched: tuple[str, ...]
     operations: str
-    threshold: str
     budget: Budget | None
     signature: Signature
     rule: Threshold
@@ -400,6 +399,7 @@ def read_benchmark_file(
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
+    note_other_units(BenchmarkTable, place)
     _note_unread(place, command)
     given, machine_file = apply_settings(values, settings or {}), None
     table = read(BenchmarkTable, given, place)
@@ -458,9 +458,9 @@ def _resolved(
     """Return the benchmark that the tables describe, its logs found, with the mistakes in `place`."""
     machine, settings = machine_file.machine, wanted.settings
     names: tuple[str, ...] = place.tried((), _detectors, table, place, machine_file, wanted)
-    otherwise: tuple[str, Threshold, Signature] = ("signature", table.signature, table.signature)
-    given = (table.threshold, table.signature, machine.default_sides, place)
-    threshold, rule, signature = place.tried(otherwise, threshold_of, *given)
+    signature = table.signature.sided(machine.default_sides)
+    otherwise: Threshold = signature
+    rule = place.tried(otherwise, table.rule, place, signature)
     cut = place.tried(None, table.run_cut, place)
     found = LogsOf(file.parent, machine_file, cut is not None)
     if found.runs and (machine_file.columns.beside or machine_file.topics.beside):
@@ -482,7 +482,6 @@ def _resolved(
         detectors=names,
         watched=table.joints,
         operations=table.operations,
-        threshold=threshold,
         budget=place.tried(None, _budget, table, place),
         signature=signature,
         rule=rule,

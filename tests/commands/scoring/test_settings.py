@@ -51,6 +51,7 @@ def test_results_state_the_settings_and_differ_in_their_digest(results):
         ("activation.debonce=3", "--set activation.debonce: unknown key (did you mean debounce?"),
         ("activaton.debounce=3", "--set activaton: unknown key (did you mean activation"),
         ("debounce", "--set is 'debounce' (give KEY=VALUE"),
+        ("activation.debounce_ms=9", "debounce_ms: unknown key (give activation.debounce: consecutive samples outside"),
         ("objective=p95", "--set objective: unknown key (write tune.objective"),
         (
             "machine.load_mass=3",
@@ -69,6 +70,12 @@ def test_results_state_the_settings_and_differ_in_their_digest(results):
 def test_a_wrong_setting_is_one_line_that_names_the_option(gate_folder, text, said):
     done = cdtool("benchmark", gate_folder / "benchmark.toml", "--set", text)
     assert done.status == 2 and said in done.err and "Traceback" not in done.err
+
+
+def test_a_unit_behind_a_key_gets_the_unit_of_the_key_without_a_benchmark_file_too(gate_folder):
+    log, machine = gate_folder / "stiff/01.csv", ("-m", gate_folder / "machine.toml")
+    done = cdtool("detect", log, *machine, "-d", "gm", "--set", "activation.debounce_ms=9")
+    assert done.status == 2 and "(give activation.debounce: consecutive samples outside" in done.err
 
 
 def test_values_are_those_of_toml_and_a_bare_word_is_a_text():
