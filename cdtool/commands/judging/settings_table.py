@@ -13,6 +13,7 @@ from cdtool.alarms.activation import Activation
 from cdtool.base.errors import FieldsError, UsageError, nearest
 from cdtool.base.files.bounded_loading import ContentError, parse_toml
 from cdtool.base.settings import Model, NotNegative, Place, Positive, keys_of, read, setting, tables_of
+from cdtool.base.value_words import value_in_words
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.named_logs import LogPart, OnsetTable, read_label_file
 from cdtool.commands.judging.scoring_rules import ScoringRules
@@ -307,14 +308,18 @@ def names_in(key: str) -> list[str]:
 def detectors_of(given: Sequence[Named], settings: Mapping[str, Any] | None) -> tuple[Sequence[Named], dict[str, Any]]:
     """Return the detectors in place of the file's, `given` or by the setting `detectors`, and the other settings.
 
-    Raises UsageError if both are there.
+    Raises UsageError if both are there, and for a value that is not a list of names.
     """
     others = dict(settings or {})
-    named = others.pop("detectors", ())
-    if given and named:
+    if "detectors" not in others:
+        return given, others
+    if given:
         raise UsageError("--set detectors: cannot be combined with --detectors", "omit one of the two")
-    named = [part.strip() for part in named.split(",")] if isinstance(named, str) else named
-    return given or named, others
+    value = others.pop("detectors")
+    named: Any = [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+    if not (isinstance(named, list | tuple) and named and all(isinstance(name, str) for name in named)):
+        raise UsageError(f"--set detectors: is {value_in_words(value)}", "give names of detectors, as gm,eo")
+    return named, others
 
 
 def given_settings(texts: Iterable[str]) -> dict[str, Any]:

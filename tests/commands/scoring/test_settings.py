@@ -52,6 +52,8 @@ def test_results_state_the_settings_and_differ_in_their_digest(results):
         ("activaton.debounce=3", "--set activaton: unknown key (did you mean activation"),
         ("debounce", "--set is 'debounce' (give KEY=VALUE"),
         ("activation.debounce_ms=9", "debounce_ms: unknown key (give activation.debounce: consecutive samples outside"),
+        ("detectors=3", "--set detectors: is 3 (give names of detectors, as gm,eo)"),
+        ("detectors=[]", "--set detectors: is "),
         ("objective=p95", "--set objective: unknown key (write tune.objective"),
         (
             "machine.load_mass=3",
