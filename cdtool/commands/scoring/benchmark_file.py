@@ -115,7 +115,7 @@ SECTIONS = Registry(
 _ALL_BUT_SCORE = ("benchmark", "tune", "inject", "detect", "explain")
 _ALL_BUT_DETECT = ("benchmark", "score", "tune", "inject")
 _OF_DETECTORS = ("joints", "threshold", "signature", "learn", "activation.debounce", "activation.hysteresis")
-# Keys that only these commands read: --set refuses them in the others, for which they may stand in a file.
+# Keys that only these commands read: --set refuses them in the others, whose file may have them.
 _READ_BY: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(_OF_DETECTORS, _ALL_BUT_SCORE),
     "detectors": ("benchmark", "tune", "inject"),

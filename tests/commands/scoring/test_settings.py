@@ -122,7 +122,7 @@ def test_a_command_refuses_the_keys_that_it_does_not_read_and_names_one_that_doe
     assert cdtool(*score, "--set", "activation.rearm_s=0.1").status in (0, 1, 3)
 
 
-def test_a_section_of_another_command_may_stand_in_the_file(gate_folder):
+def test_the_file_may_have_a_section_of_another_command(gate_folder):
     text = (gate_folder / "benchmark.toml").read_text(encoding="utf-8")
     (gate_folder / "with_tune.toml").write_text(text + '[tune]\nobjective = "p95"\n', encoding="utf-8")
     assert cdtool("benchmark", gate_folder / "with_tune.toml", "-d", "gm", "-q").status in (0, 1)
