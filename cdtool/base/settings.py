@@ -106,6 +106,12 @@ def _fields_of(model: Any) -> list[tuple[str, bool, str]]:
     ]
 
 
+def tables_of(model: Any) -> Mapping[str, Any]:
+    """Return the models of the tables among the keys of a model."""
+    parts = [(name, bare_type(part)) for name, key in keys_of(model).items() for part in alternatives(key.hint)]
+    return {name: kind for name, kind in parts if is_model(kind)}
+
+
 def is_model(hint: Any) -> bool:
     """Whether a type is a table with keys of its own."""
     return is_dataclass(hint)
@@ -230,7 +236,7 @@ class Place:
     """Where in a file values stand, and the mistakes that were found in the file so far.
 
     `excused`: full keys that are missing because of another mistake, such as a misspelt name. `by_option`: full keys
-    that --set gave. `root`: the model of the whole file, to say where a key belongs.
+    that --set gave. `tables`: returns the models of the file's tables, to say where a key belongs.
     """
 
     where: str
@@ -238,7 +244,7 @@ class Place:
     mistakes: list[ConfigurationError] = field(default_factory=list)
     excused: list[str] = field(default_factory=list)
     by_option: Collection[str] = ()
-    root: type[Any] | None = None
+    tables: Callable[[], Mapping[str, Any]] | None = None
 
     def key(self, name: str) -> str:
         """Return file and full key, for an error message; or --set and the key, if that gave it or a part of it."""
@@ -252,9 +258,8 @@ class Place:
 
     def home_of(self, name: str) -> str:
         """Return the table of the file that has a key of that name, if only one has; else an empty text."""
-        tables = keys_of(self.root) if self.root else {}
-        models = {key.name: bare_type(part) for key in tables.values() for part in alternatives(key.hint)}
-        homes = [table for table, model in models.items() if is_model(model) and name in keys_of(model)]
+        models = self.tables() if self.tables else {}
+        homes = [table for table, model in models.items() if name in keys_of(model)]
         return homes[0] if len(homes) == 1 and self.prefix != f"{homes[0]}." else ""
 
     @property

@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from cdtool.base.errors import CdtoolError, UsageError
+from cdtool.base.errors import CdtoolError
 from cdtool.base.exit_status import ExitStatus, Fact, help_epilog, status_of, statuses_words
 from cdtool.base.plain_text import counted, one_line
 from cdtool.base.remote import session
@@ -136,7 +136,9 @@ def _options(
 def _show_note(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
     """Show a warning that is meant for the user; those of NumPy and other libraries are about our code."""
     if category is UserWarning:
-        typer.echo(one_line(f"note: {message}"), err=True)
+        from cdtool.commands.console.console import print_line
+
+        print_line(one_line(f"note: {message}"), err=True)
 
 
 # Base class of click's errors for a wrong option or argument. typer uses its own copy of click or the installed one.
@@ -145,12 +147,10 @@ _CLICK_ERROR = typer.BadParameter.__mro__[2]
 
 def _print_usage_error(fault: Any) -> None:
     from cdtool.commands.console.console import print_error
+    from cdtool.commands.console.wrong_words import usage_error
 
-    if type(fault).__name__ == "NoArgsIsHelpError":  # its constructor has printed the help
-        return
-    command = fault.ctx.command_path if getattr(fault, "ctx", None) else "cdtool"
-    message = " ".join(fault.format_message().split()).rstrip(".")
-    print_error(UsageError(message, f"see {command} --help"))
+    if type(fault).__name__ != "NoArgsIsHelpError":  # its constructor has printed the help
+        print_error(usage_error(fault))
 
 
 @contextmanager

@@ -230,3 +230,25 @@ def with_limits(signal: Signal, lower: FloatArray, upper: FloatArray) -> tuple[S
     unknown = (np.isnan(lower) | np.isnan(upper)) & (status == Status.VALID)
     status[unknown] = Status.NO_LIMIT
     return signal.changed(status=status), Band(lower, upper)
+
+
+def set_by_hand(rule: Threshold) -> bool:
+    """Return whether the rule's limits or its safety factor differ from the default.
+
+    Parameters
+    ----------
+    rule : Threshold
+        A rule.
+
+    Returns
+    -------
+    bool
+        True if the user has set one of the two.
+
+    Examples
+    --------
+    >>> from cdtool.thresholds.limit import Limit
+    >>> set_by_hand(Limit()), set_by_hand(Limit(safety_factor=3.0))
+    (False, True)
+    """
+    return bool(getattr(rule, "limits", ())) or rule.safety_factor != type(rule)().safety_factor

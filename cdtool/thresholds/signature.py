@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -19,6 +19,7 @@ from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
     FittedSignature,
     Rule,
+    Sides,
     axes_of,
     progress_of,
 )
@@ -123,6 +124,10 @@ class Signature:
         if self.safety_factor is not None:
             return self.safety_factor
         return 1.0 if self.rule == "thesis" else 5.5
+
+    def sided(self, default: Sides) -> Signature:
+        """Return the rule with the sides of the machine, unless it states its own."""
+        return self if self.sides else replace(self, sides=default)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSignature:
         """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""

@@ -13,7 +13,18 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError, FieldsError, MistakesError, UsageError
 from cdtool.base.files.bounded_loading import read_toml
-from cdtool.base.settings import NOT_A_KEY, Count, NotNegative, Place, Positive, check, keys_of, read, setting
+from cdtool.base.settings import (
+    NOT_A_KEY,
+    Count,
+    NotNegative,
+    Place,
+    Positive,
+    check,
+    keys_of,
+    read,
+    setting,
+    tables_of,
+)
 
 
 class Side(Enum):
@@ -50,7 +61,7 @@ class Outer:
 
 
 def mistakes(**values: object) -> list[str]:
-    place = Place("m.toml", root=Outer)
+    place = Place("m.toml", tables=lambda: tables_of(Outer))
     read(Outer, values, place)
     return [str(item) for item in place.mistakes]
 

@@ -85,7 +85,7 @@ def shown_by(path: Path) -> set[str]:
     own = {name for name in COMMANDS if parts[0] == "commands" and set(name.split()) & names}
     if "simulate" in parts:
         own |= {name for name in COMMANDS if name.startswith("simulate")}
-    if {"signature", "learn", "learning"} & {*parts} or path.stem == "threshold_settings":
+    if {"signature", "learn", "learning"} & {*parts}:
         own |= {name for name in COMMANDS if "signature" in name} | {"detect"}
     return own.union(*(SHOWN_BY.get(part, set()) for part in parts))
 

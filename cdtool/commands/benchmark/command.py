@@ -12,7 +12,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress
+from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
 from cdtool.commands.console.options import (
     BudgetOption,
     ClusterOption,
@@ -119,9 +119,9 @@ def benchmark(
         show_results(evaluated, written, quiet=quiet, more=_stored(done.stored))
         injected = [] if quiet else REPORT_SECTIONS.load("injected").lines(evaluated)
         for line in [*injected, *lines]:
-            typer.echo(line)
+            print_line(line)
         if not lines and done.results.forces and not quiet:
-            typer.echo("next, for a test protocol of these forces:")
+            print_line("next, for a test protocol of these forces:")
             typer.echo(f"  cdtool protocol init {shlex.quote(plain(file))} -o protocol.toml")
     finish(evaluated)
 
@@ -162,12 +162,12 @@ def _show_dry_run(file: Path, given: Mapping[str, Any], *, as_json: bool) -> Non
         leave(found.skipped)
         return
     for item in found.logs:
-        typer.echo(f"{plain(item.recording)}: {', '.join(item.detectors)}, {decimal(item.bytes)}")
+        print_line(f"{plain(item.recording)}: {', '.join(item.detectors)}, {decimal(item.bytes)}")
     time = "" if found.seconds is None else f", about {_duration(found.seconds)}"
     total = counted(found.total, "recording")
-    typer.echo(f"{len(found.logs)} of {total} would be computed: {decimal(found.bytes)}{time}")
+    print_line(f"{len(found.logs)} of {total} would be computed: {decimal(found.bytes)}{time}")
     if found.to_inject:
-        typer.echo(f"{counted(found.to_inject, 'contact')} of [inject] would be made first, and computed too")
+        print_line(f"{counted(found.to_inject, 'contact')} of [inject] would be made first, and computed too")
     print_skipped(found.skipped)
     leave(found.skipped)
 

@@ -9,7 +9,7 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import plain, print_json
+from cdtool.commands.console.console import plain, print_json, print_line
 from cdtool.commands.console.options import JsonOption, listed
 from cdtool.commands.console.place import location
 
@@ -84,7 +84,7 @@ def plan(
         print_json(asdict(found))
         return
     for answer in found.answers:
-        typer.echo(plain(answer.words))
+        print_line(plain(answer.words))
 
 
 def _number(text: str | None) -> float | None:

@@ -6,7 +6,10 @@ import os
 from collections.abc import Callable, Iterable
 from importlib import import_module
 
+import typer
+
 Complete = Callable[[str], list[str]]
+CompleteIn = Callable[[typer.Context, str], list[str]]
 
 # So many folders, each the only entry of the one above, are entered at once.
 _DEEPEST = 20
@@ -31,17 +34,19 @@ def thresholds(incomplete: str) -> list[str]:
     return _beginning(incomplete, THRESHOLDS.usable_names())
 
 
-def keys(place: str) -> Complete:
+def keys(place: str) -> CompleteIn:
     """Return the completion of --set by the keys of a model, named as module:Class, then by a key's words."""
 
-    def complete(incomplete: str) -> list[str]:
-        from cdtool.commands.scoring.benchmark_file import SECTIONS
+    def complete(context: typer.Context, incomplete: str) -> list[str]:
+        from cdtool.commands.scoring.benchmark_file import SECTIONS, readers_of
 
         module, _, attribute = place.partition(":")
         known = dict(_words_by_key(getattr(import_module(module), attribute), ""))
         section = incomplete.partition(".")[0]
         if section in SECTIONS.names():
             known |= _words_by_key(SECTIONS.load(section).table, f"{section}.")
+        if (command := context.command.name) in readers_of("machine"):  # of a benchmark file
+            known = {key: words for key, words in known.items() if command in readers_of(key)}
         key, equals, typed = incomplete.partition("=")
         return (
             [f"{key}={word}" for word in _beginning(typed, known.get(key, ()))]

@@ -54,12 +54,27 @@ def print_error(fault: CdtoolError) -> None:
             print_error(mistake)
         return
     for note in getattr(fault, "__notes__", ()):
-        typer.echo(one_line(note), err=True)
+        print_line(one_line(note), err=True)
     message, hint = plain(fault.message), plain(fault.hint)
     room = LINE_LENGTH - len(_ERROR) - len(" ()")
     hint = shorten_names(hint, max(_SHORTEST_HINT, room - len(message)))
     message = shorten_paths(message, room - len(hint))
-    typer.echo(f"{_ERROR}{message}{f' ({hint})' if hint else ''}", err=True)
+    print_line(f"{_ERROR}{message}{f' ({hint})' if hint else ''}", err=True)
+
+
+def print_line(text: str, *, err: bool = False) -> None:
+    """Print a line to stdout or stderr; a terminal gets it wrapped at words, without splitting names."""
+    if (sys.stderr if err else sys.stdout).isatty():
+        indent = text[: len(text) - len(text.lstrip())]
+        text = _wrapped(text.lstrip(), max(shutil.get_terminal_size().columns, _NARROWEST), indent)
+    typer.echo(text, err=err)
+
+
+def _wrapped(text: str, width: int, indent: str = "") -> str:
+    more = f"{indent}  "
+    return fill(
+        text, width, initial_indent=indent, subsequent_indent=more, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def print_json(value: Any) -> None:
@@ -91,9 +106,9 @@ def _print_alike(word: str, every: Sequence[Skipped | RecordingFinding]) -> None
 
     items = alike([replace(item, reason=_bare(item)) for item in dict.fromkeys(every)])
     for item in items[:_SHOWN]:
-        typer.echo(reason_line(word, item.recording, item.reason), err=True)
+        print_line(reason_line(word, item.recording, item.reason), err=True)
     if len(items) > _SHOWN:
-        typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
+        print_line(f"{word}: and {len(items) - _SHOWN} more", err=True)
 
 
 def leave(
@@ -107,7 +122,7 @@ def leave(
     facts = tuple(facts)
     if parts:
         start = "nothing can be used:" if Fact.NOTHING_USABLE in facts else "done, but"
-        typer.echo(f"{start} {' and '.join(parts)}", err=True)
+        print_line(f"{start} {' and '.join(parts)}", err=True)
     found = [*facts, *([Fact.LEFT_OUT] if items else []), *([Fact.LOST] if logs else [])]
     status = status_of(found)
     if status:
@@ -136,22 +151,14 @@ def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
             words = f"none of {counted(len(contacts), 'contact')} could be assessed: {'; '.join(reasons)}"
         else:
             continue
-        typer.echo(f"not assessable: {plain(name)}: {plain(words)}", err=True)
+        print_line(f"not assessable: {plain(name)}: {plain(words)}", err=True)
         facts.append(Fact.NOTHING_ASSESSABLE)
     return facts
 
 
 def say(text: str, indent: str = "", tone: str = "") -> None:
     """Print a sentence to stdout in lines that fit the terminal; names are not split. `tone`: its colour."""
-    lines = fill(
-        plain(text),
-        columns_to_fill(),
-        initial_indent=indent,
-        subsequent_indent=f"{indent}  ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    typer.echo(coloured(lines, tone), color=shows_colour())
+    typer.echo(coloured(_wrapped(plain(text), columns_to_fill(), indent), tone), color=shows_colour())
 
 
 def columns_to_fill() -> int:

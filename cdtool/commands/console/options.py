@@ -99,7 +99,8 @@ def keys_option(meaning: str, model: str) -> Any:
 
 def set_option(example: str, table: str) -> Any:
     """Return the option --set for the keys of a table of `judging.settings_table`, with one as an example."""
-    return keys_option(f"As {example}; docs/benchmark-file.md.", f"cdtool.commands.judging.settings_table:{table}")
+    meaning = f"As {example}; the last of a key counts; docs/benchmark-file.md."
+    return keys_option(meaning, f"cdtool.commands.judging.settings_table:{table}")
 
 
 SetOption = Annotated[list[str] | None, set_option("activation.debounce=9", "JudgingTable")]

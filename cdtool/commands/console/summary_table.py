@@ -11,7 +11,7 @@ import typer
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.colour import Toned
-from cdtool.commands.console.console import fits_terminal, leave, number, say, table
+from cdtool.commands.console.console import fits_terminal, leave, number, print_line, say, table
 from cdtool.commands.console.truth_shown import show_truth
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def show_conclusion(evaluated: Evaluated) -> None:
     for reason in conclusion.reasons[:_SHOWN]:
         say(reason, indent="  ", tone="unknown" if tone == "unknown" else "bad")
     if len(conclusion.reasons) > _SHOWN:
-        typer.echo(f"  and {len(conclusion.reasons) - _SHOWN} more")
+        print_line(f"  and {len(conclusion.reasons) - _SHOWN} more")
     _show_limits(evaluated)
 
 
@@ -166,7 +166,7 @@ def _show_limits(evaluated: Evaluated) -> None:
         tone = "bad" if item.outcome == "violated" else "unknown"
         say(f"limit {outcome}: {name}: {item.reason} (limit {item.limit})", indent="  ", tone=tone)
     if len(failed) > _SHOWN:
-        typer.echo(f"  limits not met: and {len(failed) - _SHOWN} more")
+        print_line(f"  limits not met: and {len(failed) - _SHOWN} more")
 
 
 def finish(evaluated: Evaluated) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cdtool.commands.console.console import plain
+from cdtool.commands.console.console import plain, print_line
 from cdtool.commands.console.late_progress import late_progress
 from cdtool.commands.console.summary_table import show_conclusion, show_table
 
@@ -38,6 +38,6 @@ def show_results(evaluated: Evaluated, written: Sequence[Path], *, quiet: bool, 
     typer.echo()
     show_table(evaluated)
     for line in more:
-        typer.echo(line)
+        print_line(line)
     for path in written:
-        typer.echo(f"written: {plain(path)}")
+        print_line(f"written: {plain(path)}")

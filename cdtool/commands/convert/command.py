@@ -9,7 +9,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import leave_with, plain, print_json, with_findings
+from cdtool.commands.console.console import leave_with, plain, print_json, print_line, with_findings
 from cdtool.commands.console.late_progress import late_progress
 from cdtool.commands.console.options import JsonOption
 from cdtool.commands.console.place import Place, location
@@ -82,10 +82,10 @@ def convert(
         typer.echo("\n".join(_recovered(done) if isinstance(done, Recovered) else _converted(done)))
     for finding in done.findings:
         if finding.severity != "note" or finding.kind == "unverified":
-            typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
+            print_line(f"{finding.severity}: {plain(finding)}", err=True)
     left_out = done.left_out if isinstance(done, Recovered) else 0
     if left_out:
-        typer.echo(f"left out: {left_out} messages without a checksum (--recover all keeps them)", err=True)
+        print_line(f"left out: {left_out} messages without a checksum (--recover all keeps them)", err=True)
     leave_with(done.findings, [Fact.LEFT_OUT] if left_out else ())
 
 

@@ -19,6 +19,7 @@ from cdtool.commands.console.console import (
     plain,
     print_error,
     print_json,
+    print_line,
     print_not_assessable,
     print_skipped,
     progress,
@@ -179,7 +180,7 @@ class _DetectedLogs:
         else:
             show_detected([found for _, found in self.done], self.forces)
             for plot in self.plotted:
-                typer.echo(f"plot written to {plain(plot)}")
+                print_line(f"plot written to {plain(plot)}")
         leave(self.skipped, self.findings, print_not_assessable((str(log), found) for log, found in self.done))
 
 

@@ -9,11 +9,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.colour import Toned
-from cdtool.commands.console.console import number, plain, say, table
+from cdtool.commands.console.console import number, plain, print_line, say, table
 from cdtool.commands.console.contact_rows import contact_as_json
 from cdtool.commands.console.truth_shown import NEGATIVE
 
@@ -43,7 +41,7 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
     for force in list(forces.values())[:_SHOWN]:
         _show_force(force)
     if len(forces) > _SHOWN:
-        typer.echo(f"estimated force: and {counted(len(forces) - _SHOWN, 'more operation')} (--json has all)")
+        print_line(f"estimated force: and {counted(len(forces) - _SHOWN, 'more operation')} (--json has all)")
 
 
 def show_conclusion(done: Sequence[Detected]) -> None:
@@ -78,7 +76,7 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
     unit = first.statistic.unit
     columns = [("recording", "left"), ("verdict", "left"), ("time\ns", "right"), ("joint", "left")]
     columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
-    typer.echo(f"{first.detector}: {plain(threshold)}")
+    print_line(f"{first.detector}: {plain(threshold)}")
     table(columns, cells)
     rules = {found.onset for found, _, matching in rows for item in matching.matches if item.contact.found_by == _CELL}
     for rule in sorted(rules):
@@ -130,7 +128,7 @@ def _show_force(force: ForceSummary) -> None:
     largest = (
         f"largest {force.largest:.1f} N at {force.largest_at:.3f} s" if math.isfinite(force.largest) else "unknown"
     )
-    typer.echo(f"{plain(force.operation)}: estimated force at {plain(str(force.contact))}: {at_alarm}{largest}")
+    print_line(f"{plain(force.operation)}: estimated force at {plain(str(force.contact))}: {at_alarm}{largest}")
 
 
 def _show_notes(detections: list[Detection]) -> None:
@@ -140,7 +138,7 @@ def _show_notes(detections: list[Detection]) -> None:
         for note in detection.statistic.notes:
             say(f"{detection.operation.name}: {note}")
     if len(noted) > _SHOWN:
-        typer.echo(f"and {counted(len(noted) - _SHOWN, 'more operation')} with such a note (--json has all)")
+        print_line(f"and {counted(len(noted) - _SHOWN, 'more operation')} with such a note (--json has all)")
 
 
 def _show_not_assessable(detections: list[Detection]) -> None:
@@ -165,7 +163,7 @@ def _show_not_assessable(detections: list[Detection]) -> None:
         share = 1.0 - float(detection.statistic.valid.mean())
         say(f"not assessable in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
     if len(shown) > _SHOWN:
-        typer.echo(f"not assessable: and {counted(len(shown) - _SHOWN, 'more operation')} (--json has all)")
+        print_line(f"not assessable: and {counted(len(shown) - _SHOWN, 'more operation')} (--json has all)")
 
 
 def _place(way: float) -> str:

@@ -31,7 +31,6 @@ from cdtool.commands.judging.settings_table import (
     refuse_beside_signature,
 )
 from cdtool.commands.judging.true_contacts import any_contacts
-from cdtool.commands.learning.threshold_settings import threshold_of
 from cdtool.detectors.base import Detector
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.formats.machine_file import MachineFile, read_machine_file
@@ -189,9 +188,9 @@ def _by_hand(
     """Return the detector with a threshold that is not learned: limits set by hand, or those of each run itself."""
     machine = machine_file.machine
     table.check_joints(place, machine)
-    given = (table.threshold, Signature(), machine.default_sides, place)
-    otherwise: tuple[str, Threshold, Signature] = ("", Signature(), Signature())
-    _, rule, _ = place.tried(otherwise, threshold_of, *given)
+    signature = Signature().sided(machine.default_sides)
+    otherwise: Threshold = signature
+    rule = place.tried(otherwise, table.rule, place, signature)
     limits = getattr(rule, "limits", ())
     place.finish()
     if not limits and not is_per_run(rule):

@@ -161,7 +161,8 @@ def prepare_benchmark(
         refuse_beside_signature(apply_settings({}, settings or {}), place, own)
         place.finish()
     named = (detector,) if detector else ()
-    setup, measured = with_synchronisation(read_benchmark_file(file, detectors=named, settings=settings))
+    read = read_benchmark_file(file, detectors=named, settings=settings, command="detect")
+    setup, measured = with_synchronisation(read)
     machine_file = setup.machine_file
     if signature is not None:
         stored = signature_of(signature)

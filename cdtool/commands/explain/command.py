@@ -16,6 +16,7 @@ from cdtool.commands.console.console import (
     number,
     plain,
     print_json,
+    print_line,
     print_not_assessable,
     print_skipped,
     say,
@@ -94,7 +95,7 @@ def explain(
             _show_explained(run)
     for path in _draw(explained.runs, drawn, log_stem(log), force=force):
         if not as_json:
-            typer.echo(f"plot written to {plain(path)}")
+            print_line(f"plot written to {plain(path)}")
     leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))
 
 
@@ -118,7 +119,7 @@ def _show_explained(explained: ExplainedRun) -> None:
     for _, item in shown:
         _show_event(item)
     if len(explained.events) > len(shown):
-        typer.echo(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
+        print_line(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
     elsewhere = [item for item in explained.found.detections if item.other_speed and item.verdict.outcome != _BLIND]
     for detection in elsewhere[:_SHOWN]:
         say(f"{detection.operation.name}, not assessable at another speed: {detection.other_speed}")
@@ -128,7 +129,7 @@ def _show_explained(explained: ExplainedRun) -> None:
         why = detection.verdict.reason or "no alarm and no missed contact"
         say(f"{detection.operation.name}, {detection.detector}: {why}")
     if len(quiet) > _SHOWN:
-        typer.echo(f"and {counted(len(quiet) - _SHOWN, 'more operation')} without an event")
+        print_line(f"and {counted(len(quiet) - _SHOWN, 'more operation')} without an event")
 
 
 def _show_event(item: Explanation) -> None:

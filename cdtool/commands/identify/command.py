@@ -14,7 +14,17 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
+from cdtool.commands.console.console import (
+    leave,
+    number,
+    plain,
+    print_json,
+    print_line,
+    print_skipped,
+    progress,
+    say,
+    table,
+)
 from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
 
@@ -160,9 +170,9 @@ def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Pa
     for joint in done.joints:
         left = joint.rigid.cross_validation.left_over if joint.rigid and joint.rigid.cross_validation else math.nan
         if left > _MUCH_MORE:
-            typer.echo(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
+            print_line(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
     runs = counted(len(done.runs), "impact-free run")
-    typer.echo(f"{plain(done.machine)}: identified from {runs}")
+    print_line(f"{plain(done.machine)}: identified from {runs}")
     if done.changes and not quiet:
         _show_changes(done)
     if done.robot is not None:
@@ -175,11 +185,11 @@ def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Pa
 
 def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
     if is_named:
-        typer.echo(f"joint {plain(joint.joint)}")
+        print_line(f"joint {plain(joint.joint)}")
     _show_quality(joint)
     _show_missing(joint, "")
     for method, reason in joint.refused.items():
-        typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
+        print_line(f"not used: {method.replace('_', '-')}: {plain(reason)}")
 
 
 def _show_missing(joint: JointIdentification, name: str) -> None:
@@ -187,7 +197,7 @@ def _show_missing(joint: JointIdentification, name: str) -> None:
 
     for item in joint.not_identifiable:
         needs = words_of_needs(item.missing)
-        typer.echo(f"{name}not identifiable: {item.section}.{item.key}{f': add {needs}' if needs else ''}")
+        print_line(f"{name}not identifiable: {item.section}.{item.key}{f': add {needs}' if needs else ''}")
 
 
 def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
@@ -198,12 +208,12 @@ def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Seque
         ".json": "values",
     }
     for path in written:
-        typer.echo(f"written: {plain(path)} ({kinds[path.suffix.lower()]})")
+        print_line(f"written: {plain(path)} ({kinds[path.suffix.lower()]})")
     for target in targets:
         if target not in written:
-            typer.echo(f"not written: {plain(target)}: nothing new predicts unseen runs better")
+            print_line(f"not written: {plain(target)}: nothing new predicts unseen runs better")
     if not targets and done.changes:
-        typer.echo("nothing is written: give -o machine.toml")
+        print_line("nothing is written: give -o machine.toml")
 
 
 def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: bool) -> None:
@@ -223,9 +233,9 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
         name = plain(joint.joint)
         _show_missing(joint, f"{name}: ")
         for reason in joint.refused.values():
-            typer.echo(f"{name}: {plain(reason)}")
+            print_line(f"{name}: {plain(reason)}")
     for line in words_of_robot(robot, done.joints, len(done.runs)):
-        typer.echo(plain(line))
+        print_line(plain(line))
 
 
 def _show_changes(done: IdentifiedMachine) -> None:
@@ -242,8 +252,8 @@ def _show_quality(joint: JointIdentification) -> None:
     validation = joint.rigid.cross_validation if joint.rigid else None
     if validation is not None:
         floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
-        typer.echo(f"force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")
+        print_line(f"force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")
     for level in joint.rigid.levels if joint.rigid else ():
         way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
         force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
-        typer.echo(f"friction {way} at {speed}: {force}")
+        print_line(f"friction {way} at {speed}: {force}")

@@ -58,5 +58,16 @@ def write_identification(
         if target.suffix.lower() == JSON:
             texts[target] = strict_json({**done.summary, "outputs": [str(path) for path in written]}) + "\n"
     refuse_inputs(texts, inputs)
-    write_texts(texts)
+    write_texts({**_schemas(texts), **texts})
     return tuple(texts)
+
+
+def _schemas(texts: Mapping[Path, str]) -> dict[Path, str]:
+    """Return the schema that a machine file names beside itself, if it is not there: the file is in a new folder."""
+    made: dict[Path, str] = {}
+    for file, text in texts.items():
+        if file.suffix.lower() == MACHINE and text.startswith("#:schema ./"):
+            from cdtool.commands.console.json_schema import with_schema
+
+            made |= {path: own for path, own in with_schema("machine", file, text).items() if not path.exists()}
+    return made

@@ -81,7 +81,7 @@ def updated_text(text: str, changes: Sequence[MachineChange], origin: str) -> st
 
     document = tomlkit.parse(text)
     for change in changes:
-        table = opened_table(document, change.section)
+        table = opened_table(document, *change.section.split("."))
         value: Any = change.values[0] if len(set(change.values)) == 1 else list(change.values)
         before = table.get(change.key)
         item = tomlkit.item(int(value) if change.key in _WHOLE else value)

@@ -9,7 +9,16 @@ import typer
 from cdtool.base.errors import CdtoolError
 from cdtool.base.exit_status import Fact
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import leave_with, number, plain, print_error, print_json, table, with_findings
+from cdtool.commands.console.console import (
+    leave_with,
+    number,
+    plain,
+    print_error,
+    print_json,
+    print_line,
+    table,
+    with_findings,
+)
 from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import JsonOption
 from cdtool.commands.console.place import Place, location
@@ -55,7 +64,7 @@ def info(
         if common := common_latencies(done):
             typer.echo(f"\nAll {len(done)} logs, if their clocks are the same:\n")
             for finding in common:
-                typer.echo(f"{finding.severity}: {plain(str(finding))}")
+                print_line(f"{finding.severity}: {plain(str(finding))}")
     leave_with((finding for item in done for finding in item.findings), facts if done else [Fact.NOTHING_USABLE])
 
 
@@ -63,7 +72,7 @@ def _show(item: Info) -> None:
     from cdtool.report.alike import grouped_findings
 
     details = ", ".join(f"{plain(key)} {plain(value)}" for key, value in item.details.items())
-    typer.echo(f"{plain(item.source)}: {item.format}{' (' + details + ')' if details else ''}")
+    print_line(f"{plain(item.source)}: {item.format}{' (' + details + ')' if details else ''}")
     columns = [("channel", "left"), ("unit", "left")]
     columns += [(name, "right") for name in ("samples", "lost", "Hz", "start\ns", "length\ns", "min", "max")]
     rows = [
@@ -84,9 +93,9 @@ def _show(item: Info) -> None:
     typer.echo()
     for severity in ("loss", "warning", "note"):
         for name, text in grouped_findings([found for found in item.findings if found.severity == severity]):
-            typer.echo(f"{severity}: {plain(f'{name}: {text}' if name else text)}")
+            print_line(f"{severity}: {plain(f'{name}: {text}' if name else text)}")
     if not item.findings:
-        typer.echo("no warnings")
+        print_line("no warnings")
     if item.dialect:
         typer.echo("\nTable format, to be pasted into a machine file:\n")
         for line in item.dialect.splitlines():

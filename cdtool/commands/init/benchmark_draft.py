@@ -15,6 +15,7 @@ from cdtool.base.errors import CdtoolError, RecordingError
 from cdtool.base.log_names import log_stem, log_suffix
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import relative_name
+from cdtool.base.toml_text import comment_lines, commented
 from cdtool.commands.init.draft_text import toml
 from cdtool.commands.judging.runs import read_named
 from cdtool.commands.judging.scoring_rules import ScoringRules
@@ -31,7 +32,7 @@ from cdtool.truth.onset_rule import OnsetRule
 _HOLDOUT = 4
 # With fewer logs of impacts, a threshold learned from the others is not worth it.
 _ENOUGH_IMPACTS = 3
-_FORCE_ONLY = "  # the logs have no channels of a machine: a protocol of the forces needs no detector"
+_FORCE_ONLY = "the logs have no channels of a machine: a protocol of the forces needs no detector"
 _NORMAL_MAD = 1.4826
 # Words, between anything but letters, in the names of logs without an impact.
 _FREE = re.compile(
@@ -136,8 +137,8 @@ def draft_benchmark(
     lines = [
         f"# Draft by cdtool init from {counted(len(known), 'log')}: check each line marked CHECK.",
         f"machine = {toml(relative_name(machine_file.path, folder))}",
-        f"detectors = {_listed(usable)}" + ("" if usable or others else _FORCE_ONLY),
-        *([f"# With inertia and friction in the machine file also: {', '.join(others)}"] if others else []),
+        *commented(f"detectors = {_listed(usable)}", "" if usable or others else _FORCE_ONLY),
+        *(comment_lines(f"With inertia and friction in the machine file also: {', '.join(others)}") if others else []),
         *(_learning(impacts, free, folder, _is_plausible_travel(first)) if usable or others else []),
         *_groups(impacts, folder),
         *_onset(known, beside),
@@ -189,22 +190,25 @@ def _learning(impacts: Sequence[Path], free: Sequence[Path], folder: Path, by_po
         lines = [] if by_position else ['threshold = "limit"  # without a plausible position']
         lines += ["", "[learn]", f"logs = {_listed(patterns(learned, folder))}"]
         return [*lines, "", "[holdout]", f"logs = {_listed(patterns(held, folder))}"] if held else lines
-    why = f"# {counted(len(free), 'impact-free log')}: a signature needs {ENOUGH_RUNS}."
+    why = f"{counted(len(free), 'impact-free log')}: a signature needs {ENOUGH_RUNS}."
     both = [*free, *impacts]
     if len(both) >= _ENOUGH_IMPACTS:
         return [
-            f"{why} Limits are learned from what is before the contacts,",
-            "# and each log is scored with what was learned from the others.",
+            *comment_lines(
+                f"{why} Limits are learned from what is before the contacts, and each log is scored with what was "
+                "learned from the others."
+            ),
             'threshold = "limit"',
             '# Or, without learning: threshold = "baseline"',
             '# operations = "motion"  # alarms while the machine rests do not count',
             "",
             "[learn]",
             'until = "onset"',
-            '# from = "0.5s"  # without the beginning of each log, here and in each group of impacts',
+            *commented('# from = "0.5s"', "without the beginning of each log, here and in each group of impacts"),
             f"logs = {_listed(patterns(both, folder))}",
         ]
-    return [f"{why} Limits are those of each run's own first seconds in motion.", 'threshold = "baseline"']
+    why = f"{why} Limits are those of each run's own first seconds in motion."
+    return [*comment_lines(why), 'threshold = "baseline"']
 
 
 def _groups(impacts: Sequence[Path], folder: Path) -> list[str]:
@@ -242,15 +246,15 @@ def _onset(known: Sequence[_Log], beside: Mapping[str, str]) -> list[str]:
     step = 10.0 ** (math.floor(math.log10(level)) - 1)
     rounded = digits(math.ceil(level / step) * step)
     why = f"{sigmas:g} standard deviations of the load cell's noise, {digits(float(f'{max(noises):.2g}'))} N at most"
-    return ["", "[onset]", f"above_n = {rounded}  # {why}; CHECK: below the force that counts as a contact"]
+    check = f"{why}; CHECK: below the force that counts as a contact"
+    return ["", "[onset]", *commented(f"above_n = {rounded}", check)]
 
 
 def _comments(unknown: Sequence[Path], folder: Path) -> list[str]:
     if not unknown:
         return []
-    return ["", "# Not used: without load cell, label or event it is unknown whether they contain an impact:"] + [
-        f"#   {relative_name(log, folder)}" for log in unknown
-    ]
+    why = "Not used: without load cell, label or event it is unknown whether they contain an impact:"
+    return ["", *comment_lines(why), *(f"#   {relative_name(log, folder)}" for log in unknown)]
 
 
 def _label_file(logs: Sequence[Path], folder: Path) -> str:

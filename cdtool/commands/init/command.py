@@ -11,7 +11,15 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import leave, leave_with, plain, print_json, print_skipped, with_findings
+from cdtool.commands.console.console import (
+    leave,
+    leave_with,
+    plain,
+    print_json,
+    print_line,
+    print_skipped,
+    with_findings,
+)
 from cdtool.commands.console.late_progress import late_progress
 from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import JsonOption
@@ -89,11 +97,13 @@ def init(
         else:
             typer.echo(drafted.text)
             first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
-            typer.echo(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
+            print_line(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
             typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(drafted.path)}")
         _warn(drafted)
         leave_with(drafted.findings)
         return
+    if output.suffix and not output.is_dir():
+        raise UsageError(f"--output is {plain(output)}", "give a machine file, NAME.toml, or a folder without a suffix")
     with late_progress("analysing the logs"):
         study = init_study(logs, output, machine=machine, force=force, csv=csv, free=free or (), urdf=urdf)
     if as_json:
@@ -111,34 +121,34 @@ def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
 
     typer.echo(study.text)
     names = [*([study.machine_path] if study.machine else []), study.path, *study.beside]
-    typer.echo(
+    print_line(
         f"{', '.join(map(plain, names))} written: drafts based on guesses. Check each line marked CHECK, then run"
     )
     typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(study.machine_path)}")
     for name in study.kept:
-        typer.echo(f"{plain(name)} kept as it is: delete it for an empty one")
+        print_line(f"{plain(name)} kept as it is: delete it for an empty one")
     if study.beside:
-        typer.echo(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
+        print_line(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
         some = " ".join("*".join(part and _quoted(part) for part in item.split("*")) for item in patterns(logs, Path()))
         typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
     if study.has_detectors:
         typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
     if not study.beside and not study.kept:
-        typer.echo("for a test protocol of the contact forces:")
+        print_line("for a test protocol of the contact forces:")
         typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
 
 
 def _warn(drafted: Drafted) -> None:
     """Print what is wrong with a draft to stderr."""
     if not drafted.channels:
-        typer.echo(
+        print_line(
             "warning: no column's name or values indicate a torque, speed or position: all are comments", err=True
         )
     for name in drafted.left_out:
-        typer.echo(f"warning: {name}: the log contradicts the guess: written as a comment", err=True)
+        print_line(f"warning: {name}: the log contradicts the guess: written as a comment", err=True)
     for finding in drafted.findings:
         if finding.severity == "loss" or finding.kind == "steady_header":
-            typer.echo(f"{finding.severity}: {plain(finding)}", err=True)
+            print_line(f"{finding.severity}: {plain(finding)}", err=True)
 
 
 def _quoted(path: object) -> str:

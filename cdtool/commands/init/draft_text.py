@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
 
 from cdtool.base.findings import Finding
+from cdtool.base.toml_text import comment_lines, commented
 from cdtool.commands.init.derived_speed import LowPassGuess
 from cdtool.commands.init.machine_side import Side
 from cdtool.commands.init.names.units import Evidence
@@ -18,7 +18,6 @@ from cdtool.commands.init.streams import Channels, column_key
 from cdtool.commands.init.unmapped import Unmapped
 from cdtool.recordings.recording import CONTACT_PRESSURE, RIG_UNITS, UNITLESS
 
-_WIDEST = 100
 _MOST_LISTED = 200
 _GROUND_TRUTH = {
     "force": "ground truth only: is it the load cell of the test?",
@@ -74,7 +73,9 @@ def draft_text(draft: Draft, left_out: Mapping[str, str], reverse: Sequence[Find
     side, clock, low_pass = draft.side, draft.clock, draft.low_pass
     lines = [
         f"# Draft by cdtool init from {_plain(draft.log)}: guessed, not measured.",
-        '# "guessed" gives the reason; "CHECK" marks what cdtool cannot know: delete the mark after checking.',
+        *comment_lines(
+            '"guessed" gives the reason; "CHECK" marks what cdtool cannot know: delete the mark after checking.'
+        ),
         "",
         "[machine]",
         *_line("type", side.type, side.why, side.check),
@@ -96,14 +97,14 @@ def draft_text(draft: Draft, left_out: Mapping[str, str], reverse: Sequence[Find
     for name in found:
         made = _mapped(draft, name, [item for item in reverse if item.channel == name])
         lines += [f"# {text}" for text in made] if name in left_out else made
-        lines += _wrapped(f"CHECK: left out: it {left_out[name]}") if left_out.get(name) else []
+        lines += comment_lines(f"CHECK: left out: it {left_out[name]}") if left_out.get(name) else []
     if not found:
-        lines += _wrapped(
+        lines += comment_lines(
             "CHECK: no name or value indicates a torque, speed or position. Write the channels here, with the unit "
             'of the log, e.g. torque = { column = "CH1", unit = "V", scale = 2.0 } with N m or N per V.'
         )
     elif absent := [name for name in ("torque", "speed", "position") if name not in found]:
-        lines.append(f"# CHECK: found no {', no '.join(absent)}: cdtool info lists the content of the log")
+        lines += comment_lines(f"CHECK: found no {', no '.join(absent)}: cdtool info lists the content of the log")
     return "\n".join([*lines, *_unmapped(draft)]) + "\n"
 
 
@@ -170,7 +171,7 @@ def _unmapped(draft: Draft) -> list[str]:
         if len(item.columns) > 1:
             where += f" to {toml(column_key(item.columns[-1]))} ({len(item.columns)} columns)"
         text = _plain(f"{where}: {values}{guess}")
-        made += wrap(text, _WIDEST, initial_indent="#   ", subsequent_indent="#     ", break_on_hyphens=False)
+        made += comment_lines(text, "  ", "  ")
     if rest := sum(max(1, len(item.columns)) for item in draft.unmapped[_MOST_LISTED:]):
         made.append(f"#   and {rest} more columns: cdtool info lists them")
     return made
@@ -224,13 +225,7 @@ def _robot(draft: Draft) -> list[str]:
 def _line(key: str, value: object, why: str = "", check: str = "") -> list[str]:
     """Return a key with its comment after it, or before it if both are too long for one line."""
     parts = [f"guessed: {why}" if why else "", f"CHECK: {check}" if check else ""]
-    comment = _plain(". ".join(filter(None, parts)))
-    joined = f"{key} = {toml(value)}" + (f"  # {comment}" if comment else "")
-    return [joined] if len(joined) <= _WIDEST or not comment else [*_wrapped(comment), f"{key} = {toml(value)}"]
-
-
-def _wrapped(text: str) -> list[str]:
-    return [f"# {part}" for part in wrap(text, _WIDEST - 4, break_long_words=False, break_on_hyphens=False)]
+    return commented(f"{key} = {toml(value)}", _plain(". ".join(filter(None, parts))))
 
 
 def _plain(text: str) -> str:

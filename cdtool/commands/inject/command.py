@@ -10,7 +10,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress
+from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
 from cdtool.commands.console.options import (
     ClusterOption,
     ForceOption,
@@ -92,14 +92,14 @@ def inject(
     else:
         show_coverage(done, quiet=quiet)
         for target in () if quiet else targets:
-            typer.echo(f"written: {plain(target)}")
+            print_line(f"written: {plain(target)}")
     leave(done.skipped)
 
 
 def _show_logs(made: Injected) -> None:
     groups = dict.fromkeys(case.group for case in made.logs.cases)
-    typer.echo(f"{plain(made.folder)}: {counted(len(made.logs.cases), 'injected contact')} in {', '.join(groups)}")
+    print_line(f"{plain(made.folder)}: {counted(len(made.logs.cases), 'injected contact')} in {', '.join(groups)}")
     for doubt in dict.fromkeys(doubt for case in made.logs.cases for doubt in case.doubts):
         many = sum(doubt in case.doubts for case in made.logs.cases)
-        typer.echo(f"note: {doubt.replace('_', ' ')}: {many} of {len(made.logs.cases)}")
-    typer.echo(f"written: {plain(made.folder)}/benchmark.toml, with {counted(made.copied, 'impact-free log')}")
+        print_line(f"note: {doubt.replace('_', ' ')}: {many} of {len(made.logs.cases)}")
+    print_line(f"written: {plain(made.folder)}/benchmark.toml, with {counted(made.copied, 'impact-free log')}")

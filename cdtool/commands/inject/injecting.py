@@ -89,7 +89,7 @@ def inject(
     >>> len(done.logs.cases), done.logs.cases[0].group
     (32, 'injected_stiff')
     """
-    setup = read_benchmark_file(file, settings=settings)
+    setup = read_benchmark_file(file, settings=settings, command="inject")
     workers = (workers or Workers()).limited_by(setup.execution)
     section = section_of(setup)
     folder = location(output)

@@ -5,24 +5,35 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import FieldsError, UsageError, nearest
 from cdtool.base.files.bounded_loading import ContentError, parse_toml
-from cdtool.base.settings import Model, NotNegative, Place, Positive, read, setting
+from cdtool.base.settings import Model, NotNegative, Place, Positive, keys_of, read, setting, tables_of
+from cdtool.base.value_words import value_in_words
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.named_logs import LogPart, OnsetTable, read_label_file
 from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.execution.workers import Execution
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.operations import RunCut
+from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.base import Threshold
+from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.truth.onset_rule import OnsetRule
 
+#: A detector, by its name or as an object.
+Named = TypeVar("Named")
+
 # How long before its first contact a log is no longer learned from [s].
 GUARD = 0.2
+_DEFAULT = "signature"
+# Settings of a signature that another threshold cannot follow, and why.
+_OF_SIGNATURE = (("adaptive_level", "does not follow a run"), ("speed_range", "has no limits between speeds"))
 _NAME = re.compile(r"""(["'])(.*?)\1|([^.]+)""")
 
 
@@ -117,6 +128,46 @@ class DetectorTable:
         with place.at("operations", self.operations):
             return RunCut.of(self.operations)
 
+    def rule(self, place: Place, signature: Signature) -> Threshold:
+        """Return the threshold's rule, with the mistakes of single keys in `place`.
+
+        Raises ConfigurationError for an unknown threshold, and for settings that do not fit together.
+
+        `limits` without a name are those of the threshold `limit`. The settings of the signature, also if another rule
+        learns one, are in [signature]; so is the safety factor of any rule if [threshold] does not set it.
+        """
+        given = self.threshold
+        table: dict[str, Any] = (
+            {"name": given} if isinstance(given, str) else {"name": "limit" if "limits" in given else _DEFAULT, **given}
+        )
+        name = table.pop("name")
+        below = place if isinstance(given, str) else place.below("threshold")
+        key = "threshold" if isinstance(given, str) else "name"
+        known = THRESHOLDS.names_for(name)
+        if name not in known:
+            raise below.fault(key, f"is {name!r}", nearest(str(name), known))
+        if name == _DEFAULT:
+            for other in table:
+                hint = "name its threshold with threshold.name; the signature's settings are in [signature]"
+                below.note(other, "is not a key of the threshold signature", hint)
+            return signature
+        for own, problem in _OF_SIGNATURE:
+            if getattr(signature, own):
+                what = f"'{name}' {problem}: {own} of [signature] is for the threshold 'signature'"
+                raise place.fault("threshold", what, f"remove {own}, or choose that threshold")
+        kind = THRESHOLDS.load(name)
+        if "safety_factor" in keys_of(kind) and "safety_factor" not in table and signature.safety_factor is not None:
+            table["safety_factor"] = signature.safety_factor
+        if "limits" in table and "safety_factor" in table:
+            raise below.fault("safety_factor", "cannot be combined with limits set by hand", "remove one of the two")
+        rule: Threshold | None = read(kind, table, below)
+        if rule is None:
+            return signature
+        try:
+            return with_context(rule, signature.sides, signature)
+        except UsageError as fault:
+            raise below.whole(fault) from fault
+
     def check_joints(self, place: Place, machine: Machine) -> None:
         """Note each joint that the machine does not have."""
         for joint in self.joints:
@@ -191,12 +242,23 @@ def read_settings(model: type[Model], settings: Mapping[str, Any]) -> tuple[Mode
 
     Raises ConfigurationError with all mistakes if there is no model, as for values that do not fit together.
     """
-    place = Place("--set", by_option=full_keys(settings), root=model)
+    place = Place("--set", by_option=full_keys(settings), tables=partial(tables_of, model))
+    note_other_units(model, place)
     table = read(model, apply_settings({}, settings), place)
     if table is None:
         place.finish()
     assert table is not None
     return table, place
+
+
+def note_other_units(model: Any, place: Place) -> None:
+    """Note each key of --set that is one of the model but for a unit behind it, as activation.debounce_ms."""
+    for key in sorted(place.by_option):
+        table, _, name = key.rpartition(".")
+        known = keys_of(tables_of(model)[table]) if table in tables_of(model) else {}
+        meant = known.get(name.rpartition("_")[0])
+        if meant and name not in known:
+            place.note(key, "unknown key", f"give {table}.{meant.name}: {meant.meaning}")
 
 
 def refuse_beside_signature(values: Mapping[str, Any], place: Place, names: Sequence[str]) -> None:
@@ -214,7 +276,7 @@ def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> di
     """
     found = dict(values)
     for key, value in settings.items():
-        *tables, name = _names_in(key)
+        *tables, name = names_in(key)
         table = found
         for above in tables:
             inner = table.get(above)
@@ -227,12 +289,37 @@ def apply_settings(values: Mapping[str, Any], settings: Mapping[str, Any]) -> di
 
 def full_keys(settings: Mapping[str, Any] | None) -> frozenset[str]:
     """Return the full keys of settings, as a message names them."""
-    return frozenset(".".join(_names_in(key)) for key in settings or ())
+    return frozenset(".".join(names_in(key)) for key in settings or ())
 
 
-def _names_in(key: str) -> list[str]:
-    """Return the tables and the name of a key; one with a dot is in quotes, as in impacts."stiff 1.5".window_s."""
-    return [quoted or bare for _, quoted, bare in _NAME.findall(key)] or [key]
+def names_in(key: str) -> list[str]:
+    """Return the tables and the name of a key; one with a dot is in quotes, as in impacts."stiff 1.5".window_s.
+
+    >>> names_in("limits.gm.stiff.p95_ms.max")  # the name of a limit always has dots
+    ['limits', 'gm.stiff.p95_ms', 'max']
+    """
+    first, *names = [quoted or bare for _, quoted, bare in _NAME.findall(key)] or [key]
+    if first != "limits" or not names:
+        return [first, *names]
+    bound = names[-1:] if names[-1] in ("min", "max") else []
+    return [first, ".".join(names[: len(names) - len(bound)]), *bound]
+
+
+def detectors_of(given: Sequence[Named], settings: Mapping[str, Any] | None) -> tuple[Sequence[Named], dict[str, Any]]:
+    """Return the detectors in place of the file's, `given` or by the setting `detectors`, and the other settings.
+
+    Raises UsageError if both are there, and for a value that is not a list of names.
+    """
+    others = dict(settings or {})
+    if "detectors" not in others:
+        return given, others
+    if given:
+        raise UsageError("--set detectors: cannot be combined with --detectors", "omit one of the two")
+    value = others.pop("detectors")
+    named: Any = [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+    if not (isinstance(named, list | tuple) and named and all(isinstance(name, str) for name in named)):
+        raise UsageError(f"--set detectors: is {value_in_words(value)}", "give names of detectors, as gm,eo")
+    return named, others
 
 
 def given_settings(texts: Iterable[str]) -> dict[str, Any]:

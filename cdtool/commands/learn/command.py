@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress, table
+from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress, table
 from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import (
     BudgetOption,
@@ -72,7 +72,7 @@ def learn_signature(
         if runs < ENOUGH_RUNS and learned.signature.learns_limits:
             which = f" {motion.described}" if motion else ""
             text = f"{counted(runs, 'run')}{which}, fewer than {ENOUGH_RUNS}: its limits are less certain"
-            typer.echo(f"warning: {text}", err=True)
+            print_line(f"warning: {text}", err=True)
     print_skipped(learned.skipped, learned.findings)
     _show(learned, output, as_json=as_json, quiet=quiet)
     leave(learned.skipped, learned.findings)
@@ -108,4 +108,4 @@ def _show(learned: LearnedSignature, output: Path, *, as_json: bool, quiet: bool
     ]
     if not quiet:
         table([("detector", "left"), ("class", "left"), ("runs", "right"), ("unit", "left")], rows)
-    typer.echo(f"{signature.described}; written to {plain(output)}")
+    print_line(f"{signature.described}; written to {plain(output)}")

@@ -19,7 +19,6 @@ from cdtool.commands.judging.settings_table import LearningTable, read_settings
 from cdtool.commands.learning.calibration import calibrate, in_fixed_order, kept
 from cdtool.commands.learning.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.commands.learning.normal_runs import normal_motions
-from cdtool.commands.learning.threshold_settings import set_by_hand, threshold_of
 from cdtool.detectors.base import Detector
 from cdtool.execution.workers import Workers
 from cdtool.formats.machine_file import MachineFile, fingerprint, machine_parameters, read_machine_file
@@ -31,7 +30,7 @@ from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.operations import Operation
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.results import RecordingFinding, Skipped
-from cdtool.thresholds.base import Threshold
+from cdtool.thresholds.base import Threshold, set_by_hand
 from cdtool.thresholds.signature import Signature
 
 
@@ -150,7 +149,7 @@ def learn_signature(  # noqa: PLR0913  # the public function: a keyword for each
 def _rule(rule: Threshold | None, table: LearningTable, machine: Machine, place: Place) -> Threshold:
     """Return the threshold to learn: a given one, or that of the settings. Raises ConfigurationError."""
     if rule is None:
-        return threshold_of(table.threshold, table.signature, machine.default_sides, place)[1]
+        return table.rule(place, table.signature.sided(machine.default_sides))
     for name in ("threshold", "signature"):
         if any(key.partition(".")[0] == name for key in place.by_option):
             place.note(name, "cannot be combined with the argument rule", "omit one of the two")

@@ -9,7 +9,7 @@ import typer
 
 from cdtool.base.errors import UsageError, nearest
 from cdtool.commands.console.completions import one_of
-from cdtool.commands.console.console import leave, number, print_json, print_skipped, table
+from cdtool.commands.console.console import leave, number, print_json, print_line, print_skipped, table
 from cdtool.commands.console.options import JsonOption
 
 _KINDS = ("detectors", "thresholds", "machines", "formats", "writers")
@@ -72,8 +72,8 @@ def _entry(kind: str, name: str) -> dict[str, Any]:
 
 def _show_detectors(entries: list[dict[str, Any]]) -> None:
     for entry in entries:
-        typer.echo(f"{entry['name']} ({entry['short_name']}): {entry['title']}; needs {', '.join(entry['needs'])}")
+        print_line(f"{entry['name']} ({entry['short_name']}): {entry['title']}; needs {', '.join(entry['needs'])}")
         for gain in entry["gains"]:
             unit = "" if gain["unit"] == "1" else f" {gain['unit']}"
-            typer.echo(f"    {gain['name']} = {number(gain['default'], 4)}{unit}")
-            typer.echo(f"        {gain['meaning']}")
+            print_line(f"    {gain['name']} = {number(gain['default'], 4)}{unit}")
+            print_line(f"        {gain['meaning']}")

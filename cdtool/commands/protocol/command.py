@@ -11,7 +11,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, statuses_words
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import leave, plain, print_json, say
+from cdtool.commands.console.console import leave, plain, print_json, print_line, say
 from cdtool.commands.console.options import ForceOption, JsonOption
 from cdtool.commands.console.place import Place, location
 
@@ -58,7 +58,7 @@ def init(
 
     drafted = draft_protocol(benchmark, output, force=force)
     typer.echo(drafted.text)
-    typer.echo(f"{plain(drafted.path)} written: {counted(drafted.to_fill_in, 'value')} to fill in, then run")
+    print_line(f"{plain(drafted.path)} written: {counted(drafted.to_fill_in, 'value')} to fill in, then run")
     typer.echo(f"  cdtool protocol check {_quoted(drafted.path)}")
 
 
@@ -133,19 +133,19 @@ def _show_checked(checked: CheckedProtocol) -> None:
 
     file, words = checked.file, words_of("en")
     for name, count in checked.recordings.items():
-        typer.echo(f"{plain(name)}: {counted(count, 'recording')}")
+        print_line(f"{plain(name)}: {counted(count, 'recording')}")
     for due, title in (("before_test", "before the test"), ("test_day", "on the day of the test")):
         part = ProtocolVerdict(tuple(item for item in checked.verdict.reasons if item.due == due))
         sentences = [*words.reasons(part, "fail"), *words.reasons(part, "incomplete")]
         if sentences:
-            typer.echo(f"incomplete, {title}:")
+            print_line(f"incomplete, {title}:")
         for sentence in sentences:
             say(f"- {sentence}", indent="  ")
     for profile in {point.profile for point in file.plan.points if point.profile}:
         if not file.profiles[profile].checked:
             say(f"note: {profile}: {file.profiles[profile].warning}; the protocol states this")
     done = not checked.verdict.reasons
-    typer.echo("complete; next, the protocol:" if done else "when these are settled, the protocol:")
+    print_line("complete; next, the protocol:" if done else "when these are settled, the protocol:")
     folder = file.path.parent
     benchmark = file.benchmark or folder / "benchmark.toml"
     own = [] if benchmark == file.path else ["-p", _quoted(file.path)]
@@ -165,9 +165,9 @@ def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
     for sentence in sentences[:_SHOWN]:
         say(f"- {sentence}", indent="  ")
     if len(sentences) > _SHOWN:
-        typer.echo(f"  and {len(sentences) - _SHOWN} more, all in the protocol")
+        print_line(f"  and {len(sentences) - _SHOWN} more, all in the protocol")
     for line in written_lines(made, written):
-        typer.echo(line)
+        print_line(line)
 
 
 def _plain(value: object) -> object:

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from statistics import median
-from textwrap import wrap
 from typing import Any
 
 from cdtool.base.errors import UsageError
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.remote.remote_path import relative_name
+from cdtool.base.toml_text import comment_lines, commented
 from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
 from cdtool.commands.judging.matched_log import CutLog
 from cdtool.commands.protocol.assessment.plan import (
@@ -92,7 +92,7 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
     read = {point.name: list(_read(setup, point.logs)) for point in points} if setup else {}
     name = relative_name(setup.path, output.parent) if setup else ""
     lines = [
-        "# Draft by cdtool protocol init: fill in what is marked FILL IN, check what is marked CHECK.",
+        *comment_lines("Draft by cdtool protocol init: fill in what is marked FILL IN, check what is marked CHECK."),
         "[protocol]",
         f"benchmark = {_text(name)}"
         if name
@@ -113,7 +113,7 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
     lines += ["", "# [[protocol.exclusion]]", '# logs = ["point_1/03.csv"]', '# reason = ""']
     written = with_schema("protocol", output, "\n".join(lines) + "\n")
     write_texts(written)
-    return DraftedProtocol(output, written[output], sum(f"# {FILL_IN}" in line for line in lines[1:]))
+    return DraftedProtocol(output, written[output], sum(f"# {FILL_IN}:" in line for line in lines))
 
 
 def _points(setup: BenchmarkFile, folder: Path) -> list[_Point]:
@@ -182,7 +182,7 @@ def _profiles_known() -> list[str]:
     names = list(read_force_limits())
     return [
         '# Force profiles that come with cdtool, or limits = "FILE" with your own:',
-        *wrap(", ".join(names), 100, initial_indent="# ", subsequent_indent="# "),
+        *comment_lines(", ".join(names)),
     ]
 
 
@@ -195,13 +195,13 @@ def _table(
         meaning = item.metadata["meaning"]
         if item.name in known:
             value, comment = known[item.name]
-            lines.append(f"{item.name} = {value}" + (f"  # {comment}" if comment else ""))
+            lines += commented(f"{item.name} = {value}", comment)
         elif item.name in without:
             continue
         elif item.metadata["due"] == "never":
-            lines.append(f"# {item.name} =  # {meaning}")
+            lines += commented(f"# {item.name} =", meaning)
         else:
-            lines.append(f'{item.name} = ""  # {FILL_IN}: {meaning}')
+            lines += commented(f'{item.name} = ""', f"{FILL_IN}: {meaning}")
     return lines
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import plain, print_skipped
+from cdtool.commands.console.console import plain, print_line, print_skipped
 from cdtool.commands.console.options import ForceOption, OutputOption, QuietOption
 from cdtool.commands.console.place import Place, location
 from cdtool.commands.console.summary_table import finish
@@ -43,7 +43,7 @@ def report(
     check_outputs(targets, force=force)
     evaluated, traces, note = load_report(results)
     if note:
-        typer.echo(f"note: {plain(note)}", err=True)
+        print_line(f"note: {plain(note)}", err=True)
     written = write_reports(Report(evaluated, traces), targets, force=force, quiet=quiet)
     print_skipped(evaluated.results.skipped, evaluated.results.findings)
     show_results(evaluated, written, quiet=quiet)

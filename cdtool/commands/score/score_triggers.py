@@ -86,7 +86,8 @@ def score(
     [('stiff', 4, 0, 0), ('soft', 2, 1, 0), ('holdout', 0, 0, 1)]
     """
     given = read_triggers(location(triggers))
-    setup = read_benchmark_file(benchmark, learning=False, also_known=tuple(given.rows), settings=settings)
+    known = tuple(given.rows)
+    setup = read_benchmark_file(benchmark, learning=False, also_known=known, settings=settings, command="score")
     workers = (workers or Workers(jobs)).limited_by(setup.execution)
     with workers.ready(to_be_seen([path for item in setup.impacts.values() for path in item.logs])):
         return _run(setup, given, workers)

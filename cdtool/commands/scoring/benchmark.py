@@ -15,8 +15,8 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.registry import plugin_packages
 from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import to_be_seen
+from cdtool.commands.judging.settings_table import detectors_of
 from cdtool.commands.learning.normal_runs import normals_for
-from cdtool.commands.learning.threshold_settings import set_by_hand
 from cdtool.commands.scoring.benchmark_file import (
     HOLDOUT,
     BenchmarkFile,
@@ -47,7 +47,7 @@ from cdtool.results.curves.sweep import MULTIPLES
 from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import LimitRule, unchecked
 from cdtool.results.results import Results, Skipped
-from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.base import FittedThreshold, set_by_hand
 from cdtool.thresholds.normal_motion import NormalMotions
 
 
@@ -135,7 +135,8 @@ class BenchmarkWork:
     ) -> BenchmarkWork:
         """Read a benchmark file unless it has been read; raises as `benchmark`."""
         if not isinstance(file, BenchmarkFile):
-            file = read_benchmark_file(file, detectors=detectors, settings=settings)
+            detectors, others = detectors_of(detectors, settings)
+            file = read_benchmark_file(file, detectors=detectors, settings=others)
         setup = file
         limits = setup.limits
         setup = with_detectors(setup, detectors) if detectors else setup
@@ -277,7 +278,7 @@ def _provenance(
         "machine": setup.machine_file.machine.name,
         "machine_sha256": setup.machine_file.digest,
         "gains": {detector.name: asdict(detector) for detector in detectors},
-        "threshold": setup.threshold,
+        "threshold": setup.rule.name,
         "threshold_rule": asdict(setup.rule),
         "signature_rule": {
             **asdict(setup.signature),

@@ -17,7 +17,7 @@ from cdtool.base.files.bounded_loading import read_bytes, read_toml
 from cdtool.base.plain_text import counted, digits
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
-from cdtool.base.settings import Place, Positive, read, setting
+from cdtool.base.settings import Place, Positive, read, setting, tables_of
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_file, named_logs
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
@@ -31,8 +31,8 @@ from cdtool.commands.judging.settings_table import (
     TriggersTable,
     apply_settings,
     full_keys,
+    note_other_units,
 )
-from cdtool.commands.learning.threshold_settings import threshold_of
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
 from cdtool.execution.workers import Workers
@@ -112,6 +112,28 @@ SECTIONS = Registry(
 )
 
 
+_ALL_BUT_SCORE = ("benchmark", "tune", "inject", "detect", "explain")
+_ALL_BUT_DETECT = ("benchmark", "score", "tune", "inject")
+_OF_DETECTORS = ("joints", "threshold", "signature", "learn", "activation.debounce", "activation.hysteresis")
+# Keys that only these commands read: --set refuses them in the others, whose file may have them.
+_READ_BY: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(_OF_DETECTORS, _ALL_BUT_SCORE),
+    "detectors": ("benchmark", "tune", "inject"),
+    **dict.fromkeys(("limits", "campaigns", "points", "execution"), _ALL_BUT_DETECT),
+    "false_alarm_budget": ("benchmark", "inject", "detect", "explain"),
+    "inject": ("benchmark", "tune", "inject"),
+    "triggers": ("score",),
+    "tune": ("tune",),
+    "protocol": (),
+}
+
+
+def readers_of(key: str) -> tuple[str, ...]:
+    """Return the commands that read a key of a benchmark file, by its full name; empty for one read by none."""
+    known = (name for name in _READ_BY if f"{key}.".startswith(f"{name}."))
+    return _READ_BY.get(next(known, ""), (*_ALL_BUT_SCORE, "score"))
+
+
 @dataclass(frozen=True, kw_only=True)
 class LearnTable(LearnPart, LogsTable):
     """[learn]: the logs that limits are learned from."""
@@ -140,7 +162,9 @@ class ConditionTable:
 class BenchmarkTable(JudgingTable):
     """A benchmark file as it is written: the logs to learn from and to score, and the detectors."""
 
-    machine: Annotated[str, setting("the machine file")]
+    machine: Annotated[
+        str, setting("the machine file", hint="give the path of the machine file, which has its own keys")
+    ]
     detectors: Annotated[
         tuple[str, ...] | None,
         setting("full or short names, each once, or all; required unless the command names them", empty=True),
@@ -192,7 +216,6 @@ class BenchmarkFile:
     detectors: tuple[str, ...]
     watched: tuple[str, ...]
     operations: str
-    threshold: str
     budget: Budget | None
     signature: Signature
     rule: Threshold
@@ -362,19 +385,22 @@ def read_benchmark_file(
     also_known: Sequence[str] = (),
     detectors: Sequence[str | Detector] = (),
     settings: Mapping[str, Any] | None = None,
+    command: str = "benchmark",
 ) -> BenchmarkFile:
     """Read and check a benchmark file; raises ConfigurationError with every mistake.
 
     `detectors` are used if the file does not name any; `all` selects every registered detector. Without `learning`, for
     external alarms, the file needs neither detectors nor logs to learn from, and [limits] may be set for the detectors
-    `also_known`. `settings` take the place of keys of the file, as "activation.debounce".
+    `also_known`. `settings` take the place of keys of the file, as "activation.debounce", which `command` reads.
     """
     file = location(path)
-    place = Place(str(file), by_option=full_keys(settings), root=BenchmarkTable)
+    place = Place(str(file), by_option=full_keys(settings), tables=_tables)
     values = read_toml(file, "a benchmark file", place)
     if isinstance(values.get("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
+    note_other_units(BenchmarkTable, place)
+    _note_unread(place, command)
     table = read(BenchmarkTable, apply_settings(values, settings or {}), place)
     if table is None:
         place.finish()
@@ -390,6 +416,19 @@ def read_benchmark_file(
     if learning:
         _refuse_unknown_locations(benchmark)
     return benchmark
+
+
+def _tables() -> Mapping[str, Any]:
+    """Return the models of the tables of a benchmark file."""
+    return {**tables_of(BenchmarkTable), **{name: SECTIONS.load(name).table for name in SECTIONS.names()}}
+
+
+def _note_unread(place: Place, command: str) -> None:
+    """Note each key that --set gives and the command does not read."""
+    for key in sorted(place.by_option):
+        if command not in (others := readers_of(key)):
+            hint = f"cdtool {others[0]} reads it" if others else "write it into the file"
+            place.note(key, "has no effect in this command", hint)
 
 
 def _other_machine(joints: Sequence[str]) -> MachineFile:
@@ -415,9 +454,9 @@ def _resolved(
     """Return the benchmark that the tables describe, its logs found, with the mistakes in `place`."""
     machine, settings = machine_file.machine, wanted.settings
     names: tuple[str, ...] = place.tried((), _detectors, table, place, machine_file, wanted)
-    otherwise: tuple[str, Threshold, Signature] = ("signature", table.signature, table.signature)
-    given = (table.threshold, table.signature, machine.default_sides, place)
-    threshold, rule, signature = place.tried(otherwise, threshold_of, *given)
+    signature = table.signature.sided(machine.default_sides)
+    otherwise: Threshold = signature
+    rule = place.tried(otherwise, table.rule, place, signature)
     cut = place.tried(None, table.run_cut, place)
     found = LogsOf(file.parent, machine_file, cut is not None)
     if found.runs and (machine_file.columns.beside or machine_file.topics.beside):
@@ -441,7 +480,6 @@ def _resolved(
         detectors=names,
         watched=table.joints,
         operations=table.operations,
-        threshold=threshold,
         budget=place.tried(None, _budget, table, place),
         signature=signature,
         rule=rule,
@@ -590,6 +628,9 @@ def _groups(
         if name.strip() in ("", ALL, HOLDOUT):
             hint = f"choose another name; {ALL} stands for every group, {HOLDOUT} for the impact-free one"
             place.below("impacts").note(name, "is not a valid group name", hint)
+        if not group.logs and any(key.startswith(f"impacts.{name}.") for key in place.by_option):
+            known = nearest(name, [other for other, given in table.impacts.items() if given.logs])
+            place.below("impacts").note(name, "is not a group of the file", known)
         logs: dict[Path, LogSection] = place.tried({}, found.sections, group, own)
         limits = profile
         if group.force_profile is not None and profiles:

@@ -12,7 +12,7 @@ from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, statuses_words
 from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
-from cdtool.commands.console.console import leave, plain, print_json, print_skipped, progress
+from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
 from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import (
     ClusterOption,
@@ -128,7 +128,7 @@ def check(
 
         plot_drift(audit, path)
         if not as_json:
-            typer.echo(f"plot written to {plain(path)}")
+            print_line(f"plot written to {plain(path)}")
     nothing = all(item.coverage is None and item.drift is None for item in checked.classes)
     leave(checked.skipped, checked.findings, [Fact.NOTHING_USABLE] if nothing else ())
 
@@ -174,7 +174,7 @@ def update(
         print_json({"file": str(file), "added": list(done.added), "refused": refused, "findings": findings})
     else:
         counts = f"{len(done.refused)} refused; {len(done.file.runs)} in total"
-        typer.echo(f"{counted(len(done.added), 'run')} added to {plain(file)}, {counts}")
+        print_line(f"{counted(len(done.added), 'run')} added to {plain(file)}, {counts}")
     leave(done.refused, done.findings, () if done.added else [Fact.NOTHING_USABLE])
 
 

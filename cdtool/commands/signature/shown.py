@@ -6,10 +6,8 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from cdtool.base.plain_text import counted, ordinal
-from cdtool.commands.console.console import number, plain, say, table
+from cdtool.commands.console.console import number, plain, print_line, say, table
 
 if TYPE_CHECKING:
     from cdtool.commands.signature.audit import DriftAudit
@@ -28,15 +26,15 @@ def show_file(stored: SignatureFile) -> None:
     from cdtool.thresholds.fitted_signature import FittedSignature
 
     gains = ", ".join(f"{name} {value}" for name, value in stored.gains.items()) or "none"
-    typer.echo(f"machine: {plain(stored.machine)}")
+    print_line(f"machine: {plain(stored.machine)}")
     say(f"detector: {stored.detector}, gains: {gains}; unit {stored.unit}")
     settings = "".join(f"; {name} {value}" for name, value in stored.settings.items())
     say(f"threshold: {stored.described}{settings}")
-    typer.echo(f"activation: {_activation(stored)}")
-    typer.echo(f"joints: {plain(', '.join(stored.joints))}")
-    typer.echo(f"runs: {len(stored.runs)}, the last {plain(stored.runs[-1].name)}" if stored.runs else "runs: none")
+    print_line(f"activation: {_activation(stored)}")
+    print_line(f"joints: {plain(', '.join(stored.joints))}")
+    print_line(f"runs: {len(stored.runs)}, the last {plain(stored.runs[-1].name)}" if stored.runs else "runs: none")
     for words in _between(stored):
-        typer.echo(f"between learned speeds: {plain(words)}")
+        print_line(f"between learned speeds: {plain(words)}")
     rows = []
     for current, first in zip(stored.current, stored.first, strict=True):
         if not (isinstance(current, FittedSignature) and isinstance(first, FittedSignature)):
@@ -114,7 +112,7 @@ def show_class(item: CheckedClass, *, quiet: bool = False) -> None:
     """Print the result of a check for one class of motion."""
     from cdtool.commands.signature.summary import summarise_signature
 
-    typer.echo(f"class: {item.signature.motion.described}, safety factor {item.signature.safety_factor:.4g}")
+    print_line(f"class: {item.signature.motion.described}, safety factor {item.signature.safety_factor:.4g}")
     if item.coverage:
         _show_coverage(item.coverage)
     if item.drift:
@@ -123,7 +121,7 @@ def show_class(item: CheckedClass, *, quiet: bool = False) -> None:
     for joint in found.joints:
         if joint.moved > 0.0:
             moved = f"{joint.moved:.2f} spreads, {_moved_at(found, joint)}"
-            typer.echo(f"since first learned: the limit of {plain(joint.joint)} moved by up to {moved}")
+            print_line(f"since first learned: the limit of {plain(joint.joint)} moved by up to {moved}")
     say(f"advice: {item.advice}")
 
 
@@ -133,19 +131,19 @@ def _show_coverage(found: SignatureCoverage) -> None:
     nearest = f"; the nearest run reaches {share:.0f} % of its limit" if factors else ""
     runs = f"{counted(len(found.runs), 'run')}, each checked against a signature of the others"
     judged = f"{runs}: {counted(found.alarms, 'alarm')}{nearest}"
-    typer.echo(f"coverage: {judged}")
+    print_line(f"coverage: {judged}")
     say(found.verdict, indent="  ")
     for gap in found.gaps[:_SHOWN]:
         say(f"no limit for {gap.joint} {gap.described}", indent="  ")
     if len(found.gaps) > _SHOWN:
-        typer.echo(f"  no limit: and {counted(len(found.gaps) - _SHOWN, 'more section')} (--json has all)")
+        print_line(f"  no limit: and {counted(len(found.gaps) - _SHOWN, 'more section')} (--json has all)")
 
 
 def _show_drift(found: DriftAudit, *, quiet: bool) -> None:
     from cdtool.commands.signature.words import verdicts
 
     for joint in found.joints:
-        typer.echo(f"season of {counted(len(joint.runs), 'run')}, {plain(joint.joint)}:")
+        print_line(f"season of {counted(len(joint.runs), 'run')}, {plain(joint.joint)}:")
         for verdict in verdicts(joint):
             say(verdict, indent="  ")
         if quiet:
@@ -170,9 +168,9 @@ def _show_drift(found: DriftAudit, *, quiet: bool) -> None:
         ]
         table([*columns, ("of limit\n%", "right"), ("", "left")], rows)
         if step > 1:
-            typer.echo(f"every {ordinal(step)} run is shown (--json has all)")
+            print_line(f"every {ordinal(step)} run is shown (--json has all)")
     for name, reason in found.not_assessable:
-        typer.echo(f"  not assessable: {plain(name)}: {plain(reason)}")
+        print_line(f"  not assessable: {plain(name)}: {plain(reason)}")
 
 
 def checked_as_json(checked: Checked) -> dict[str, Any]:

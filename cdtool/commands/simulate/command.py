@@ -9,7 +9,7 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import plain, progress
+from cdtool.commands.console.console import plain, print_line, progress
 from cdtool.commands.console.options import keys_option
 from cdtool.commands.console.place import Place, location
 
@@ -59,6 +59,6 @@ def simulate(
         )
     why_not = without_benchmark(counts)
     files = "machine.toml" if why_not else "machine.toml, benchmark.toml"
-    typer.echo(f"{counted(written, 'recording')}, {files} and contacts.csv written to {plain(output)}")
+    print_line(f"{counted(written, 'recording')}, {files} and contacts.csv written to {plain(output)}")
     if why_not:
-        typer.echo(f"no benchmark.toml: {why_not}")
+        print_line(f"no benchmark.toml: {why_not}")

@@ -10,7 +10,7 @@ from rich.filesize import decimal
 
 from cdtool.base.exit_status import statuses_words
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import plain, print_json
+from cdtool.commands.console.console import plain, print_json, print_line
 from cdtool.commands.console.options import JsonOption
 from cdtool.commands.console.place import Place, location
 
@@ -44,7 +44,7 @@ def status(folder: FolderArgument, as_json: JsonOption = False) -> None:
         print_json(asdict(found) | {"folder": str(found.folder)})
         return
     words = ", ".join(f"{count} {kind}" for kind, count in found.entries.items())
-    typer.echo(f"{plain(found.folder)}: {words}; {decimal(found.bytes)}")
+    print_line(f"{plain(found.folder)}: {words}; {decimal(found.bytes)}")
 
 
 @store.command("gc", epilog=statuses_words("store gc"))
@@ -61,7 +61,7 @@ def gc(
     from cdtool.execution.store.upkeep import collect_garbage
 
     done = collect_garbage(folder, older_than_days=older_than)
-    typer.echo(
+    print_line(
         f"{plain(folder)}: {counted(done.removed, 'entry')} removed, {done.kept} kept; "
         f"{decimal(done.bytes_before)} before, {decimal(done.bytes_after)} now"
     )

@@ -8,7 +8,7 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import statuses_words
-from cdtool.commands.console.console import number, plain, print_json, table
+from cdtool.commands.console.console import number, plain, print_json, print_line, table
 from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption, keys_option
 from cdtool.commands.console.place import Place, location
 
@@ -86,13 +86,13 @@ def figures(
     from cdtool.commands.study.impact_plots import draw_impact_figures
 
     for path in draw_impact_figures(output, force=force):
-        typer.echo(plain(path))
+        print_line(plain(path))
 
 
 def _show(done: SensorStudy) -> None:
     ranking = done.ranking
     case = ranking.case
-    typer.echo(
+    print_line(
         f"{plain(done.machine)}, joint {plain(done.joint)}: {case.transmission.load_mass:.4g} kg at {case.speed:g} m/s "
         f"on {case.obstacle.stiffness:g} N/m: {0.5 * case.transmission.load_mass * case.speed**2:.3g} J"
     )
@@ -115,17 +115,17 @@ def _show(done: SensorStudy) -> None:
         )
     table(columns, rows)
     typer.echo()
-    typer.echo(
+    print_line(
         f"seen: beyond {ranking.factor:g} sigma and the resolution, at the least favourable sampling instants, "
         "without the machine's own variation"
     )
     peak = f"{ranking.peak_force:.4g} N at {1e3 * ranking.peak_time:.3g} ms"
-    typer.echo(f"if the drive is not stopped, the force reaches {peak} (analysed for {1e3 * case.window:g} ms)")
-    typer.echo(ranking.rigidity.words)
+    print_line(f"if the drive is not stopped, the force reaches {peak} (analysed for {1e3 * case.window:g} ms)")
+    print_line(ranking.rigidity.words)
     if done.waves:
-        typer.echo(done.waves.words)
+        print_line(done.waves.words)
     for words in done.assumptions:
-        typer.echo(f"assumed: {plain(words)}")
+        print_line(f"assumed: {plain(words)}")
 
 
 def _newtons(force: float | None) -> str:

@@ -11,7 +11,17 @@ import typer
 from cdtool.base.plain_text import counted
 from cdtool.commands.console import completions
 from cdtool.commands.console.colour import Toned
-from cdtool.commands.console.console import leave, number, plain, print_json, print_skipped, progress, say, table
+from cdtool.commands.console.console import (
+    leave,
+    number,
+    plain,
+    print_json,
+    print_line,
+    print_skipped,
+    progress,
+    say,
+    table,
+)
 from cdtool.commands.console.options import DetectorsOption, ForceOption, JsonOption, QuietOption, SetOption, listed
 from cdtool.commands.console.place import Place, location
 
@@ -52,7 +62,7 @@ def tune(
 
     Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
     """
-    from cdtool.commands.judging.settings_table import given_settings
+    from cdtool.commands.judging.settings_table import detectors_of, given_settings
     from cdtool.commands.scoring.benchmark_file import read_benchmark_file
     from cdtool.commands.tune.files import open_folder, write_tuning
     from cdtool.commands.tune.options import TuningOptions
@@ -61,8 +71,8 @@ def tune(
     from cdtool.execution.workers import Workers
     from cdtool.results.results import Skipped
 
-    names = listed(detectors or "")
-    setup = read_benchmark_file(file, detectors=names, settings=given_settings(settings or ()))
+    names, others = detectors_of(listed(detectors or ""), given_settings(settings or ()))
+    setup = read_benchmark_file(file, detectors=names, settings=others, command="tune")
     watch = _unwatched if quiet else _watch
     options = TuningOptions.of(setup, false_alarm_budget, detectors=names, workers=Workers(jobs), watch=watch)
     searches = open_folder(output, setup.inputs, setup.detectors, force=force)
@@ -76,7 +86,7 @@ def tune(
     else:
         _show(done, quiet=quiet)
         for path in () if quiet else written:
-            typer.echo(f"written: {plain(path)}")
+            print_line(f"written: {plain(path)}")
     leave(left_out, done.findings)
 
 
@@ -84,7 +94,7 @@ def _watch(detector: str, count: int, best: str) -> None:
     """Print the best so far to a terminal, after each round of a search."""
     if sys.stderr.isatty():
         words = f"{detector}: {counted(count, 'candidate')}, best so far: {best}"
-        typer.echo(plain(words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."), err=True)
+        print_line(plain(words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."), err=True)
 
 
 def _unwatched(detector: str, count: int, best: str) -> None:

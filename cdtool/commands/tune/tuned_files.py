@@ -15,6 +15,7 @@ from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import is_remote, joined, location, relative_name
 from cdtool.base.toml_text import opened_table
 from cdtool.base.version import __version__
+from cdtool.commands.judging.settings_table import names_in
 from cdtool.commands.learning.learning import LearnedSignature, Setting, learned_from_runs
 from cdtool.commands.tune.search.candidate import Candidate
 from cdtool.commands.tune.search.tuned import ChoiceResults, TunedDetector
@@ -56,7 +57,7 @@ def _detector_table(document: Any, tuned: TunedDetector) -> Any:
     """Return the table of a detector's gains, under the name that the file uses."""
     known = document.get("detectors", {})
     name = next((name for name in (tuned.detector, tuned.short_name) if name in known), tuned.detector)
-    return opened_table(document, f"detectors.{name}")
+    return opened_table(document, "detectors", name)
 
 
 def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: Path) -> str:
@@ -66,9 +67,9 @@ def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: 
     setup = tuning.setup
     document: Any = tomlkit.parse(read_text(setup.path, ConfigurationError).removeprefix("\ufeff"))
     for key, value in setup.settings.items():  # of --set, in place of the file's
-        table, _, name = key.rpartition(".")
-        if table != "threshold":  # the tuned one is written below
-            (opened_table(document, table) if table else document)[name] = value
+        *above, name = names_in(key)
+        if above != ["threshold"]:  # the tuned one is written below
+            opened_table(document, *above)[name] = value
     _rebase(document, setup.path.parent, folder)
     document["machine"] = MACHINE
     document["detectors"] = [tuned.detector]

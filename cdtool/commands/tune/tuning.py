@@ -13,6 +13,7 @@ from cdtool.alarms.activation import DEBOUNCE_TIME, Activation
 from cdtool.alarms.pipeline import run_detector, signal_of_log
 from cdtool.base.errors import CdtoolError, SignatureError, UsageError
 from cdtool.base.value_words import value_in_words
+from cdtool.commands.judging.settings_table import detectors_of
 from cdtool.commands.learning.calibration import kept
 from cdtool.commands.learning.fitting import Fitted, fitting, for_machine
 from cdtool.commands.scoring.benchmark_file import (
@@ -112,7 +113,8 @@ def tune(  # the public function: a keyword for each setting
     cdtool.base.errors.UsageError: 10 impact-free runs for a false-alarm budget of 1/20op: 19 are needed to set...
     """
     if not isinstance(file, BenchmarkFile):
-        file = read_benchmark_file(file, detectors=detectors, settings=settings)
+        detectors, others = detectors_of(detectors, settings)
+        file = read_benchmark_file(file, detectors=detectors, settings=others, command="tune")
     more = {"journals": journals, "workers": workers, "watch": watch}
     return tune_detectors(file, TuningOptions.of(file, false_alarm_budget, detectors=detectors, **more))
 

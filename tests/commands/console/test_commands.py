@@ -32,11 +32,6 @@ def test_the_version_is_shown():
     assert cdtool("--version").out.strip() == f"cdtool {__version__}"
 
 
-def test_an_unknown_command_or_option_exits_with_2():
-    for arguments in (("detects",), ("info", "--machines", "x"), ("simulate",), ("benchmark",)):
-        assert cdtool(*arguments).status == 2
-
-
 def test_info_shows_columns_without_and_channels_with_a_machine_file(gate_folder):
     log = gate_folder / "stiff" / "01.csv"
     plain = cdtool("info", log)

@@ -7,7 +7,8 @@ import sys
 
 import pytest
 
-from cdtool.commands.console.console import table
+from cdtool.base.errors import UsageError
+from cdtool.commands.console.console import print_error, print_line, table
 
 HEADINGS = [("group", "left"), ("detector", "left"), ("latency\nms", "right"), ("range\nms", "right"), ("why", "left")]
 ROWS = [
@@ -43,3 +44,18 @@ def test_a_name_longer_than_the_terminal_is_folded_without_loss(terminal):
     name = "x" * 150
     lines = terminal(60, [("stiff", name, "1", "2", "")])
     assert sum(line.count("x") for line in lines) % 150 == 0 and max(map(len, lines)) <= 60
+
+
+def test_a_line_wraps_at_words_in_a_terminal_and_stays_one_elsewhere(monkeypatch, capsys):
+    path = f"/data/{'long_folder/' * 8}a-b.csv"
+    fault = UsageError(f"{path}: {'no such file ' * 5}", "check the path")
+    print_error(fault)
+    whole = capsys.readouterr().err
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "80")
+    print_error(fault)
+    print_line("  an indented line", err=True)
+    *lines, last = capsys.readouterr().err.splitlines()
+    assert whole.count("\n") == 1 and len(lines) > 2 and last == "  an indented line"
+    assert max(len(line) for line in lines if path not in line) <= 80 and any(f"{path}:" in line for line in lines)
+    assert " ".join(" ".join(lines).split()) == " ".join(whole.split()) and lines[1].startswith("  ")

@@ -53,6 +53,17 @@ def test_all_outputs_are_written_together(identified: IdentifiedMachine, tmp_pat
         check_identification_files(targets[:1], GATE / "machine.toml")
 
 
+def test_a_machine_file_in_another_folder_has_the_schema_that_it_names(
+    identified: IdentifiedMachine, tmp_path: Path
+) -> None:
+    drafted = replace(identified, text=f"#:schema ./machine.schema.json\n{identified.text}")
+    assert write_identification(drafted, [tmp_path / "m.toml"]) == (tmp_path / "m.toml",)
+    assert json.loads((tmp_path / "machine.schema.json").read_text())["title"] == "cdtool machine file"
+    (tmp_path / "machine.schema.json").write_text("{}")
+    write_identification(drafted, [tmp_path / "m.toml"])
+    assert (tmp_path / "machine.schema.json").read_text() == "{}", "one that is there stays"
+
+
 def test_an_output_that_cannot_be_written_leaves_no_other(identified: IdentifiedMachine, tmp_path: Path) -> None:
     with pytest.raises(UsageError):
         write_identification(identified, [tmp_path / "m.toml", tmp_path / "no_folder" / "m.json"])

@@ -144,6 +144,7 @@ def test_a_log_that_cannot_be_read_is_named_and_the_others_are_drafted(gate, tmp
         (("a.csv", "-m", "x.toml", "-o", "m.toml"), "--output is the file m.toml, with --machine"),
         (("a.csv", "b.csv"), "--output is the file machine.toml, with 2 logs"),
         (("missing.csv", "-o", "study"), "missing.csv"),
+        (("a.csv", "-o", "x.txt"), "--output is x.txt (give a machine file, NAME.toml, or a folder without a suffix)"),
         (("a.csv", "--free", "b.csv"), "--output is the file machine.toml, with --free"),
         (("a.csv", "--free", "no/*.csv", "-o", "study"), "no file matches 'no/*.csv'"),
         (("a.csv", "--urdf", "r.urdf", "-m", "m.toml", "-o", "study"), "--urdf and --machine: both describe"),

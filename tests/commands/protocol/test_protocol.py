@@ -52,8 +52,9 @@ def fill_in(path: Path) -> None:
     """Fill in a draft, as a person would."""
     lines = path.read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(lines):
-        if "# FILL IN" in line:
-            lines[number] = f"{line.split(' = ')[0]} = {FILLED_IN[line.split(' = ')[0]]}"
+        key, _, value = line.partition(" = ")
+        if value.startswith('""') and "FILL IN" in f"{lines[number - 1]}{value}":
+            lines[number] = f"{key} = {FILLED_IN[key]}"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -93,7 +93,7 @@ def coverage(
     >>> done.map.positions, sorted(done.map.cells)
     ((0.99, 1.04), ['momentum'])
     """
-    setup = read_benchmark_file(file, settings=settings)
+    setup = read_benchmark_file(file, settings=settings, command="inject")
     workers = (workers or Workers()).limited_by(setup.execution)
     section = section_of(setup)
     units = {mark.unit for mark in section.positions}

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import typer
-
 from cdtool.base.plain_text import counted, digits
 from cdtool.commands.console.colour import Toned
-from cdtool.commands.console.console import number, say, table
+from cdtool.commands.console.console import number, print_line, say, table
 from cdtool.commands.inject.coverage.coverage import Coverage
 from cdtool.commands.inject.coverage.coverage_map import CellKey, MapCell, TellingCell
 from cdtool.commands.inject.coverage.page import coverage_counts, coverage_headline, coverage_tone
@@ -50,11 +48,11 @@ def _show_telling(done: Coverage) -> None:
     made = done.map
     telling = made.most_telling()
     if telling:
-        typer.echo("a test at the rig would tell most here:")
+        print_line("a test at the rig would tell most here:")
     for item in telling:
         speed_words = "" if item.key.speed is None else f", {item.key.speed:g} {made.speed_unit}"
         where = f"{item.key.position:g} {made.unit}, {_spring(item.key.stiffness)} N/mm{speed_words}"
-        typer.echo(f"  {item.detector} at {where}: {_why(item)}")
+        print_line(f"  {item.detector} at {where}: {_why(item)}")
 
 
 def _row(cells: Sequence[MapCell]) -> tuple[object, ...]:
