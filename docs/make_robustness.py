@@ -309,8 +309,9 @@ def read_results(path: Path) -> dict[str, Simulated]:
 HEAD = """# When the machine has changed
 
 A threshold is learned from a machine on some day. Later its friction is higher because it is cold, its speed is set to
-another value, a sensor drifts. This page shows how every registered detector then performs with every threshold but `combined`; every
-combination in every state is a row of [robustness.csv](robustness.csv). All of it is written by a command:
+another value, a sensor drifts. This page shows how every registered detector then performs with every threshold but
+`combined`; every combination in every state is a row of [robustness.csv](robustness.csv). All of it is written by a
+command:
 
 ```sh
 {commands}
