@@ -123,9 +123,6 @@ def test_the_conclusions_follow_from_the_cells():
         "by 1 of 1 with its `speed_range`.",
         "`adaptive_level` costs at most 10 % latency as learned (`momentum`, stiff).",
         "`speed_range` costs at most 0 % latency as learned (`momentum`, stiff).",
-        "Combinations that are assessable as learned and hardly any more afterwards: speed +20 % (1).",
-        "1 combination can assess no impact-free run at a speed that is 20 % too high and detect contacts "
-        "nevertheless, late: the contact slows the machine to the speed that was learned.",
     ]
 
 
