@@ -154,18 +154,22 @@ def kind_in_words(hint: Any, plural: bool = False) -> str:
 
     >>> kind_in_words(Count | None), kind_in_words(tuple[Positive, ...]), kind_in_words(bool)
     ('a whole number of at least 1', 'one number or a list of numbers above 0', 'true or false, without quotes')
+    >>> kind_in_words(float | tuple[float, ...])
+    'a number or a list of numbers'
     """
-    return " or ".join(dict.fromkeys(_one_kind(part, plural) for part in alternatives(hint)))
+    parts = alternatives(hint)
+    alone = not any(map(_is_scalar, parts))
+    return " or ".join(dict.fromkeys(_one_kind(part, plural, alone) for part in parts))
 
 
-def _one_kind(hint: Any, plural: bool) -> str:
+def _one_kind(hint: Any, plural: bool, alone: bool) -> str:
     bare = bare_type(hint)
     if words := words_of(hint):
         return f"one of {', '.join(words)}"
     if get_origin(bare) in (tuple, list):
         items = [part for part in get_args(bare) if part is not Ellipsis]
         size = "" if Ellipsis in get_args(bare) or get_origin(bare) is list else f"{len(items)} "
-        one = "one number or " if not size and bare_type(items[0]) in (int, float) else ""
+        one = "one number or " if alone and not size and bare_type(items[0]) in (int, float) else ""
         return f"{one}{size or 'a list of '}{kind_in_words(items[0], plural=True)}"
     if bare is bool:
         return "true or false, without quotes"
@@ -207,8 +211,9 @@ def _scalar(key: Key, hint: Any, value: Any) -> tuple[Any, str, str]:
         if is_number and not (key.extra.get("infinite") and found == math.inf):
             break
         return found, "", ""
-    words = [word for part in alternatives(hint) for word in words_of(part)]
-    return value, problem, nearest(value, words) if words and isinstance(value, str) else allowed
+    words = [words_of(part) for part in alternatives(hint)]
+    is_choice = all(words) and isinstance(value, str) and not key.extra.get("hint")
+    return value, problem, nearest(value, sum(words, ())) if is_choice else allowed
 
 
 def _date(value: Any) -> dt.date:
@@ -260,7 +265,7 @@ class Place:
     @property
     def is_whole(self) -> bool:
         """Whether the whole file could be read: no line of it is broken."""
-        return all(mistake.key for mistake in self.mistakes)
+        return all(mistake.key for mistake in self.mistakes if self._is_own(mistake))
 
     def below(self, name: str) -> Place:
         """Return the place of the table `name` in this one."""
@@ -285,13 +290,18 @@ class Place:
 
     def _add(self, mistake: ConfigurationError) -> None:
         """Remember a mistake, unless it only follows from one about the same key or a part of it."""
-        key = mistake.key
-        if not key or not (key in self.excused or self.has_mistake(key)):
+        if not mistake.key or not self.has_mistake(mistake.key):
             self.mistakes.append(mistake)
 
-    def has_mistake(self, key: str) -> bool:
-        """Whether a mistake is about a full key or a part of it."""
-        return any(f"{known.key}.".replace("[", ".").startswith(f"{key}.") for known in self.mistakes)
+    def _is_own(self, mistake: ConfigurationError) -> bool:
+        """Whether a mistake is of this file: one of a file that it names has keys of its own."""
+        return mistake.message.startswith((self.where, "--set"))
+
+    def has_mistake(self, *keys: str) -> bool:
+        """Whether a mistake is about one of these full keys or a part of it, or excuses one of them."""
+        own = [f"{known.key}.".replace("[", ".") for known in self.mistakes if self._is_own(known)]
+        names, excused = ([f"{key}.".replace("[", ".") for key in some] for some in (keys, self.excused))
+        return any(name.startswith(tuple(excused)) or any(key.startswith(name) for key in own) for name in names)
 
     def tried(self, otherwise: Made, make: Callable[..., Made], *given: Any) -> Made:
         """Return what `make` makes of what is given; after an error, which is remembered, `otherwise`."""
@@ -388,9 +398,7 @@ def _made(model: type[Model], given: Mapping[str, Any], place: Place, known: int
     except FieldsError as fault:
         names = {key.attribute: name for name, key in keys_of(model).items()}
         concerned = [names[attribute] for attribute in fault.fields]
-        if not any(
-            place.has_mistake(f"{place.prefix}{name}") for name in concerned
-        ):  # else it follows from the default
+        if not place.has_mistake(*(f"{place.prefix}{name}" for name in concerned)):  # else it follows from the default
             place.note(concerned[0], fault.problem, fault.hint)
         others = {name: value for name, value in given.items() if name not in fault.fields}
         if len(others) < len(given) and not any(keys_of(model)[name].required for name in concerned):
@@ -464,7 +472,7 @@ def _list(key: Key, hint: Any, name: str, value: Any, place: Place) -> Any:
         return _WRONG
     names = [name if single else f"{name}[{i}]" for i in range(1, len(items) + 1)]
     found = [_value(key, kinds[0], own, item, place) for own, item in zip(names, items, strict=True)]
-    return _WRONG if any(item is _WRONG for item in found) else tuple(found)
+    return tuple(_stand_in(kinds[0]) if item is _WRONG else item for item in found)
 
 
 def check(values: Any) -> None:

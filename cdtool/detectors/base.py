@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.errors import ConfigurationError, RecordingError
+from cdtool.base.errors import ConfigurationError, FieldsError, RecordingError
 from cdtool.base.kernels import kernel
+from cdtool.base.value_words import value_in_words
 from cdtool.detectors.detection import Signal, Status, StatusArray
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.recordings.clock import previous_value
@@ -130,7 +131,7 @@ def require_positive(detector: object, *names: str) -> None:
 
     Raises
     ------
-    ConfigurationError
+    FieldsError
         A gain is not a finite number above 0; the message names it.
 
     Examples
@@ -144,7 +145,7 @@ def require_positive(detector: object, *names: str) -> None:
             continue
         numbers = np.atleast_1d(value)
         if not (numbers.size and np.all(np.isfinite(numbers) & (numbers > 0.0))):
-            raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed, or one per joint")
+            raise FieldsError((name,), f"is {value_in_words(value)}", "give a number above 0, or one per joint")
 
 
 def per_joint(value: Gain, joints: int) -> FloatArray:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cdtool.base.derived import StoresDerived
-from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.errors import ConfigurationError, nearest
 from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.remote.remote_path import location
 from cdtool.base.settings import Place, keys_of, read, setting
@@ -209,8 +209,7 @@ def _read_gains(table: Mapping[str, Any], joints: int, place: Place) -> dict[str
         with place.noting(), place.at(name):
             full = DETECTORS.canonical(name)
             if full in gains:
-                raise UsageError(f"repeats {full}", "give a detector's gains once, under one of its names")
-            gains[full] = {}
+                place.note(name, f"repeats {full}", "give a detector's gains once, under one of its names")
             detector = read(DETECTORS.load(full), values, place.below(name))
             keys = [key for key in values if hasattr(detector, key)]
             for key in keys:

@@ -160,10 +160,11 @@ class JointMachine:
             for key in ("motor_inertia", "transmission_ratio"):
                 if getattr(table, key):
                     place.note(key, "has no meaning with coordinates = 'load'", "remove the key or coordinates")
-        elif not table.transmission_ratio:
+        elif not table.transmission_ratio and place.is_whole:
             place.note("transmission_ratio", "is missing", "give a number")
         if 0.0 in table.transmission_ratio:
-            place.note("transmission_ratio", "is 0", f"load travel per motor angle [{cls.ratio_unit}]")
+            hint = f"give the load travel per motor angle [{cls.ratio_unit}], not 0"
+            place.note("transmission_ratio", "is 0", hint)
             table = replace(table, transmission_ratio=())
         every = {
             item.name: per_joint(table, item.name, len(joints), place)

@@ -62,9 +62,10 @@ class PlanarArm(CoupledMachine):
     @classmethod
     def parameters(cls, table: PlanarArmTable, place: Place) -> dict[str, Any]:
         """Return the parameters of the arm; raises ConfigurationError naming the key."""
+        if len(table.joints) not in (0, _LINKS):
+            place.note("joints", f"names {len(table.joints)} joints", "a planar arm has 2: arm and forearm")
+            table = replace(table, joints=())
         found = super().parameters(table, place)
-        if len(found["joints"]) != _LINKS:
-            raise place.fault("joints", f"names {len(found['joints'])} joints", "a planar arm has 2: arm and forearm")
         found |= {
             key: per_joint(table, key, _LINKS, place)
             for key in ("link_mass", "centre_of_mass", "link_inertia", "imu_position")

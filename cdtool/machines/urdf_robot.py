@@ -76,10 +76,10 @@ class UrdfRobot(CoupledMachine):
         """Return the parameters of the robot and its URDF; raises ConfigurationError naming key or joint."""
         if not table.joints:
             raise place.fault("joints", "is missing", "give a list of texts")
+        drive_inertia, home = (per_joint(table, key, len(table.joints), place) for key in ("drive_inertia", "home"))
         found = super().parameters(table, place)
         joints = found["joints"]
-        drives = np.array(per_joint(table, "drive_inertia", len(joints), place))
-        drives = drives + np.array(found["motor_inertia"]) / np.array(found["transmission_ratio"]) ** 2
+        drives = np.array(drive_inertia) + np.array(found["motor_inertia"]) / np.array(found["transmission_ratio"]) ** 2
         for name in table.joint_map:
             if name not in joints:
                 place.below("joint_map").note(name, "is not a joint of the log", nearest(name, joints))
@@ -88,7 +88,7 @@ class UrdfRobot(CoupledMachine):
         path = joined(location(place.where).parent, table.urdf)
         with place.at("urdf"):
             tree = read_urdf(path, names, table.locked, drives.tolist(), gravity)
-        return {**found, "tree": tree, "home": per_joint(table, "home", len(joints), place)}
+        return {**found, "tree": tree, "home": home}
 
     @property
     def load_units(self) -> dict[str, str]:

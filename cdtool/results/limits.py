@@ -18,6 +18,8 @@ from cdtool.results.results import LimitResult, RecordingFinding
 from cdtool.results.summary import COUNTED_ALWAYS, FIGURES, Summary, kind_group
 
 ALL = "*"
+# The tables that name groups: in a benchmark file, a limit on a group whose table is wrong is not checked.
+_GROUPS = ("", "impacts.", "conditions.")
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,7 @@ def limit_rules(
     kinds : sequence of str
         Names of the kinds of contacts in the groups, as GROUP/KIND; `*` does not stand for them.
     complete : bool
-        Whether these are all detectors, groups and kinds; if not, because of another mistake, only the metrics are
-        checked.
+        Whether these are all groups and kinds; if not, because of another mistake, metrics and detectors are checked.
 
     Returns
     -------
@@ -93,10 +94,10 @@ def limit_rules(
             place.note(key, "does not name a metric", 'give "detector.group.metric", e.g. "*.stiff.p95_ms"')
         elif figure not in FIGURES:
             place.note(key, f"unknown metric '{figure}'", nearest(figure, FIGURES))
-        elif not complete:
-            continue
         elif detector not in full:
             place.note(key, f"unknown detector '{detector}'", nearest(detector, full))
+        elif not complete or place.has_mistake(*(f"{table}{group.partition('/')[0]}" for table in _GROUPS)):
+            continue
         elif group != ALL and group not in (*groups, *kinds):
             place.note(key, f"unknown group '{group}'", nearest(group, [ALL, *groups, *kinds]))
         elif group in kinds and group not in groups and figure in COUNTED_ALWAYS:

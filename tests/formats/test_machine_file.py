@@ -266,3 +266,53 @@ def test_no_mistake_hides_another_nor_leads_to_a_false_one(tmp_path, kind):
         "model.friction.viscous",
     }
     assert len(caught.value.mistakes) == len(keys)
+
+
+ARM = """
+[machine]
+type = "planar_arm"
+joints = ["arm", "forearm", "hand"]
+link_mass = [1.3, 1.6]
+link_length = 0.3
+centre_of_mass = [0.14, 0.18]
+link_inertia = [1.0, 2.0, 3.0]
+[channels]
+time = { rate_hz = -1000 }
+torque = { columns = ["a"], unit = "N m" }
+speed = { columns = ["a", "b"], unit = "rad/s" }
+position = { columns = ["a", -1], unit = "count", scale = [1, 2] }
+force = { file = "cell.csv", column = "F", unit = "N" }
+contact_pressure = { file = "{stem}.csv", column = "p", unit = "bar", trigger = "sync", time = { rate_hz = 5 } }
+[channels.mcap]
+speed = { topic = "/joint_states", field = "velocity[0" }
+torque = { scale = 2 }
+[detectors]
+gm = { bandwidth = [1, 2, 3] }
+momentum = { bandwidth = 2 }
+feekf = { minimum_spede = 2, sigma_speed = -1 }
+"""
+
+
+def test_what_follows_from_a_mistake_of_an_arm_is_not_called_wrong(tmp_path):
+    with pytest.raises(MistakesError) as caught:
+        read(tmp_path, ARM)
+    assert [fault.key for fault in caught.value.mistakes] == [
+        "machine.joints",
+        "machine.transmission_ratio",
+        "machine.link_inertia",
+        "channels.time.rate_hz",
+        "channels.position.columns[2]",
+        "channels.contact_pressure.trigger",
+        "channels.torque.columns",
+        "channels.force.file",
+        "channels.force.clock",
+        "channels.force.time",
+        "channels.mcap.speed.field",
+        "channels.mcap.torque.topic",
+        "channels.mcap.torque.field",
+        "detectors.gm.bandwidth",
+        "detectors.momentum",
+        "detectors.feekf.minimum_spede",
+        "detectors.feekf.sigma_speed",
+    ]
+    assert "give 2: one per joint" in str(caught.value)

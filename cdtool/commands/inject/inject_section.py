@@ -288,15 +288,15 @@ def inject_section(table: InjectTable, place: Place, found: LogsOf, groups: tupl
         place.note("joint", f"is '{table.joint}'", nearest(table.joint, joints))
     return InjectSection(
         logs=place.tried((), found.of, table.logs, place),
-        obstacles=_obstacles(table, place, shipped, groups),
-        positions=_positions(table.positions, place, machine),
+        obstacles=place.tried((), _obstacles, table, place, shipped, groups),
+        positions=place.tried((), _positions, table.positions, place, machine),
         duration=table.duration_s,
         seed=table.seed,
         joint=joints.index(table.joint) if table.joint in joints else 0,
         folder=table.folder,
         file_format=table.file_format,
         struck=_struck(table, place, machine),
-        lever=_lever(table, place, machine),
+        lever=place.tried(0.0, _lever, table, place, machine),
     )
 
 
@@ -305,16 +305,17 @@ def _struck(table: InjectTable, place: Place, machine: Machine) -> StruckPoint |
     if not has_links(machine):
         for key in ("link", "point"):
             if getattr(table, key) not in ("", None):
-                raise place.fault(key, "applies to a planar_arm or urdf_robot only", "remove it")
+                place.note(key, "applies to a planar_arm or urdf_robot only", "remove it")
         if table.direction != "motion":
-            raise place.fault("direction", "applies to a planar_arm or urdf_robot only", "remove it")
+            place.note("direction", "applies to a planar_arm or urdf_robot only", "remove it")
         return None
     if table.joint:
-        raise place.fault("joint", "applies to axes only", "give link, and the point of it that meets the obstacle")
+        place.note("joint", "applies to axes only", "give link, and the point of it that meets the obstacle")
     if table.link == "":
-        raise place.fault("link", "is missing", "name the link that meets the obstacle")
+        place.note("link", "is missing", "name the link that meets the obstacle")
     if table.point is None:
-        raise place.fault("point", "is missing", "give [x, y, z] in the link's frame, in m")
+        place.note("point", "is missing", "give [x, y, z] in the link's frame, in m")
+        return None
     return StruckPoint(table.link, table.point, None if table.direction == "motion" else table.direction)
 
 
@@ -335,14 +336,15 @@ def _obstacles(
     found = []
     for name, own in table.obstacles.items():
         if not name.replace("_", "").replace("-", "").isalnum():
-            raise below.fault(name, "is not a valid name", "use letters, digits, - and _")
-        if own.compare_with and own.compare_with not in groups:
-            raise below.below(name).fault("compare_with", f"is '{own.compare_with}'", nearest(own.compare_with, groups))
-        found.append(NamedObstacle(name, _obstacle(own, shipped, below.below(name)), own.compare_with))
+            below.note(name, "is not a valid name", "use letters, digits, - and _")
+        if own.compare_with and own.compare_with not in groups and not place.has_mistake(f"impacts.{own.compare_with}"):
+            below.below(name).note("compare_with", f"is '{own.compare_with}'", nearest(own.compare_with, groups))
+        with place.noting():
+            found.append(NamedObstacle(name, _obstacle(own, shipped, below.below(name)), own.compare_with))
     springs = table.stiffnesses_n_per_mm
     for stiffness in springs.values if isinstance(springs, StiffnessGrid) else springs:
         found.append(NamedObstacle(f"{digits(stiffness)}_n_per_mm", Obstacle.spring(stiffness * _PER_MM)))
-    if not found:
+    if not found and not table.obstacles:
         raise place.fault(
             "obstacles", "is missing", "give [inject.obstacles.NAME] with stiffness_n_per_mm, or stiffnesses_n_per_mm"
         )
@@ -359,7 +361,9 @@ def _positions(given: tuple[str, ...] | PositionGrid, place: Place, machine: Mac
         if replace(begin, value=end.value) != end or not end.value > begin.value:
             raise below.fault("to", "is not after from", "give both in the same unit")
         return tuple(replace(begin, value=float(value)) for value in np.linspace(begin.value, end.value, given.count))
-    marks = tuple(_mark(place, "positions", text, machine) for text in given)
+    names = [f"positions[{number}]" if len(given) > 1 else "positions" for number in range(1, len(given) + 1)]
+    parsed = [place.tried(None, _mark, place, name, text, machine) for name, text in zip(names, given, strict=True)]
+    marks = tuple(mark for mark in parsed if mark)
     if len({getattr(mark, "joint", None) for mark in marks}) > 1:
         raise place.fault("positions", "are those of different joints", "give positions of one joint")
     if len({f"{digits(mark.value)} {mark.unit}" for mark in marks}) < len(marks):

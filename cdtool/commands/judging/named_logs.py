@@ -191,9 +191,9 @@ def read_label_file(onset: OnsetTable, place: Place, base: Path) -> Labels | Non
 
 
 def labels_of(
-    onset: OnsetTable, place: Place, logs: LogsOf, scored: Sequence[Path], learned: Sequence[Path] = ()
+    labels: Labels | None, logs: LogsOf, scored: Sequence[Path], learned: Sequence[Path] = ()
 ) -> Labels | None:
-    """Return the label file, whose rows are about the `scored` logs; None without a file.
+    """Return the labels of a file, whose rows are about the `scored` logs; None without a file.
 
     Rows about other logs are a note.
 
@@ -203,7 +203,6 @@ def labels_of(
     name that matches several.
     """
     base, runs = logs.base, logs.runs
-    labels = read_label_file(onset, place, base)
     if labels is None:
         return None
     path = location(labels.source)

@@ -19,7 +19,15 @@ from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import Place, Positive, read, setting
 from cdtool.commands.judging.log_groups import Split
-from cdtool.commands.judging.named_logs import LogList, LogsOf, LogsTable, labels_of, named_file, named_logs
+from cdtool.commands.judging.named_logs import (
+    LogList,
+    LogsOf,
+    LogsTable,
+    labels_of,
+    named_file,
+    named_logs,
+    read_label_file,
+)
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, resolve_all, shown_path
 from cdtool.commands.judging.scoring_rules import ScoringRules
@@ -393,7 +401,7 @@ def read_benchmark_file(
 
 
 def _other_machine(joints: Sequence[str]) -> MachineFile:
-    values = {"joints": list(joints) or ["axis"], "load_mass": 1.0, "transmission_ratio": 1.0}
+    values = {"joints": list(dict.fromkeys(joints)) or ["axis"], "load_mass": 1.0, "transmission_ratio": 1.0}
     machine = MACHINES.load("linear_axis").read(values, Place(""))
     no_channels = ChannelMap(TimeSource(), (), machine.joints)
     return MachineFile(Path(), machine, no_channels, no_channels, {}, "")
@@ -426,6 +434,7 @@ def _resolved(
     needs_runs = wanted.learning and not getattr(rule, "limits", ()) and not is_per_run(rule)
     learn: dict[Path, LogSection] = place.tried({}, _learned, table, place, found, needs_runs)
     impacts, sections = _groups(table, place, found)
+    groups_known = place.is_whole and not place.has_mistake("impacts", HOLDOUT, "conditions")
     scored, with_impacts = _scored(impacts, impact_free=True), _scored(impacts)
     made, machine_known = None, bool(machine_file.digest)  # one in place of another has none
     if table.inject is not None and machine_known:
@@ -434,7 +443,10 @@ def _resolved(
         read(SECTIONS.load("inject").table, table.inject, place.below("inject"))
     learn = _under_scored_paths(learn, scored)
     onset = place.below("onset")
-    labels = place.tried(None, labels_of, table.onset, onset, found, scored, tuple(learn))
+    of_file = place.tried(None, read_label_file, table.onset, onset, file.parent)
+    labels = place.tried(of_file, labels_of, of_file, found, scored, tuple(learn)) if groups_known else of_file
+    named = (table.campaigns, table.points) if groups_known else ({}, {})
+    meant = names if place.is_whole and not place.has_mistake("detectors") else DETECTORS.usable_names()
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
@@ -453,20 +465,20 @@ def _resolved(
         mass_before_cell=table.force.mass_before_cell_kg,
         learn=tuple(learn),
         impacts=impacts,
-        campaigns=place.tried({}, named_logs, table.campaigns, place.below("campaigns"), found, scored),
-        points=place.tried({}, named_logs, table.points, place.below("points"), found, with_impacts),
+        campaigns=place.tried({}, named_logs, named[0], place.below("campaigns"), found, scored),
+        points=place.tried({}, named_logs, named[1], place.below("points"), found, with_impacts),
         limits=limit_rules(
             table.limits,
             place.below("limits"),
-            [*_names(machine_file, names), *((name, name) for name in wanted.also_known)],
-            (*impacts, *(made.names(machine_file) if made else ())),
+            [*_names(machine_file, meant), *((name, name) for name in wanted.also_known)],
+            (*impacts, *(place.tried((), made.names, machine_file) if made else ())),
             [
                 kind_group(name, kind)
                 for name, group in impacts.items()
                 if not group.condition
                 for kind in _kinds(machine_file, labels)
             ],
-            complete=place.is_whole and machine_known,
+            complete=place.is_whole and machine_known and not place.has_mistake("inject"),
         ),
         digest=_digest(file, settings),
         window=table.window_s,
@@ -482,7 +494,7 @@ def _resolved(
         execution=table.execution,
     )
     table.check_joints(place, machine)
-    if table.points and not any(group.force for group in impacts.values()):
+    if table.points and not (any(group.force for group in impacts.values()) or place.has_mistake("force", "impacts")):
         place.note("points", "there is no force profile to check them against", "set [force] profile")
     with place.noting():
         _refuse_overlap(benchmark)
@@ -515,11 +527,12 @@ def _detectors(table: BenchmarkTable, place: Place, machine_file: MachineFile, w
         hint = "name detectors, or write a protocol without them: cdtool protocol init"
         raise place.fault("detectors", "is empty: nothing can be scored", f"{hint} {place.where}")
     names: tuple[str, ...] = ()
-    for item in _all_or(given):
-        with place.noting(), place.at("detectors"):
-            names += (machine_file.detector(item).name,)
-    if len(set(names)) < len(names):
-        raise place.fault("detectors", "contains a detector twice", "list each detector once")
+    for number, item in enumerate(_all_or(given), 1):
+        with place.noting(), place.at(f"detectors[{number}]"):
+            name = machine_file.detector(item).name
+            if name in names:
+                raise UsageError(f"is '{item}', a detector that is already listed", "list each detector once")
+            names += (name,)
     return names
 
 
@@ -600,9 +613,10 @@ def _groups(
         logs = place.tried({}, found.sections, table.holdout, place.below(HOLDOUT))
         sections |= logs
         groups[HOLDOUT] = ImpactGroup(tuple(logs), table.window_s, is_impact_free=True)
-    if force.limits and profiles and not any(group.force for group in groups.values()):
+    is_selected = any(group.force for group in groups.values()) or place.has_mistake("force.profile", "impacts")
+    if force.limits and profiles and not is_selected:
         below.note("limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}")
-    if not groups and table.inject is None:
+    if not groups and table.inject is None and not place.has_mistake(HOLDOUT, "inject"):
         place.note("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")
     changed, of_changed = _conditions(table, place.below("conditions"), found, groups)
     sections |= of_changed
@@ -623,7 +637,7 @@ def _conditions(
         below = place.below(condition)
         named = {HOLDOUT: (own.holdout, below.below(HOLDOUT))} if own.holdout else {}
         for name, logs_of in own.impacts.items():
-            if name not in struck:
+            if name not in struck and not place.has_mistake(f"impacts.{name}"):
                 below.below("impacts").note(name, "is not a group of [impacts]", nearest(name, struck))
             named[name] = logs_of, below.below("impacts").below(name)
         if condition.strip() in ("", ALL):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from cdtool.base.errors import UsageError, nearest
+from cdtool.base.errors import FieldsError, nearest
 from cdtool.base.settings import CountFromZero, NotNegative, setting
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.tune.search.grid import SHORTEST_DEBOUNCE
@@ -49,7 +49,7 @@ class TuneTable:
         for name in self.thresholds:
             if name not in known:
                 hint = 'give a list, as ["signature", "glr"]' if "," in name else nearest(name, known)
-                raise UsageError(f"unknown threshold '{name}'", hint)
+                raise FieldsError(("thresholds",), f"contains '{name}'", hint)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from cdtool.base.errors import nearest
+from cdtool.base.errors import RecordingError, nearest
 from cdtool.base.log_names import log_stem
 from cdtool.base.settings import CountFromZero, NotNegative, Place, Positive, Text, read, setting
 from cdtool.base.value_words import value_in_words
+from cdtool.formats.messages.fields import parse_field
 from cdtool.recordings.recording import CHANNELS, CHECKED, GROUND_TRUTH, RIG_UNITS, TRIGGER, UNITLESS
 from cdtool.recordings.units import RAW_UNITS, unit
 
@@ -352,8 +353,10 @@ def _column_time(table: ClockTable | None, above: Place) -> TimeSource:
         if table.column is None:
             return TimeSource(rate=table.rate_hz)
         return TimeSource(column=table.column, factor=1.0 / table.rate_hz, rate=table.rate_hz)
+    if place.has_mistake(f"{place.prefix}rate_hz"):
+        return TimeSource()
     if table.column is None:
-        raise place.fault("column", "is missing", _COLUMN_HINT)
+        place.note("column", "is missing", _COLUMN_HINT)
     if not table.unit:
         raise place.fault("unit", "is missing", "give s, ms, us, ns or min")
     with place.at("unit"):
@@ -399,7 +402,7 @@ class _Sources:
             count = len(columns) or count
         if len(fields) > 1:
             count = len(fields)
-        duty = place.tried(None, _duty, table, place) if table.kind == "duty" else None
+        duty = _duty(table, place) if table.kind == "duty" else None
         scaled = _Scaled(channel, self.accepted(channel), count, topics)
         nothing: tuple[str, str, tuple[float, ...]] = ("", "", ())
         stated, si, factor = place.tried(nothing, scaled.unit_and_factor, table, duty, place)
@@ -471,18 +474,20 @@ def _kinds(given: Mapping[str, str], place: Place) -> tuple[tuple[float, str], .
 
 
 def _own_file(table: ChannelTable, place: Place, *, in_messages: bool) -> OwnFile:
-    """Return the file beside the log of a load cell or pressure sensor; raises ConfigurationError for a wrong clock."""
+    """Return the file beside the log of a load cell or pressure sensor, with the mistakes in `place`."""
     pattern = table.file or ""
     placeholders = _PLACEHOLDER.findall(pattern)
     if not placeholders or "\0" in pattern:
-        raise place.fault("file", f"is {value_in_words(pattern)}", "name the log in it, e.g. cell_{stem}.csv")
+        place.note("file", f"is {value_in_words(pattern)}", "name the log in it, e.g. cell_{stem}.csv")
     for name in placeholders:
         if name not in _PLACEHOLDERS:
-            raise place.fault("file", f"has {name}", f"use {', '.join(_PLACEHOLDERS)}")
-    if (table.clock and table.trigger) or not (table.clock or table.trigger or table.time_offset is not None):
-        hint = 'give time_offset, clock = "epoch" or trigger = { log = , file = }'
-        raise place.fault("file", "the clocks are not aligned", hint)
-    time = _column_time(table.time, place)
+            place.note("file", f"has {name}", f"use {', '.join(_PLACEHOLDERS)}")
+    hint = 'give time_offset, clock = "epoch" or trigger = { log = , file = }'
+    is_given = table.clock or table.trigger or table.time_offset is not None
+    wrong = place.has_mistake(f"{place.prefix}trigger", f"{place.prefix}time_offset")
+    if (table.clock and table.trigger) or not (is_given or wrong):
+        place.note("clock", "the clocks are not aligned", hint)
+    time = place.tried(TimeSource(), _column_time, table.time, place)
     if table.clock:
         return OwnFile(pattern, time, "epoch")
     if table.trigger is None:
@@ -490,11 +495,10 @@ def _own_file(table: ChannelTable, place: Place, *, in_messages: bool) -> OwnFil
     log, file, below = table.trigger.log, table.trigger.file, place.below("trigger")
     for name, value in (("log", log), ("file", file)):
         if value is None:
-            raise below.fault(name, "is missing", _COLUMN_HINT)
+            below.note(name, "is missing", _COLUMN_HINT)
     if in_messages and (not isinstance(log, str) or " " not in log.strip()):
-        raise below.fault("log", f"is {value_in_words(log)}", 'give topic and field, e.g. "/sync data"')
-    assert log is not None and file is not None
-    return OwnFile(pattern, time, "trigger", log, file)
+        below.note("log", f"is {value_in_words(log)}", 'give topic and field, e.g. "/sync data"')
+    return OwnFile(pattern, time, "trigger", "" if log is None else log, "" if file is None else file)
 
 
 def _columns(table: ChannelTable, channel: str, count: int, place: Place) -> tuple[str | int, ...]:
@@ -517,7 +521,12 @@ def _fields(table: ChannelTable, place: Place) -> tuple[str, ...]:
         raise place.fault("fields", "cannot be combined with 'field'", "remove one of the two")
     for key, given in (("topic", table.topic), ("field", table.field or table.fields)):
         if not given:
-            raise place.fault(key, "is missing", "give a text")
+            place.note(key, "is missing", "give a text")
+    for name in filter(None, table.fields or (table.field,)):
+        try:
+            parse_field(name, place.where)
+        except RecordingError as fault:
+            place.note("fields" if table.fields else "field", f"is '{name}'", fault.hint)
     for name in table.fields:
         if "[:]" in name:
             hint = "name one element per axis, e.g. data[0]"
@@ -593,7 +602,7 @@ class _Scaled:
 
 
 def _duty(table: ChannelTable, place: Place) -> Duty:
-    for name in ("resistance", "back_emf_constant", "torque_constant"):
+    for name in _OF_DUTY:
         if getattr(table, name) is None:
-            raise place.fault(name, "is missing", "give a number")
-    return Duty(*(float(getattr(table, name)) for name in _OF_DUTY))
+            place.note(name, "is missing", "give a number")
+    return Duty(*(float(getattr(table, name) or 0.0) for name in _OF_DUTY))

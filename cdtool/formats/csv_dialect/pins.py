@@ -15,10 +15,11 @@ from cdtool.formats.csv.text import UNIT_BYTES
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "pipe": "|", "blanks": " "}
 _DECIMALS = {"comma": ",", "point": "."}
 _TIME_WORDS = ("", "number", "excel")
+_ENCODINGS = "give utf-8, utf-16-le, utf-16-be, latin-1 or cp1252"
 _LINE = Annotated[
     bool | Count | None,
     setting(
-        "the number of its line, counted from 1, or false", hint="the number of its line, counted from 1, or false"
+        "the number of its line, counted from 1, or false", hint="give the number of its line, counted from 1, or false"
     ),
 ]
 
@@ -29,12 +30,14 @@ class CsvTable:
 
     separator: Annotated[
         Literal["comma", "semicolon", "tab", "pipe", "blanks", ",", ";", "\t", "|", " "] | None,
-        setting("between the columns"),
+        setting("between the columns", hint="give comma, semicolon, tab, pipe or blanks, or the character"),
     ] = None
-    decimal: Annotated[Literal["comma", "point", ",", "."] | None, setting("the decimal mark")] = None
+    decimal: Annotated[
+        Literal["comma", "point", ",", "."] | None, setting("the decimal mark", hint='give "." or ","')
+    ] = None
     thousands: Annotated[
         Literal["", ",", ".", "'", " ", "\u00a0", "\u202f"] | None,
-        setting("between groups of three digits", hint='",", ".", "\'", a blank, or "" for none'),
+        setting("between groups of three digits", hint='give ",", ".", "\'", a blank, or "" for none'),
     ] = None
     encoding: Annotated[str, setting("utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")] = ""
     header: _LINE = None
@@ -52,7 +55,7 @@ def read_pins(values: Mapping[str, Any], place: Place) -> TablePins:
         return TablePins()
     for name in ("header", "units"):
         if getattr(table, name) is True:
-            place.note(name, "is true", "the number of its line, counted from 1, or false")
+            place.note(name, "is true", "give the number of its line, counted from 1, or false")
     if table.header is False and table.units:
         place.note("units", f"is {table.units}, but header is false", "units need a header")
     decimal = _DECIMALS.get(table.decimal or "", table.decimal or "")
@@ -80,11 +83,11 @@ def _encoding(name: str, place: Place) -> str:
         # Also the codec of host names agrees with ASCII, but it cannot replace what it cannot decode.
         narrow = "1,2\n".encode(known) == b"1,2\n" == b"1,2\n".decode(known, "replace").encode()
     except (LookupError, UnicodeError, AssertionError):
-        raise place.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252") from None
+        raise place.fault("encoding", f"is '{name}'", _ENCODINGS) from None
     # Numbers are read byte by byte: their bytes must be ASCII, or the encoding must be one that is recoded to UTF-8.
     known = {"iso8859-1": "latin-1"}.get(known, known)
     if not narrow and known not in UNIT_BYTES:
-        raise place.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")
+        raise place.fault("encoding", f"is '{name}'", _ENCODINGS)
     return known
 
 
@@ -94,6 +97,6 @@ def _time_format(value: str, place: Place) -> str:
     problem = check_pattern(value) if "%" in value else "is not a layout"
     if problem:
         raise place.fault(
-            "time_format", f"is '{value}': {problem}", "number, excel, or a layout such as %d.%m.%Y %H:%M:%S.%f"
+            "time_format", f"is '{value}': {problem}", "give number, excel, or a layout such as %d.%m.%Y %H:%M:%S.%f"
         )
     return value

@@ -109,7 +109,7 @@ def parse_field(text: str, where: str) -> Field:
         if match is None or match["index"] == "":
             raise RecordingError(
                 f"{where}: field '{text}' cannot be understood",
-                "e.g. data, wrench.force.z, position[0], position[:] or position[joint_name]",
+                "give a field such as data, wrench.force.z, position[0], position[:] or position[joint_name]",
             )
         steps.append((match["name"], match["index"]))
     return Field(text, tuple(steps))

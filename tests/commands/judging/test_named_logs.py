@@ -8,7 +8,7 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.settings import Place, read
-from cdtool.commands.judging.named_logs import LogsOf, OnsetTable, labels_of
+from cdtool.commands.judging.named_logs import LogsOf, OnsetTable, labels_of, read_label_file
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 
 MACHINE = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\n'
@@ -44,14 +44,15 @@ def test_the_file_of_a_logs_load_cell_is_not_a_log(tmp_path, force, names):
 def test_a_setting_of_labels_needs_a_label_file(tmp_path, key):
     value = {"labels_clock": "source", "labels_zone": "Z", "not_contacts": ("soft",)}[key]
     with pytest.raises(ConfigurationError, match=f"onset.{key}: is only for a label file"):
-        labels_of(OnsetTable(**{key: value}), Place("b.toml", "onset."), logs(tmp_path), [])
+        read_label_file(OnsetTable(**{key: value}), Place("b.toml", "onset."), tmp_path)
 
 
 def test_the_settings_of_the_labels_reach_the_file(tmp_path):
     rows = "recording,start_time,end_time,kind\n01.csv,2025-04-03T12:00,,hard\n01.csv,2025-04-03T12:01,,soft\n"
     (tmp_path / "labels.csv").write_text(rows, encoding="utf-8")
     settings = {"labels": "labels.csv", "labels_zone": "+02:00", "not_contacts": ("soft",)}
-    labels = labels_of(OnsetTable(**settings), Place("b.toml", "onset."), logs(tmp_path), [tmp_path / "01.csv"])
+    of_file = read_label_file(OnsetTable(**settings), Place("b.toml", "onset."), tmp_path)
+    labels = labels_of(of_file, logs(tmp_path), [tmp_path / "01.csv"])
     assert labels is not None and labels.kinds == ("hard",) and labels.clock == "source"
     assert labels.contacts["01.csv"][0].start == 1_743_674_400.0
 

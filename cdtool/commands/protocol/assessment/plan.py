@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, Literal
 
+from msgspec import Meta
+
 from cdtool.base.errors import FieldsError
 from cdtool.base.settings import CountFromZero, NotNegative, check, setting
 
@@ -48,7 +50,9 @@ class TestParticulars:
     date: dt.date | None = entry("day of the test, as 2026-03-31", default=None)
     place: str = entry("place of the test")
     temperature_c: float | None = entry("temperature at the machine [°C]", due="test_day", default=None)
-    humidity_percent: NotNegative | None = entry("relative humidity [%]", due="never", default=None)
+    humidity_percent: Annotated[float, Meta(ge=0.0, le=100.0)] | None = entry(
+        "relative humidity [%]", due="never", default=None
+    )
     conditions: str = entry("other conditions: wind, supply voltage, warm-up", due="never")
 
     __test__ = False  # not a test of pytest
