@@ -245,7 +245,7 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
     ("arguments", "words"),
     [
         (("--set", "tune.objective=speed"), "--set tune.objective: is 'speed'"),
-        (("--set", "tune.thresholds=glx"), "unknown threshold 'glx'"),
+        (("--set", "tune.thresholds=glx"), "tune.thresholds: contains 'glx'"),
         (("--set", "tune.impacts=all"), "--set tune.impacts: is 'all'"),
         (("--set", "tune.impacts=injected"), "has no section [inject]"),
         (("--set", "tune.worse_at_most=-1"), "--set tune.worse_at_most: is -1"),
