@@ -50,7 +50,10 @@ class UsageError(CdtoolError):
 
 
 class FieldsError(UsageError):
-    """Values of a model are wrong or do not fit together: `problem` is that of the first of its `fields`."""
+    """Values of a model are wrong or do not fit together: `problem` is that of the first of its `fields`.
+
+    A field may be that of an item of a list, as `points[2].name`.
+    """
 
     def __init__(self, fields: tuple[str, ...], problem: str, hint: str = "") -> None:
         super().__init__(f"{fields[0]} {problem}", hint)

@@ -402,12 +402,13 @@ def _made(model: type[Model], given: Mapping[str, Any], place: Place, known: int
         return model(**given)
     except FieldsError as fault:
         names = {key.attribute: name for name, key in keys_of(model).items()}
-        concerned = [names[attribute] for attribute in fault.fields]
+        parts = [attribute.partition("[") for attribute in fault.fields]  # of an item: points[2].name
+        concerned = [f"{names[attribute]}{bracket}{item}" for attribute, bracket, item in parts]
         if not place.has_mistake(*(f"{place.prefix}{name}" for name in concerned)):  # else it follows from the default
             place.note(concerned[0], fault.problem, fault.hint)
-        others = {name: value for name, value in given.items() if name not in fault.fields}
-        if len(others) < len(given) and not any(keys_of(model)[name].required for name in concerned):
-            return _made(model, others, place, known)
+        others = given.keys() - {attribute for attribute, *_ in parts}
+        if len(others) < len(given) and not any(keys_of(model)[names[attribute]].required for attribute, *_ in parts):
+            return _made(model, {name: given[name] for name in others}, place, known)
     except CdtoolError as fault:
         if len(place.mistakes) == known:  # else it may only follow from a value that was replaced
             place.mistakes.append(place.whole(fault))

@@ -108,22 +108,29 @@ class ForceProfile:
     permissible: Annotated[bool, setting("false: a region that nothing may touch; no contact passes")] = True
 
     def __post_init__(self) -> None:
-        times = [step.from_s for step in self.steps]
-        if not times or times[0] != 0.0 or any(later <= earlier for earlier, later in pairwise(times)):
-            given = f"begin at {', '.join(f'{time:g}' for time in times)} s" if times else "are empty"
-            raise FieldsError(("steps",), given, "the first step begins with the contact, at 0, and times increase")
-        for what, names in (
-            ("steps", [step.name for step in self.steps]),
-            ("pressures", [item.area for item in self.pressures]),
+        for key, names in (
+            ("pressures[{}].area", [item.area for item in self.pressures]),
+            ("steps[{}].name", [step.name for step in self.steps]),
         ):
-            if twice := [name for name in names if names.count(name) > 1]:
-                raise FieldsError((what,), f"name '{twice[0]}' twice", "give each a different name")
-        if self.pressures and not self.pressure_source.strip():
-            hint = "state from where the pressures are: standard, edition, table"
-            raise FieldsError(("pressure_source", "pressures"), "is missing", hint)
+            for number, name in enumerate(names, 1):
+                if name in names[: number - 1]:
+                    raise FieldsError((key.format(number),), f"is '{name}' again", "give each a different name")
+        for number, (before, after) in enumerate(pairwise(self.steps), 2):
+            if after.from_s <= before.from_s:
+                fields = (f"steps[{number}].from_s", f"steps[{number - 1}].from_s")
+                hint = f"give more than {before.from_s:g}, of the step before"
+                raise FieldsError(fields, f"is {after.from_s:g}", hint)
+        if self.steps and self.steps[0].from_s != 0.0:
+            hint = "give 0: the first step begins with the contact"
+            raise FieldsError(("steps[1].from_s",), f"is {self.steps[0].from_s:g}", hint)
         if len(self.steps) < 2 and any(item.transient is not None for item in self.pressures):
             hint = "give a second one: from its time on, the quasi-static pressure applies"
             raise FieldsError(("steps", "pressures"), "has one step", hint)
+        if self.pressures and not self.pressure_source.strip():
+            hint = "state from where the pressures are: standard, edition, table"
+            raise FieldsError(("pressure_source",), "is missing", hint)
+        if not self.steps:
+            raise FieldsError(("steps",), "are empty", "give a step from_s = 0: it begins with the contact")
 
     @property
     def warning(self) -> str:

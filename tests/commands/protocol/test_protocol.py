@@ -246,7 +246,8 @@ def test_a_deviation_without_its_point_and_a_point_twice_are_named_in_one_run(tm
     (tmp_path / "protocol.toml").write_text("[protocol]\n" + more, encoding="utf-8")
     with pytest.raises(MistakesError) as caught:
         read_protocol_file(tmp_path / "protocol.toml")
-    assert [fault.key for fault in caught.value.mistakes] == ["protocol.deviation", "protocol.point"]
+    keys = ["protocol.deviation[1].point", "protocol.point[2].name"]
+    assert [fault.key for fault in caught.value.mistakes] == keys
 
 
 def test_an_unknown_group_and_a_body_area_without_a_limit_hide_nothing(tmp_path):

@@ -179,14 +179,15 @@ class TestPlan:
     __test__ = False
 
     def __post_init__(self) -> None:
-        names = [point.name for point in self.points if point.name]
-        for item in self.deviations:
+        names = [point.name for point in self.points]
+        for number, item in enumerate(self.deviations, 1):
             if item.point and item.point not in names:
-                hint = f"use one of {', '.join(names)}"
-                raise FieldsError(("deviations",), f"names the measuring point '{item.point}'", hint)
-        for name in names:
-            if names.count(name) > 1:
-                raise FieldsError(("points",), f"has two measuring points '{name}'", "give each a name of its own")
+                field, hint = f"deviations[{number}].point", f"use one of {', '.join(filter(None, names))}"
+                raise FieldsError((field,), f"names the measuring point '{item.point}'", hint)
+        for number, name in enumerate(names, 1):
+            if name and name in names[: number - 1]:
+                problem = f"is that of another measuring point, '{name}'"
+                raise FieldsError((f"points[{number}].name",), problem, "give each a name of its own")
 
     @property
     def force_instrument(self) -> Instrument | None:

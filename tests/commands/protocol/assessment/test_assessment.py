@@ -318,7 +318,7 @@ def test_the_plan_is_checked_before_anything_is_measured():
 def test_a_plan_names_each_point_once():
     from cdtool.base.errors import UsageError
 
-    with pytest.raises(UsageError, match="two measuring points"):
+    with pytest.raises(UsageError, match="another measuring point"):
         replace(PLAN, points=(POINT, POINT))
     with pytest.raises(UsageError, match="given with logs"):
         replace(POINT, logs=("a.csv",))
