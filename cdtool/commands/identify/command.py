@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from cdtool.commands.identify.identifying import IdentifiedMachine
     from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
     from cdtool.commands.identify.joint import JointIdentification
-    from cdtool.commands.identify.presses import PressLogs
     from cdtool.execution.workers import Workers
 
 _PAYLOAD = re.compile(r"(?P<mass>[^@:]+?) ?kg(?:@(?P<link>[^:]+))?(?::(?P<centre>.+))?")
@@ -61,13 +60,6 @@ def identify(
         str | None,
         typer.Option("--payload", help="The payload of --loaded-logs: 3.2kg@LINK:X,Y,Z, with its centre of mass [m]."),
     ] = None,
-    presses: Annotated[
-        list[str] | None,
-        typer.Option("--presses", help="Logs of slow press and release on a load cell, for the torque's scale."),
-    ] = None,
-    lever_arm: Annotated[
-        float | None, typer.Option("--lever-arm", help="Of a rotary axis: distance of the load cell from it [m].")
-    ] = None,
     force: ForceOption = False,
     jobs: JobsOption = 1,
     quiet: QuietOption = False,
@@ -75,8 +67,7 @@ def identify(
 ) -> None:
     """Identify the model of an axis or robot from impact-free logs, with honest standard errors.
 
-    Of an axis: mass, drive, friction and controller; with --presses the scale of its torque. Of a robot: friction,
-    inertias, torque constants.
+    Of an axis: mass, drive, friction and controller. Of a robot: friction, inertias, torque constants.
     Every change of the machine file is shown; old values remain in its comments.
 
     Example: cdtool identify 'sample_logs/gate/free/*.csv' -m sample_logs/gate/machine.toml -o machine.toml
@@ -87,10 +78,7 @@ def identify(
     targets = output or []
     check_identification_files(targets, machine, force=force)
     loaded = _loaded_runs(loaded_logs or (), payload)
-    pressed = _press_logs(presses or (), lever_arm)
-    if loaded is not None and pressed is not None:
-        raise UsageError("--loaded-logs with --presses", "these are for robots, those for axes")
-    _identify_machine(logs, machine, targets, Workers(jobs), loaded or pressed, as_json=as_json, quiet=quiet)
+    _identify_machine(logs, machine, targets, Workers(jobs), loaded, as_json=as_json, quiet=quiet)
 
 
 def _loaded_runs(logs: Sequence[str], payload: str | None) -> LoadedRuns | None:
@@ -117,25 +105,12 @@ def _is_point(centre: tuple[float, ...] | None) -> TypeGuard[tuple[float, float,
     return centre is None or (len(centre) == 3 and all(map(math.isfinite, centre)))
 
 
-def _press_logs(presses: Sequence[str], lever_arm: float | None) -> PressLogs | None:
-    """Return the logs with presses; None without any. Raises UsageError for a lever arm that does not fit."""
-    from cdtool.commands.identify.presses import PressLogs
-
-    if lever_arm is not None and not 0.0 < lever_arm < math.inf:
-        raise UsageError(f"--lever-arm is {lever_arm:g}", "give it in m, above 0")
-    if presses:
-        return PressLogs(tuple(presses), lever_arm)
-    if lever_arm is not None:
-        raise UsageError("--lever-arm without --presses", "give logs of presses too")
-    return None
-
-
 def _identify_machine(
     logs: Sequence[str],
     machine: Path,
     targets: Sequence[Path],
     workers: Workers,
-    other_logs: LoadedRuns | PressLogs | None,
+    loaded: LoadedRuns | None,
     *,
     as_json: bool,
     quiet: bool,
@@ -145,7 +120,7 @@ def _identify_machine(
     from cdtool.commands.judging.runs import find_logs
 
     with progress("identifying", quiet=quiet) as advance:
-        done = run(logs, machine, workers=workers, progress=advance, other_logs=other_logs)
+        done = run(logs, machine, workers=workers, progress=advance, loaded=loaded)
     written = write_identification(done, targets, find_logs(logs, Path(), "LOGS"))
     done = replace(done, written=", ".join(str(path) for path in written if path.suffix.lower() == MACHINE))
     print_skipped(done.skipped, done.findings)

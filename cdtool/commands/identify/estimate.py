@@ -21,7 +21,6 @@ class Method(Enum):
     LEAST_SQUARES = "least squares"
     INSTRUMENTAL_VARIABLES = "instrumental variables"
     OUTPUT_ERROR = "output error"
-    PRESSES = "presses on a load cell"
     LOADED_RUNS = "runs with and without a known payload"
     FEASIBLE_LEAST_SQUARES = "physically consistent least squares"
 

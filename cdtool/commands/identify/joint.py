@@ -10,7 +10,6 @@ from typing import Any
 from cdtool.commands.identify.axis.excitation import Excitation
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerFit
-from cdtool.commands.identify.axis.torque_constant import TorqueScale
 from cdtool.commands.identify.axis.two_mass import TwoMassFit
 from cdtool.commands.identify.estimate import Estimate, Method, NotIdentifiable
 from cdtool.commands.identify.robot.friction_choice import JointFriction
@@ -25,8 +24,7 @@ class JointIdentification:
     """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
 
     `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`
-    and `evidence`: of a joint of a robot or planar arm, which has none of the others. `torque_scale`: the factor by
-    which all torques were multiplied before; None without presses.
+    and `evidence`: of a joint of a robot or planar arm, which has none of the others.
     """
 
     joint: str
@@ -38,7 +36,6 @@ class JointIdentification:
     refused: Mapping[str, str] = field(default_factory=dict)
     robot: JointFriction | None = None
     evidence: RobotJointEvidence | None = None
-    torque_scale: TorqueScale | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -57,14 +54,7 @@ class JointIdentification:
         if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
             # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
             found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
-        return tuple(map(self._with_scale_error, found.values()))
-
-    def _with_scale_error(self, estimate: Estimate) -> Estimate:
-        """Return an estimate whose standard error has that of the torque's scale, on which masses and forces depend."""
-        if self.torque_scale is None or not estimate.unit.startswith(("kg", "N")):
-            return estimate
-        relative = self.torque_scale.standard_error / self.torque_scale.factor
-        return replace(estimate, standard_error=math.hypot(estimate.standard_error, relative * estimate.value))
+        return tuple(found.values())
 
     @property
     def together(self) -> tuple[Estimate, ...]:
@@ -142,7 +132,6 @@ class JointIdentification:
             "estimates": [item.summary for item in self.estimates],
             "not_identifiable": [item.summary for item in self.not_identifiable],
             "refused": dict(self.refused),
-            "torque_scale": self.torque_scale and asdict(self.torque_scale),
         }
         return {**values, **_of_axis(self), **_of_robot(self)}
 

@@ -94,7 +94,7 @@ def gain_values_with_centre(kind: str, seed: int, folder: Path) -> list[Value]:
 
 def _identified(logs: Sequence[Path], machine: Path, loaded: LoadedRuns | None = None) -> IdentifiedMachine | None:
     try:
-        return cdtool.identify(logs, machine, other_logs=loaded)
+        return cdtool.identify(logs, machine, loaded=loaded)
     except CdtoolError:
         return None
 

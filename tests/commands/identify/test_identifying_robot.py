@@ -204,7 +204,7 @@ def test_torque_constants_from_runs_with_a_payload(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_text(ARM + channels_of(2, "[10.0, 10.0]"), encoding="utf-8")
     payload = LoadedRuns((tmp_path / "loaded.csv",), 0.7, centre=(0.25, 0.0, 0.0))
-    done = cdtool.identify([tmp_path / "free.csv"], path, tmp_path / "new.toml", other_logs=payload)
+    done = cdtool.identify([tmp_path / "free.csv"], path, tmp_path / "new.toml", loaded=payload)
     values = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
     assert values["channels"]["torque"]["scale"] == pytest.approx([12.0, 8.0], rel=0.03)
     assert values["channels"]["torque"]["columns"] == ["t0", "t1"]
@@ -216,11 +216,11 @@ def test_torque_constants_from_runs_with_a_payload(tmp_path: Path) -> None:
 def test_a_payload_of_an_axis_or_of_an_unknown_link_is_refused(tmp_path: Path) -> None:
     gate = ROOT / "sample_logs" / "gate"
     with pytest.raises(UsageError, match="payload is given for an axis"):
-        cdtool.identify([gate / "free" / "03.csv"], gate / "machine.toml", other_logs=LoadedRuns(("x.csv",), 1.0))
+        cdtool.identify([gate / "free" / "03.csv"], gate / "machine.toml", loaded=LoadedRuns(("x.csv",), 1.0))
     path = files(tmp_path, TRUE, ARM, [fourier(1, 2, 6.0, 0.01)])
     payload = LoadedRuns((tmp_path / "run0.csv",), 1.0, "hand")
     with pytest.raises(ConfigurationError, match="unknown link 'hand'"):
-        cdtool.identify([tmp_path / "run0.csv"], path, other_logs=payload)
+        cdtool.identify([tmp_path / "run0.csv"], path, loaded=payload)
 
 
 PANDA = """[machine]
