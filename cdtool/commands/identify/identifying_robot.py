@@ -14,13 +14,12 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.remote.remote_path import joined
-from cdtool.commands.identify.estimate import Estimate, IdentificationError, Identified, Method, NotIdentifiable
+from cdtool.commands.identify.estimate import IdentificationError, Identified, Method, NotIdentifiable
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
 from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
 from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
 from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction, choose_friction
-from cdtool.commands.identify.robot.planar_links import planar_links
 from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
 from cdtool.commands.identify.robot.robot_dynamics import (
     RobotFit,
@@ -34,7 +33,6 @@ from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recordings.recording import Recording
 
@@ -44,8 +42,8 @@ _EXPLAINED = 0.5
 _MOST_UNEXPLAINED = 0.1
 # Units of inertia, force, travel and viscous friction.
 _REVOLUTE, _PRISMATIC = ("kg m2", "N m", "rad", "N m s/rad"), ("kg", "N", "m", "N s/m")
-# Physical links may raise the residual of least squares by this share, and shift a base parameter by so many errors.
-_MOST_RISE, _MOST_SHIFT = 0.1, 3.0
+# Physical links may raise the residual of least squares by this share.
+_MOST_RISE = 0.1
 
 
 @dataclass(frozen=True)
@@ -276,10 +274,10 @@ def _with_inertias(
         return found, joints, ""
     if not _predicts_better(fit, joints):
         return replace(found, refused="the present inertias predict unseen parts as well"), joints, ""
+    if not isinstance(fit.machine, UrdfRobot):
+        return replace(found, refused="new ones predict better, but only a URDF has a place for them"), joints, ""
     try:
-        if isinstance(fit.machine, UrdfRobot):
-            return _new_urdf(fit, found, joints, joined(folder, str(given["machine"]["urdf"])))
-        return _new_links(fit, found, joints)
+        return _new_urdf(fit, found, joints, joined(folder, str(given["machine"]["urdf"])))
     except CdtoolError as fault:
         return replace(found, refused=str(fault)), joints, ""
 
@@ -308,32 +306,16 @@ def _new_urdf(
             f"no physical links explain the torques: their residual is {100.0 * consistent.residual_rise:.0f} % higher",
             "check the signs and units of the channels, and the kinematics of the URDF",
         )
-    tree: KinematicTree = consistent.robot.tree
-    text = updated_urdf(read_text(path, ConfigurationError), tree)
+    text = updated_urdf(read_text(path, ConfigurationError), consistent.tree)
     found = replace(found, is_new=True, residual_rise=consistent.residual_rise)
-    return found, _joints_with_inertias(consistent.fit, joints, ()), text
+    return found, _joints_with_inertias(consistent.fit, joints), text
 
 
-def _new_links(
-    fit: RobotFit, found: InertiaIdentification, joints: tuple[JointFriction, ...]
-) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
-    links = planar_links(fit)
-    if links.shift > _MOST_SHIFT:
-        raise IdentificationError(
-            f"coupling and gravity of the forearm contradict each other by {links.shift:.1f} standard errors",
-            "check link_length and the order of the channels",
-        )
-    return replace(found, is_new=True), _joints_with_inertias(fit, joints, links.estimates), ""
-
-
-def _joints_with_inertias(
-    fit: RobotFit, joints: Sequence[JointFriction], links: Sequence[Estimate]
-) -> tuple[JointFriction, ...]:
+def _joints_with_inertias(fit: RobotFit, joints: Sequence[JointFriction]) -> tuple[JointFriction, ...]:
     """Return the joints with the friction that belongs to the new inertias."""
     complete = []
     for item in joints:
         known, together = joint_estimates(fit, item.joint, Method.FEASIBLE_LEAST_SQUARES)
-        own = tuple(estimate for estimate in links if estimate.joint == item.joint)
         refused = fit.identified.not_identifiable
         missing = tuple(entry for entry in refused if entry.joint == item.joint and entry.key != "base_parameters")
         errors = {**item.errors, FrictionForm.WITH_INERTIAS: fit.left_out.error(item.joint)}
@@ -342,7 +324,7 @@ def _joints_with_inertias(
                 item,
                 form=FrictionForm.WITH_INERTIAS,
                 compared=FrictionForm.WITH_INERTIAS,
-                identified=Identified((*own, *known), missing),
+                identified=Identified(known, missing),
                 together=together,
                 errors=errors,
             )

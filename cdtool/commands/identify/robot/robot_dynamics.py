@@ -44,7 +44,6 @@ from cdtool.commands.identify.robot.robot_regressor import (
     Regressor,
     RegressorColumn,
     regressor_of,
-    with_bodies,
 )
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
@@ -218,29 +217,6 @@ def identify_robot(
         left_out=left_out,
         condition_number=condition,
         equations=equations,
-    )
-
-
-def fitted_robot(fit: RobotFit) -> UrdfRobot:
-    """Return the robot with all fitted parameters; raises UsageError for another machine than one from a URDF.
-
-    With free inertial parameters its motion as a whole is right; a single link may be unphysical, see
-    consistent_inertia.py.
-    """
-    machine = fit.machine
-    if not isinstance(machine, UrdfRobot):
-        raise UsageError(f"machine '{machine.name}': has no URDF", "fitted_robot is for type = 'urdf_robot'")
-    values = {group: np.array([fit.parameters[i] for i in _columns_of(fit, group)]) for group in ColumnGroup}
-    ratio = np.array(machine.transmission_ratio)
-    tree = with_bodies(machine.tree, values[ColumnGroup.INERTIAL])
-    drives = dict(zip(tree.order, values[ColumnGroup.DRIVE_INERTIA].tolist(), strict=True))
-    joints = tuple(replace(joint, drive_inertia=drives[joint.name]) for joint in tree.joints)
-    return replace(
-        machine,
-        tree=replace(tree, joints=joints),
-        viscous_friction=tuple((values[ColumnGroup.VISCOUS] * ratio**2).tolist()),
-        coulomb_friction=tuple((values[ColumnGroup.COULOMB] * np.abs(ratio)).tolist()),
-        constant_force=tuple((values[ColumnGroup.CONSTANT] * ratio).tolist()),
     )
 
 
