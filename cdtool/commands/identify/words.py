@@ -99,7 +99,7 @@ _REASONS: Mapping[Missing, str] = {
     Missing.ACCELERATION: "hardly any acceleration",
     Missing.MORE_RECORDINGS: "too few runs",
     Missing.SATURATION: "the command never reached a limit",
-    Missing.TORQUE_FILTER: "the lag between command and measured torque contains that of the torque's low-pass",
+    Missing.TORQUE_FILTER: "the lag of the logged torque is in it",
     Missing.OTHER_CONTROLLER: (
         "P and PI control, alone or under a position controller, do not explain the controller's output (feed-forward, "
         "or references of another log?)"
