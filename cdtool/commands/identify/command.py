@@ -133,8 +133,8 @@ def _identify_machine(
 
 def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path], *, quiet: bool) -> None:
     for joint in done.joints:
-        left = joint.rigid.cross_validation.left_over if joint.rigid and joint.rigid.cross_validation else math.nan
-        if left > _MUCH_MORE:
+        validation = joint.evidence.cross_validation if joint.evidence else None
+        if validation and (left := validation.left_over) > _MUCH_MORE:
             typer.echo(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
     runs = counted(len(done.runs), "impact-free run")
     typer.echo(f"{plain(done.machine)}: identified from {runs}")
@@ -214,7 +214,7 @@ def _show_changes(done: IdentifiedMachine) -> None:
 
 
 def _show_quality(joint: JointIdentification) -> None:
-    validation = joint.rigid.cross_validation if joint.rigid else None
+    validation = joint.evidence.cross_validation if joint.evidence else None
     if validation is not None:
         floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
         typer.echo(f"force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")

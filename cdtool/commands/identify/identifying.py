@@ -310,10 +310,12 @@ def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[
         if method == "rigid" and _has_opposite_sign(found.get("rigid")):
             reason = "the torque falls where the acceleration rises: check the signs (scale) of torque and speed"
             return JointIdentification(name, refused={"sign": reason})
-    units = (mass, force, travel, f"{force} s/{travel}")
+    units, rigid = (mass, force, travel, f"{force} s/{travel}"), found.get("rigid")
     return JointIdentification(
         name,
         units=units,
+        evidence=rigid and rigid.evidence,
+        excitation=rigid and rigid.excitation,
         has_torque_filter="torque_filter_time" in stated,
         refused=refused,
         **found,

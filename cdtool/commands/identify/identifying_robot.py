@@ -19,7 +19,7 @@ from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
 from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
 from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
-from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction, choose_friction
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction, choose_friction
 from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
 from cdtool.commands.identify.robot.robot_dynamics import (
     RobotFit,
@@ -27,8 +27,7 @@ from cdtool.commands.identify.robot.robot_dynamics import (
     is_prismatic,
     joint_estimates,
 )
-from cdtool.commands.identify.robot.robot_evidence import joint_evidence
-from cdtool.commands.identify.robot.robot_excitation import measure_joint_motion
+from cdtool.commands.identify.robot.robot_evidence import joint_evidence, joint_excitations
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
@@ -195,11 +194,21 @@ def identify_joints(
     floor = repeated_runs(runs)
     fits = {**fits, FrictionForm.WITH_INERTIAS: whole}
     identified = []
-    for motion, friction, reasons in zip(measure_joint_motion(runs, machine), joints, refused, strict=True):
-        units = _PRISMATIC if is_prismatic(machine, friction.joint) else _REVOLUTE
-        shown = joint_evidence(motion, friction.compared, fits, explained.runs)
-        name = machine.joints[friction.joint]
-        identified.append(JointIdentification(name, units=units, refused=reasons, robot=friction, evidence=shown))
+    for excitation, friction, reasons in zip(joint_excitations(runs, machine), joints, refused, strict=True):
+        shown = None
+        if friction.compared is not None:
+            is_new = friction.answer is FrictionAnswer.NEW
+            shown = joint_evidence(friction.joint, fits[friction.compared], is_new, explained.runs, floor)
+        identified.append(
+            JointIdentification(
+                machine.joints[friction.joint],
+                units=_PRISMATIC if is_prismatic(machine, friction.joint) else _REVOLUTE,
+                refused=reasons,
+                robot=friction,
+                evidence=shown,
+                excitation=excitation,
+            )
+        )
     return RobotIdentification(tuple(identified), inertias, gains, floor, explained.share, urdf)
 
 

@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -24,12 +23,7 @@ from cdtool.commands.identify.axis.filtered_regression import (
     filter_run,
     fit_linear,
 )
-from cdtool.commands.identify.axis.friction_curve import (
-    FrictionCurve,
-    friction_curve,
-    profile_covariance,
-    speed_edges,
-)
+from cdtool.commands.identify.axis.profile_covariance import profile_covariance
 from cdtool.commands.identify.estimate import (
     Estimate,
     IdentificationError,
@@ -38,6 +32,7 @@ from cdtool.commands.identify.estimate import (
     Missing,
     NotIdentifiable,
 )
+from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, UnseenRun
 from cdtool.machines.axis_model.axis_run import AxisRun
 
 
@@ -80,52 +75,6 @@ _ENOUGH_STROKES, _PIECES = 3, 6
 _SAME_STROKE, _TIMES, _INNER = 0.02, 400, 0.98
 
 
-@dataclass(frozen=True, eq=False)
-class UnseenRun:
-    """The force on a run whose parts were left out of the fit in turn: (n,) [N, N m] at `time` [s] while moving.
-
-    `of_runs`: the number of runs it is the worst of.
-    """
-
-    run: str
-    time: FloatArray
-    measured: FloatArray
-    predicted: FloatArray
-    of_runs: int
-
-    @property
-    def error(self) -> float:
-        """Return the root mean square of what the prediction leaves over [N, N m]."""
-        return float(np.sqrt(np.mean((self.measured - self.predicted) ** 2)))
-
-
-@dataclass(frozen=True, eq=False)
-class CrossValidation:
-    """How well the force is predicted while moving, in runs, or strokes of a single run, left out of the fit.
-
-    `error` [N, N m]: root mean square. `folds`: how often something was left out. `floor` [N, N m]: standard deviation
-    of the force between strokes that repeat each other, over `repeats` strokes; NaN without repeats. `worst`: the run
-    that is described worst.
-    """
-
-    error: float
-    folds: int
-    floor: float
-    repeats: int
-    worst: UnseenRun
-
-    @property
-    def left_over(self) -> float:
-        """Return the error over the floor; NaN without a floor."""
-        return self.error / self.floor if self.floor > 0.0 else math.nan
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """Return the errors as JSON values."""
-        worst = {"worst_run": self.worst.run, "error_of_worst_run": self.worst.error, "of_runs": self.worst.of_runs}
-        return {"error": self.error, "floor": self.floor, "repeats": self.repeats, **worst}
-
-
 @dataclass(frozen=True)
 class FrictionLevel:
     """The mean force against the travel at the fastest speed that is held, per direction, the constant force included.
@@ -145,10 +94,7 @@ class RigidAxisFit:
     """An identified rigid axis.
 
     `identified`: per parameter an estimate or what is missing. `total_mass` [kg, kg m2] with its standard error: motor
-    and load. `levels`: per direction. `speed`, `friction`, `residual` (m,): of each equation, the force without that of
-    the inertia, and what the model leaves over. `friction_curve`: the friction over signed speed; `position_curves`:
-    the residual over position, per direction (1, -1). `cross_validation` is None with a single stroke. All forces
-    are without a stated lag.
+    and load. `levels`: per direction. All forces are without a stated lag.
     """
 
     identified: Identified
@@ -157,12 +103,7 @@ class RigidAxisFit:
     levels: tuple[FrictionLevel, ...]
     condition_number: float
     excitation: Excitation
-    speed: FloatArray = field(repr=False)
-    friction: FloatArray = field(repr=False)
-    residual: FloatArray = field(repr=False)
-    friction_curve: FrictionCurve = field(repr=False)
-    position_curves: dict[int, FrictionCurve] = field(repr=False)
-    cross_validation: CrossValidation | None
+    evidence: ForceEvidence = field(repr=False)
 
 
 def identify_rigid_axis(
@@ -219,7 +160,6 @@ def identify_rigid_axis(
     levels = _levels(equations, solution.mass, excitation)
     mass_error = math.hypot(solution.mass_error, settings.lag_left * abs(lag.mass_change))
     solution = replace(solution, mass_error=mass_error, levels=levels)
-    speed, friction = equations.regressors[:, 1], equations.force - solution.mass * equations.regressors[:, 0]
     return RigidAxisFit(
         Identified.of(
             [
@@ -232,12 +172,13 @@ def identify_rigid_axis(
         solution.levels,
         solution.fit.condition_number,
         excitation,
-        speed,
-        friction,
-        solution.fit.residuals,
-        friction_curve(speed, friction, equations.stroke, speed_edges(speed)),
-        _position_curves(equations, solution.fit.residuals),
-        _cross_validate(equations, settings.folds),
+        ForceEvidence.of(
+            (equations.regressors[:, 1], equations.position),
+            equations.force - solution.mass * equations.regressors[:, 0],
+            solution.fit.residuals,
+            equations.stroke,
+            _cross_validate(equations, settings.folds),
+        ),
     )
 
 
@@ -547,16 +488,6 @@ _FRICTIONS = (
     ("model.friction", "coulomb_backward", {"coulomb": 1.0, "constant": -1.0}),
     ("machine", "constant_force", {"constant": 1.0}),
 )
-
-
-def _position_curves(equations: _Equations, residual: FloatArray) -> dict[int, FrictionCurve]:
-    position, curves = equations.position, {}
-    edges = np.linspace(position.min(), position.max(), 51)
-    for direction in (1, -1):
-        inside = equations.direction == direction
-        if np.any(inside) and edges[-1] > edges[0]:
-            curves[direction] = friction_curve(position[inside], residual[inside], equations.stroke[inside], edges)
-    return curves
 
 
 def _cross_validate(equations: _Equations, most: int) -> CrossValidation | None:

@@ -143,7 +143,8 @@ class Equations:
     """Weighted equations of the runs: `rows` (m, B) of the base parameters, `torques` (m,), both times the weight.
 
     `joints`, `times` [s], `runs` (m,): the joint, the window's centre and the index of the run of each. `rigid` (m,):
-    the torque of the links, of which the inertias are taken as known; 0 where they are free.
+    the torque of the links, of which the inertias are taken as known; 0 where they are free. `averages` (m, 4), without
+    weight: torque, that of inertia and gravity by the machine's own parameters, speed, position.
     """
 
     rows: FloatArray
@@ -152,6 +153,11 @@ class Equations:
     times: FloatArray
     runs: FloatArray
     rigid: FloatArray
+    averages: FloatArray
+
+    def where(self, chosen: BoolArray) -> Equations:
+        """Return the chosen (m,) equations."""
+        return Equations(*(values[chosen] for values in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +165,8 @@ class RobotFit:
     """The identified model of a robot.
 
     `parameters` (P,): every column of the regressor, those not identified as in the machine; `base` and its `grouping`
-    for all free columns; `condition_number` of the scaled equations; `equations`, weighted by joint, for what further
-    restricts the parameters; `machine` as it was.
+    for all free columns; `condition_number` of the scaled equations; `equations`, times the `weights` (J,) of the
+    joints, for what further restricts the parameters; `machine` as it was.
     """
 
     machine: CoupledMachine
@@ -172,6 +178,7 @@ class RobotFit:
     left_out: LeftOutTorque
     condition_number: float
     equations: Equations
+    weights: FloatArray
 
 
 def identify_robot(
@@ -197,7 +204,7 @@ def identify_robot(
     start = grouping.combination @ known[list(free)]
     bounded = _bounds(regressor.columns, grouping)
     solution = _Solution.of(
-        _windows_of(runs, regressor, grouping, free_groups, half_width), start, bounded, len(machine.joints)
+        windows_of(runs, regressor, grouping.base, free_groups, half_width), start, bounded, len(machine.joints)
     )
     equations = solution.equations
     parameters = known.copy()
@@ -217,6 +224,7 @@ def identify_robot(
         left_out=left_out,
         condition_number=condition,
         equations=equations,
+        weights=solution.weights,
     )
 
 
@@ -274,13 +282,12 @@ class Window:
         return np.asarray(windows @ weights)
 
 
-def resting_windows(run: RobotRun, machine: CoupledMachine, window: Window) -> BoolArray:
-    """Return which windows (K, J) hold a sample of a joint at rest or so slow that its dry friction is unknown."""
-    return window.average(run.slow(machine.stick_speed).astype(np.float64)) > 0.0
-
-
-def _windows_of(
-    runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, free: frozenset[ColumnGroup], half_width: float
+def windows_of(
+    runs: Sequence[RobotRun],
+    regressor: Regressor,
+    columns: Sequence[int],
+    free: frozenset[ColumnGroup],
+    half_width: float,
 ) -> Equations:
     """Return all equations, unweighted; what is not free is subtracted. Raises IdentificationError, UsageError."""
     machine, parts = regressor.machine, []
@@ -288,10 +295,13 @@ def _windows_of(
         if run.joint_count != len(machine.joints):
             raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
         window = Window.of(half_width, run.period)
-        rigid = rigid_torque(run, machine, window) * (ColumnGroup.INERTIAL not in free)
-        torque = window.average(run.torque) - rigid - _known_torque(run, regressor, window, free)
-        rows = np.stack([window_of_column(run, regressor, window, own) for own in grouping.base], axis=2)
-        valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
+        own = _rigid_torque(run, machine, window)
+        rigid = own * (ColumnGroup.INERTIAL not in free)
+        averages = window.average(run.torque), own, window.average(run.speed), window.average(run.position)
+        torque = averages[0] - rigid - _known_torque(run, regressor, window, free)
+        rows = np.stack([_window_of_column(run, regressor, window, column) for column in columns], axis=2)
+        rests = window.average(run.slow(machine.stick_speed).astype(np.float64)) > 0.0
+        valid = ~rests & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
         place, joint = np.nonzero(valid)
         times = run.start + run.period * (place * window.step + len(window.weights) // 2)
         parts.append(
@@ -302,6 +312,7 @@ def _windows_of(
                 times,
                 np.full(len(place), 1.0 * index),
                 rigid[valid],
+                np.stack(averages, axis=2)[valid],
             )
         )
     if not any(len(part[1]) for part in parts):
@@ -311,20 +322,20 @@ def _windows_of(
     return Equations(*(np.concatenate(item) for item in zip(*parts, strict=True)))
 
 
-def window_of_column(run: RobotRun, regressor: Regressor, window: Window, column: int) -> FloatArray:
+def _window_of_column(run: RobotRun, regressor: Regressor, window: Window, column: int) -> FloatArray:
     """Return the windows (K, J) of a column of the regressor: int -w' p + w h dt."""
     momentum, rest = regressor.momentum(column, run.position, run.speed)
     return window.rate(momentum) + window.average(rest)
 
 
-def rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> FloatArray:
+def _rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> FloatArray:
     """Return the windows' torques (K, J) of inertia and gravity, drives included."""
     momentum, velocity_force, gravity = machine.momentum_terms(run.position, run.speed)
     return window.rate(momentum) + window.average(gravity - velocity_force)
 
 
 def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: frozenset[ColumnGroup]) -> FloatArray:
-    """Return the windows' torques (K, J) of friction and drives that are not free, beside those of rigid_torque."""
+    """Return the windows' torques (K, J) of friction and drives that are not free, beside those of _rigid_torque."""
     values = regressor.values
     total = np.zeros_like(window.average(run.position))
     for column, item in enumerate(regressor.columns):
@@ -332,7 +343,7 @@ def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: fro
         contained = item.group is ColumnGroup.DRIVE_INERTIA and ColumnGroup.INERTIAL not in free
         factor = (0.0 if item.group in free else 1.0) - (1.0 if contained else 0.0)
         if item.group is not ColumnGroup.INERTIAL and values[column] and factor:
-            total += factor * values[column] * window_of_column(run, regressor, window, column)
+            total += factor * values[column] * _window_of_column(run, regressor, window, column)
     return total
 
 
@@ -681,10 +692,10 @@ def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> 
     """Return the residuals of each fold by the fit without it, unweighted."""
     equations = solution.equations
     residual = np.empty(len(equations.torques))
-    folds = _folds(equations)
+    folds = folds_of(equations)
     for fold in np.unique(folds):
         own = folds == fold
-        rest = replace(equations, rows=equations.rows[~own], torques=equations.torques[~own])
+        rest = equations.where(~own)
         values = _not_negative(rest, start, _solve(rest, start), is_bounded) if len(rest.torques) else start
         residual[own] = equations.torques[own] - equations.rows[own] @ values
     joints = equations.joints.astype(np.int64)
@@ -693,7 +704,7 @@ def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> 
     return LeftOutTorque(residual * scale, previous, joints, solution.blocks)
 
 
-def _folds(equations: Equations) -> Index:
+def folds_of(equations: Equations) -> Index:
     """Return the fold of each equation (m,): its run, or its fifth of the only one."""
     if len(np.unique(equations.runs)) > 1:
         return equations.runs.astype(np.int64)

@@ -149,7 +149,7 @@ def test_a_real_axis_has_its_published_parameters_to_a_hundredth(method):
 
 @needs_data("emps/DATA_EMPS.mat")
 def test_the_force_of_unseen_strokes_of_a_real_axis_is_predicted():
-    validation = identify_rigid_axis([emps()], 0.0).cross_validation
+    validation = identify_rigid_axis([emps()], 0.0).evidence.cross_validation
     assert validation is not None
     assert (validation.folds, validation.worst.of_runs) == (8, 1)
     assert validation.repeats >= 6

@@ -52,8 +52,8 @@ def test_a_stated_low_pass_is_undone(runs):
     assert fit.total_mass == pytest.approx(plain.total_mass, rel=5e-3)
     assert fit.identified["load_mass"].value == pytest.approx(TRUTH["load_mass"], rel=0.03)
     # The forces of the prediction are without the lag.
-    assert fit.cross_validation is not None and plain.cross_validation is not None
-    assert fit.cross_validation.error == pytest.approx(plain.cross_validation.error, rel=0.1)
+    assert fit.evidence.cross_validation is not None and plain.evidence.cross_validation is not None
+    assert fit.evidence.cross_validation.error == pytest.approx(plain.evidence.cross_validation.error, rel=0.1)
 
 
 def test_an_axis_whose_torque_does_not_lag_keeps_its_mass(runs):

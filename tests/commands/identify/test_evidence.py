@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.axis.friction_curve import friction_curve, speed_edges
+from cdtool.commands.identify.evidence import friction_curve, speed_edges
 
 
 def test_the_curve_of_a_line_is_the_line():
