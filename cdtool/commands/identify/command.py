@@ -19,9 +19,11 @@ from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption,
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
+    from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit
     from cdtool.commands.identify.identifying import IdentifiedMachine
-    from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
+    from cdtool.commands.identify.identifying_robot import RobotIdentification
     from cdtool.commands.identify.joint import JointIdentification
+    from cdtool.commands.identify.robot.drive_gains import LoadedRuns
     from cdtool.execution.workers import Workers
 
 _PAYLOAD = re.compile(r"(?P<mass>[^@:]+?) ?kg(?:@(?P<link>[^:]+))?(?::(?P<centre>.+))?")
@@ -83,7 +85,7 @@ def identify(
 
 def _loaded_runs(logs: Sequence[str], payload: str | None) -> LoadedRuns | None:
     """Return the runs with a payload; None without any. Raises UsageError for one without the other."""
-    from cdtool.commands.identify.identifying_robot import LoadedRuns
+    from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 
     if bool(logs) != (payload is not None):
         raise UsageError("--loaded-logs and --payload belong together", "give both, or neither")
@@ -132,6 +134,8 @@ def _identify_machine(
 
 
 def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path], *, quiet: bool) -> None:
+    from cdtool.commands.identify.words import words_of_robot
+
     for joint in done.joints:
         validation = joint.evidence.cross_validation if joint.evidence else None
         if validation and (left := validation.left_over) > _MUCH_MORE:
@@ -140,29 +144,25 @@ def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Pa
     typer.echo(f"{plain(done.machine)}: identified from {runs}")
     if done.changes and not quiet:
         _show_changes(done)
-    if done.robot is not None:
-        _show_robot(done, done.robot, quiet=quiet)
-    else:
-        for joint in done.joints:
-            _show_axis(joint, is_named=len(done.joints) > 1)
+    if done.robot is not None and not quiet:
+        _show_frictions(done.robot)
+    for joint in done.joints:
+        _show_joint(joint, f"{plain(joint.joint)}: " if len(done.joints) > 1 else "")
+    for line in words_of_robot(done.robot, done.joints, len(done.runs)) if done.robot else ():
+        typer.echo(plain(line))
     _show_files(done, written, targets)
 
 
-def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
-    if is_named:
-        typer.echo(f"joint {plain(joint.joint)}")
-    _show_quality(joint)
-    _show_missing(joint, "")
-    for method, reason in joint.refused.items():
-        typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
-
-
-def _show_missing(joint: JointIdentification, name: str) -> None:
+def _show_joint(joint: JointIdentification, name: str) -> None:
     from cdtool.commands.identify.words import words_of_needs
 
+    if joint.rigid is not None:
+        _show_quality(joint, joint.rigid, name)
     for item in joint.not_identifiable:
         needs = words_of_needs(item.missing)
         typer.echo(f"{name}not identifiable: {item.section}.{item.key}{f': add {needs}' if needs else ''}")
+    for method, reason in joint.refused.items():
+        typer.echo(f"{name}not used: {method.replace('_', '-')}: {plain(reason)}")
 
 
 def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
@@ -181,9 +181,8 @@ def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Seque
         typer.echo("nothing is written: give -o machine.toml")
 
 
-def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: bool) -> None:
-    """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
-    from cdtool.commands.identify.words import words_of_decision, words_of_robot
+def _show_frictions(robot: RobotIdentification) -> None:
+    from cdtool.commands.identify.words import words_of_decision
 
     rows = []
     for joint, friction, floor in robot.rows:
@@ -191,16 +190,8 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: b
         rows.append([joint.joint, joint.units[1], *errors, words_of_decision(friction)])
     headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
     columns = [("joint", "left"), ("unit", "left"), *((heading, "right") for heading in headings), ("used", "left")]
-    if not quiet:
-        say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
-        table(columns, rows)
-    for joint in done.joints:
-        name = plain(joint.joint)
-        _show_missing(joint, f"{name}: ")
-        for reason in joint.refused.values():
-            typer.echo(f"{name}: {plain(reason)}")
-    for line in words_of_robot(robot, done.joints, len(done.runs)):
-        typer.echo(plain(line))
+    say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
+    table(columns, rows)
 
 
 def _show_changes(done: IdentifiedMachine) -> None:
@@ -213,12 +204,11 @@ def _show_changes(done: IdentifiedMachine) -> None:
     table([(heading, "left") for heading in ("key", "old", "new", "standard error", "unit")], rows)
 
 
-def _show_quality(joint: JointIdentification) -> None:
-    validation = joint.evidence.cross_validation if joint.evidence else None
-    if validation is not None:
+def _show_quality(joint: JointIdentification, rigid: RigidAxisFit, name: str) -> None:
+    if validation := rigid.evidence.cross_validation:
         floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
-        typer.echo(f"force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")
-    for level in joint.rigid.levels if joint.rigid else ():
+        typer.echo(f"{name}force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")
+    for level in rigid.levels:
         way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
         force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
-        typer.echo(f"friction {way} at {speed}: {force}")
+        typer.echo(f"{name}friction {way} at {speed}: {force}")

@@ -20,9 +20,10 @@ from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSett
 from cdtool.commands.identify.axis.speed_controller import ControllerSettings, identify_controller
 from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass
 from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification, identify_joints
+from cdtool.commands.identify.identifying_robot import RobotIdentification, identify_joints
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.machine_update import MachineChange, changes_of, described_runs, robot_files, updated_text
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, Runs, find_logs, load_runs, several_logs
@@ -243,9 +244,8 @@ def _identify_robot(
         return None
     loaded = None
     if payload is not None:
-        body = payload.payload(machine)
         paths, _ = read_until(payload.logs, "payload")
-        loaded = _impact_free(paths, machine_file, reading)[1], body
+        loaded = _impact_free(paths, machine_file, reading)[1], payload
     return identify_joints(recordings, machine, given, machine_file.path.parent, loaded)
 
 

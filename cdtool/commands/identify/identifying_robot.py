@@ -18,7 +18,7 @@ from cdtool.commands.identify.estimate import IdentificationError, Identified, M
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
 from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
-from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns, drive_gains
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction, choose_friction
 from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
 from cdtool.commands.identify.robot.robot_dynamics import (
@@ -43,28 +43,6 @@ _MOST_UNEXPLAINED = 0.1
 _REVOLUTE, _PRISMATIC = ("kg m2", "N m", "rad", "N m s/rad"), ("kg", "N", "m", "N s/m")
 # Physical links may raise the residual of least squares by this share.
 _MOST_RISE = 0.1
-
-
-@dataclass(frozen=True)
-class LoadedRuns:
-    """Logs of motion with a known payload: `mass` [kg], fixed to a link, its `centre` of mass in the link's frame [m].
-
-    `centre` None: not known, then it is free. `link`: of the URDF, or "arm" or "forearm"; empty: the link that the last
-    joint moves.
-    """
-
-    logs: tuple[str | Path, ...]
-    mass: float
-    link: str = ""
-    centre: tuple[float, float, float] | None = None
-
-    def payload(self, machine: CoupledMachine) -> Payload:
-        """Return the payload on its link; raises ConfigurationError for a mass that is not above 0."""
-        link = self.link
-        if not link and isinstance(machine, UrdfRobot):
-            last = len(machine.tree.joints) - 1
-            link = next(item.name for item in machine.tree.links if item.joint == last)
-        return Payload(link=link or machine.joints[-1], mass=self.mass, centre=self.centre)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +117,7 @@ def identify_joints(
     machine: CoupledMachine,
     given: Mapping[str, Any],
     folder: Path,
-    loaded: tuple[Sequence[Recording], Payload] | None = None,
+    loaded: tuple[Sequence[Recording], LoadedRuns] | None = None,
 ) -> RobotIdentification:
     """Return what contact-free recordings show of a robot.
 

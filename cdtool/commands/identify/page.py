@@ -92,7 +92,6 @@ def _excitation_table(joints: Sequence[JointIdentification]) -> Table:
         (Heading("unit"), lambda item: Cell(item[0].units[2])),
         (Heading("speeds that are held [/s]"), lambda item: Cell(listed_numbers(item[1].speeds, 2) or NOTHING)),
         (Heading("highest speed [/s]", numeric=True), lambda item: number_cell(item[1].highest_speed)),
-        (Heading("highest acceleration [/s²]", numeric=True), lambda item: number_cell(item[1].highest_acceleration)),
         (Heading("acceleration, RMS [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration)),
         (Heading("of which noise [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration_noise)),
         (Heading("forward"), lambda item: Cell(percent(item[1].forward_share) if item[1].moving_time else NOTHING)),
@@ -180,18 +179,7 @@ def _friction_section(robot: RobotIdentification) -> PageSection:
         ),
     )
     title = "Torque that is not explained in what was left out of the fit, RMS"
-    tables = (tabulate("torque", title, fields, rows), _forms_table(robot))
-    return PageSection("Friction of the joints", tables)
-
-
-def _forms_table(robot: RobotIdentification) -> Table:
-    rows = []
-    for joint, friction, _ in robot.rows:
-        for form, error in friction.errors.items():
-            tone = "good" if form is friction.form else ""
-            rows.append([name_cell(visible(joint.joint)), Cell(form.value, tone=tone), number_cell(error)])
-    columns = (Heading("joint"), Heading("form of the friction"), Heading("RMS error", numeric=True))
-    return Table("forms", "All forms that were compared", columns, rows)
+    return PageSection("Friction of the joints", (tabulate("torque", title, fields, rows),))
 
 
 def _inertia_section(found: InertiaIdentification) -> PageSection:

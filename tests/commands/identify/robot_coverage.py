@@ -17,7 +17,7 @@ import numpy as np
 import cdtool
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.commands.identify.identifying_robot import LoadedRuns
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 from tests.synthetic.strange_robots import GRAVITY, KINDS, LOGS, Link, carrying, robot, write_log, write_machine
 
 COVERED = 1.96

@@ -15,8 +15,8 @@ from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.files.strict_json import strict_json
 from cdtool.commands.identify.estimate import IdentificationError, Missing
 from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.commands.identify.identifying_robot import LoadedRuns
 from cdtool.commands.identify.robot.consistent_inertia import is_consistent
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
 from cdtool.commands.identify.robot.robot_regressor import body_parameters, regressor_of, with_bodies
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run

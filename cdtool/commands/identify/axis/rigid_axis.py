@@ -443,22 +443,10 @@ def _load_mass(
     return NotIdentifiable("machine", "load_mass", tuple(missing), numbers)
 
 
-def _speed_numbers(solution: _AxisSolution, excitation: Excitation) -> dict[str, float]:
-    numbers = {
-        "speeds": float(len(excitation.speeds)),
-        "speeds_needed": float(SPEEDS_NEEDED),
-        "condition_number": solution.fit.condition_number,
-    }
-    for level in solution.levels:
-        side = "forward" if level.direction > 0 else "backward"
-        numbers |= {f"{side}_speed": level.speed, f"{side}_friction": level.force}
-    return numbers
-
-
 def _frictions(
     solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
 ) -> list[Estimate | NotIdentifiable]:
-    numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
+    numbers = {"speeds": float(len(excitation.speeds)), "forward_share": excitation.forward_share}
     speeds = () if "viscous" in solution.names else (Missing.SECOND_SPEED,)
     reversals = (Missing.REVERSALS,) if excitation.is_one_way else ()
     force, unit = settings.units[1], f"{settings.units[1]} s/{settings.units[2]}"

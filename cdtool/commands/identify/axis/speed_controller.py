@@ -142,22 +142,15 @@ class ControllerFit:
     """An identified controller.
 
     `controller`: to simulate with; None if the speed gain is not identifiable. `kind`: its structure. `residual_rms`
-    [N, N m]: of the command, or of the measured force where that was compared (`is_command`). `delay_samples`: may be
-    -1 in a log that writes a command before the error from which it was computed. `lag` [s]: from the command to the
-    measured torque, through drive and torque sensor; NaN if unknown. `speed_feed_forward`: whether the position
-    reference's derivative is added to the speed reference. `speed_from_position`: whether the speed was computed from
-    the position because no logged speed explains the command. `comparison`: None without references or gains.
+    [N, N m]: of the command, or of the measured force where that was compared. `lag` [s]: from the command to the
+    measured torque, through drive and torque sensor; NaN if unknown. `comparison`: None without references or gains.
     """
 
     identified: Identified
     controller: Controller | None
     kind: ControllerKind
     residual_rms: float
-    is_command: bool = True
-    delay_samples: int = 0
     lag: float = math.nan
-    speed_feed_forward: bool = False
-    speed_from_position: bool = False
     comparison: ControllerComparison | None = None
 
 
@@ -487,14 +480,13 @@ class _Source:
 
     `is_command`: the output is the logged command, else the measured torque. `from_position`: the speed is the
     position's difference, to be filtered, else the logged one. `has_position_loop`: a position error is known.
-    `has_speed_reference`: a speed reference is known. `feed_forward`: it is the position reference's difference.
+    `has_speed_reference`: a speed reference is known.
     """
 
     is_command: bool
     from_position: bool = False
     has_position_loop: bool = False
     has_speed_reference: bool = False
-    feed_forward: bool = False
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -527,9 +519,7 @@ def _sources(runs: Sequence[AxisRun]) -> list[_Source]:
         return []
     ways = ([False] if logged("speed") else []) + ([True] if logged("position") else [])
     return [
-        _Source(logged("reference_torque"), from_position, loop, logged("reference_speed"), feed_forward)
-        for from_position in ways
-        for feed_forward in ((False,) if logged("reference_speed") else (False, True))
+        _Source(logged("reference_torque"), from_position, loop, logged("reference_speed")) for from_position in ways
     ]
 
 
@@ -570,7 +560,7 @@ def _run_pieces(run: AxisRun, source: _Source, settings: ControllerSettings) -> 
     demanded = _rate(run, reference)
     speed_reference = _values(run, "reference_speed", source.has_speed_reference)
     rows = (
-        speed_reference + demanded if source.feed_forward else speed_reference,
+        speed_reference,
         reference - position if source.has_position_loop else np.zeros(len(run)),
         _rate(run, position) if source.from_position else _values(run, "speed"),
         _values(run, source.output),
@@ -918,11 +908,7 @@ def _reported(
         controller=controller,
         kind=_kind(model),
         residual_rms=fit.residual_rms,
-        is_command=source.is_command,
-        delay_samples=int(model.values["delay_samples"]),
         lag=lag.value,
-        speed_feed_forward=source.feed_forward,
-        speed_from_position=source.from_position,
         comparison=_comparison(fit, source.is_command) if controller is not None else None,
     )
 

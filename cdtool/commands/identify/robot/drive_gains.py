@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -53,16 +54,17 @@ _WORST_ERROR = 0.2
 _FRICTION = (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Payload:
-    """A known body fixed to a link: `mass` [kg], `centre` of mass (3) in the link's frame [m], None if not known.
+@dataclass(frozen=True)
+class LoadedRuns:
+    """Logs of motion with a known payload: `mass` [kg], fixed to a link, its `centre` of mass in the link's frame [m].
 
-    A planar arm's links are "arm" and "forearm", x along the link. Raises ConfigurationError for a mass that is not
-    above 0.
+    `centre` None: not known, then it is free. `link`: of the URDF, or "arm" or "forearm", x along it; empty: the link
+    that the last joint moves. Raises ConfigurationError for a mass that is not above 0.
     """
 
-    link: str
+    logs: tuple[str | Path, ...]
     mass: float
+    link: str = ""
     centre: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -73,7 +75,7 @@ class Payload:
 def drive_gains(
     unloaded: Sequence[RobotRun],
     loaded: Sequence[RobotRun],
-    payload: Payload,
+    payload: LoadedRuns,
     machine: CoupledMachine,
     scale: Sequence[float],
 ) -> Identified:
@@ -169,13 +171,14 @@ def _basis(rows: FloatArray) -> FloatArray:
     return np.asarray(left[:, values > _UNSEEN * values[0]])
 
 
-def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Payload) -> _PayloadColumns:
+def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: LoadedRuns) -> _PayloadColumns:
     """Return what a payload adds to the regressor: its mass, first moments and inertias are columns of its link."""
     unit = np.eye(len(regressor.columns))
     if isinstance(regressor, TreeRegressor):
-        link = next((item for item in regressor.tree.links if item.name == payload.link), None)
-        if link is None or link.joint < 0:
-            moving = [item.name for item in regressor.tree.links if item.joint >= 0]
+        moving = {item.name: item for item in regressor.tree.links if item.joint >= 0}
+        last = next(item for item in moving.values() if item.joint == len(regressor.tree.joints) - 1)
+        link = moving.get(payload.link) if payload.link else last
+        if link is None:
             raise ConfigurationError(f"payload: no moving link '{payload.link}'", nearest(payload.link, moving))
         own = unit[10 * link.joint : 10 * (link.joint + 1)]
         mass, moments, inertias = own[0], own[1:4], own[4:]
@@ -183,11 +186,12 @@ def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Pay
         centre = None if payload.centre is None else turn @ np.array(payload.centre) + shift
     else:
         assert isinstance(machine, PlanarArm)
-        if payload.link not in machine.joints:
+        name = payload.link or machine.joints[-1]
+        if name not in machine.joints:
             raise ConfigurationError(f"payload: unknown link '{payload.link}'", nearest(payload.link, machine.joints))
         if payload.centre is not None and any(payload.centre[1:]):
             raise ConfigurationError("payload: its centre is off the link's axis", "give y = z = 0")
-        place, length, gravity = machine.joints.index(payload.link), machine.link_length, machine.gravity_acceleration
+        place, length, gravity = machine.joints.index(name), machine.link_length, machine.gravity_acceleration
         # On the forearm its mass moves with the end of the arm, and couples both links.
         mass = place * (length**2 * unit[0] + length * gravity * unit[3])
         moments = (place * length * unit[2] + gravity * unit[3 + place])[np.newaxis]

@@ -31,7 +31,6 @@ class FrictionForm(Enum):
     """What of a joint's friction is new, the inertias of the links as they were unless stated."""
 
     PREVIOUS = "as before"
-    OFFSET = "constant force"
     FRICTION_ALONE = "viscous and Coulomb friction"
     FRICTION = "viscous and Coulomb friction, constant force"
     DRIVE_INERTIA = "viscous and Coulomb friction, constant force, drive inertia"
@@ -42,7 +41,6 @@ class FrictionForm(Enum):
         """Return the groups of parameters that are free in its fit."""
         friction = (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
         return {
-            FrictionForm.OFFSET: (ColumnGroup.CONSTANT,),
             FrictionForm.FRICTION_ALONE: friction,
             FrictionForm.FRICTION: (*friction, ColumnGroup.CONSTANT),
             FrictionForm.DRIVE_INERTIA: (ColumnGroup.DRIVE_INERTIA, *friction, ColumnGroup.CONSTANT),
@@ -139,7 +137,7 @@ def choose_friction(
     return tuple(joints), fits
 
 
-_TRIED = (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE, FrictionForm.OFFSET, FrictionForm.DRIVE_INERTIA)
+_TRIED = (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE, FrictionForm.DRIVE_INERTIA)
 
 
 def _of_joint(
@@ -187,11 +185,9 @@ def _compared(
 ) -> FrictionForm | None:
     """Return the form that predicts best, with a drive inertia only if that is clear; None without any."""
     simple = [form for form in (FrictionForm.FRICTION_ALONE, FrictionForm.FRICTION) if form in errors]
-    chosen = FrictionForm.OFFSET if FrictionForm.OFFSET in errors else None
-    if simple:
-        chosen = min(simple, key=lambda form: errors[form])
-    if chosen is None:
+    if not simple:
         return None
+    chosen = min(simple, key=lambda form: errors[form])
     drive = left_out.get(FrictionForm.DRIVE_INERTIA)
     if drive is not None and drive.is_better(joint, left_out[chosen].of_joint(joint), 2.0):
         return FrictionForm.DRIVE_INERTIA

@@ -32,7 +32,6 @@ from cdtool.commands.identify.estimate import (
 from cdtool.commands.identify.robot.base_parameters import (
     BaseParameterSet,
     Grouping,
-    Range,
     column_scale,
     condition_number,
     group_columns,
@@ -209,10 +208,9 @@ def identify_robot(
     equations = solution.equations
     parameters = known.copy()
     parameters[list(grouping.base)] += solution.values - start
-    transfer = _Transfer.of(runs, regressor, grouping, solution)
-    base = _base_set(regressor.columns, grouping, solution, transfer)
+    base = _base_set(runs, regressor, grouping, solution)
     condition = condition_number(equations.rows)
-    judge = _Judge(runs, machine, regressor.columns, grouping, base, transfer, condition, solution)
+    judge = _Judge(runs, machine, regressor.columns, grouping, base, condition, solution)
     left_out = _left_out(solution, start, bounded)
     return RobotFit(
         machine=machine,
@@ -514,44 +512,6 @@ def _jackknife(equations: Equations, values: FloatArray, blocks: Index) -> Float
     return np.asarray(factor * changes.T @ changes)
 
 
-@dataclass(frozen=True, eq=False)
-class _Transfer:
-    """What the equations are worth for other motion: random poses at the speeds and accelerations of the runs.
-
-    `excitation` (B,): the independent part of each base column, per window, relative to that of random motion.
-    `uncertainty` (B,): the standard error of a parameter as a share of the torque in random motion, of the joint where
-    it is largest; `together`: that of all parameters.
-    """
-
-    excitation: FloatArray
-    uncertainty: FloatArray
-    together: float
-
-    @classmethod
-    def of(cls, runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, solution: _Solution) -> _Transfer:
-        machine = regressor.machine
-        stick = 10.0 * np.array(machine.stick_speed)
-        speed = np.max([_percentile(run.speed) for run in runs], axis=0)
-        acceleration = np.max([_percentile(run.acceleration()) for run in runs], axis=0)
-        limits = Range(tuple(np.maximum(speed, stick).tolist()), tuple(np.maximum(acceleration, stick).tolist()))
-        random = random_rows(regressor, grouping.base, limits).reshape(-1, len(stick), len(grouping.base))
-        flat = (random * solution.weights[:, np.newaxis]).reshape(-1, len(grouping.base))
-        equations = solution.equations
-        windows = len(np.unique(np.stack((equations.runs, equations.times)), axis=1).T)
-        wanted = independent_norms(flat) / math.sqrt(len(random))
-        seen = independent_norms(equations.rows) / math.sqrt(windows)
-        excitation = np.divide(seen, wanted, out=np.zeros_like(seen), where=wanted > 0.0)
-        # The torque of a joint, as a scale: what the model says, and at least what the runs had.
-        torque = np.sqrt(np.mean((random @ solution.values) ** 2, axis=0))
-        logged = np.sqrt(np.nanmean(np.concatenate([run.torque for run in runs]) ** 2, axis=0))
-        scale = np.maximum(torque, np.nan_to_num(logged)) + 1e-300
-        covariance = np.nan_to_num(solution.covariance, posinf=1e300)
-        single = np.sqrt(np.mean(random**2, axis=0)) * np.sqrt(np.diag(covariance)) / scale[:, np.newaxis]
-        variance = np.mean(np.einsum("njb,bc,njc->nj", random, covariance, random, optimize=True), axis=0)
-        together = float(np.max(np.sqrt(np.maximum(variance, 0.0)) / scale))
-        return cls(excitation, np.max(single, axis=0), together)
-
-
 def _percentile(values: FloatArray) -> FloatArray:
     """Return the 99th percentile of |values| of each joint (J,); 0 without values."""
     high = np.zeros(values.shape[1])
@@ -562,18 +522,39 @@ def _percentile(values: FloatArray) -> FloatArray:
 
 
 def _base_set(
-    columns: tuple[RegressorColumn, ...], grouping: Grouping, solution: _Solution, transfer: _Transfer
+    runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, solution: _Solution
 ) -> BaseParameterSet:
-    inertial = [columns[i].group is ColumnGroup.INERTIAL for i in grouping.base]
-    excited = transfer.excitation >= np.where(inertial, _EXCITED_INERTIAL, _EXCITED)
-    certain = transfer.uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT)
+    """Return the base parameters, and what they are worth for other motion of the same speeds and accelerations."""
+    stick = 10.0 * np.array(regressor.machine.stick_speed)
+    speed = np.max([_percentile(run.speed) for run in runs], axis=0)
+    acceleration = np.max([_percentile(run.acceleration()) for run in runs], axis=0)
+    limits = np.maximum(speed, stick), np.maximum(acceleration, stick)
+    random = random_rows(regressor, grouping.base, *limits).reshape(-1, len(stick), len(grouping.base))
+    flat = (random * solution.weights[:, np.newaxis]).reshape(-1, len(grouping.base))
+    equations = solution.equations
+    windows = len(np.unique(np.stack((equations.runs, equations.times)), axis=1).T)
+    wanted = independent_norms(flat) / math.sqrt(len(random))
+    seen = independent_norms(equations.rows) / math.sqrt(windows)
+    excitation = np.divide(seen, wanted, out=np.zeros_like(seen), where=wanted > 0.0)
+    # The torque of a joint, as a scale: what the model says, and at least what the runs had.
+    torque = np.sqrt(np.mean((random @ solution.values) ** 2, axis=0))
+    logged = np.sqrt(np.nanmean(np.concatenate([run.torque for run in runs]) ** 2, axis=0))
+    scale = np.maximum(torque, np.nan_to_num(logged)) + 1e-300
+    covariance = np.nan_to_num(solution.covariance, posinf=1e300)
+    single = np.sqrt(np.mean(random**2, axis=0)) * np.sqrt(np.diag(covariance)) / scale[:, np.newaxis]
+    uncertainty = np.max(single, axis=0)
+    variance = np.mean(np.einsum("njb,bc,njc->nj", random, covariance, random, optimize=True), axis=0)
+    inertial = [regressor.columns[i].group is ColumnGroup.INERTIAL for i in grouping.base]
+    excited = excitation >= np.where(inertial, _EXCITED_INERTIAL, _EXCITED)
+    certain = uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT)
     trusted = excited & certain & (solution.block_count >= _FEWEST_BLOCKS)
     return BaseParameterSet(
-        names=tuple(grouping.name(row, columns) for row in range(len(grouping.base))),
+        names=tuple(grouping.name(row, regressor.columns) for row in range(len(grouping.base))),
         values=solution.values,
         covariance=solution.covariance,
-        excitation=transfer.excitation,
-        uncertainty=transfer.uncertainty,
+        excitation=excitation,
+        uncertainty=uncertainty,
+        together=float(np.max(np.sqrt(np.maximum(variance, 0.0)) / scale)),
         identifiable=tuple(trusted.tolist()),
     )
 
@@ -587,7 +568,6 @@ class _Judge:
     columns: tuple[RegressorColumn, ...]
     grouping: Grouping
     base: BaseParameterSet
-    transfer: _Transfer
     condition: float
     solution: _Solution
 
@@ -664,7 +644,7 @@ class _Judge:
         if not inertial:
             return []
         unexcited = [row for row in inertial if not self.base.identifiable[row]]
-        is_certain = self.transfer.together <= _UNCERTAIN_TORQUE
+        is_certain = self.base.together <= _UNCERTAIN_TORQUE
         if not unexcited and is_certain and self.condition <= _WORST_CONDITION:
             return []
         few_blocks = self.solution.block_count < _FEWEST_BLOCKS
@@ -673,7 +653,7 @@ class _Judge:
             "base_parameters": float(len(inertial)),
             "not_determined": float(len(unexcited)),
             "least_excitation": float(np.min(self.base.excitation[inertial])),
-            "uncertain_torque_share": self.transfer.together,
+            "uncertain_torque_share": self.base.together,
             "blocks": float(self.solution.block_count),
         }
         needed = (Missing.OTHER_MOTION, Missing.MORE_RECORDINGS) if few_blocks else (Missing.OTHER_MOTION,)
