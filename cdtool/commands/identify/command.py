@@ -185,10 +185,10 @@ def _show_frictions(robot: RobotIdentification) -> None:
     from cdtool.commands.identify.words import words_of_decision
 
     rows = []
-    for joint, friction, floor in robot.rows:
-        errors = [number(item) for item in (friction.torque, friction.before, friction.after, floor)]
+    for joint, friction in robot.rows:
+        errors = [number(item) for item in (friction.torque, friction.before, friction.after)]
         rows.append([joint.joint, joint.units[1], *errors, words_of_decision(friction)])
-    headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
+    headings = ("torque", "old\nfriction", "new\nfriction")
     columns = [("joint", "left"), ("unit", "left"), *((heading, "right") for heading in headings), ("used", "left")]
     say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
     table(columns, rows)

@@ -41,7 +41,6 @@ class Missing(Enum):
     MORE_RECORDINGS = "more recordings"
     HIGHER_RATE = "a higher sampling rate"
     GENTLER_START = "starts with less acceleration, which wind the drive up less"
-    POSITION = "the position channel"
     FINER_MOTION = "a speed or position channel with less noise or finer steps"
     OTHER_CONTROLLER = "references of a P or PI speed controller, alone or under a P position controller"
     TORQUE_FILTER = "the time constant of the torque's low-pass in [model.sensors]"

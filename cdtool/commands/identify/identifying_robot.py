@@ -20,7 +20,6 @@ from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
 from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
 from cdtool.commands.identify.robot.drive_gains import LoadedRuns, drive_gains
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction, choose_friction
-from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
 from cdtool.commands.identify.robot.robot_dynamics import (
     RobotFit,
     identify_robot,
@@ -74,15 +73,13 @@ class RobotIdentification:
     joints: tuple[JointIdentification, ...]
     inertias: InertiaIdentification
     gains: Identified | None
-    repeated: RepeatedRuns
     unexplained_share: float
     urdf: str
 
     @property
-    def rows(self) -> list[tuple[JointIdentification, JointFriction, float]]:
-        """Return each joint with its friction and the deviation between equal runs, as all outputs show them."""
-        floors = self.repeated.floor.tolist()
-        return [(joint, joint.robot, floor) for joint, floor in zip(self.joints, floors, strict=True) if joint.robot]
+    def rows(self) -> list[tuple[JointIdentification, JointFriction]]:
+        """Return each joint with its friction, as all outputs show them."""
+        return [(joint, joint.robot) for joint in self.joints if joint.robot]
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -106,8 +103,6 @@ class RobotIdentification:
                 "estimates": [item.summary for item in self.gains.estimates],
                 "not_identifiable": [item.summary for item in self.gains.not_identifiable],
             },
-            "run_to_run_torque": self.repeated.floor.tolist(),
-            "repeated_pairs": self.repeated.pairs,
             "unexplained_share": self.unexplained_share,
         }
 
@@ -169,14 +164,13 @@ def identify_joints(
     refused: tuple[Mapping[str, str], ...] = ({},) * len(joints)
     if not inertias.is_new:
         joints, refused = _refuse_unexplained(joints, machine)
-    floor = repeated_runs(runs)
     fits = {**fits, FrictionForm.WITH_INERTIAS: whole}
     identified = []
     for excitation, friction, reasons in zip(joint_excitations(runs, machine), joints, refused, strict=True):
         shown = None
         if friction.compared is not None:
             is_new = friction.answer is FrictionAnswer.NEW
-            shown = joint_evidence(friction.joint, fits[friction.compared], is_new, explained.runs, floor)
+            shown = joint_evidence(friction.joint, fits[friction.compared], is_new, explained.runs)
         identified.append(
             JointIdentification(
                 machine.joints[friction.joint],
@@ -187,7 +181,7 @@ def identify_joints(
                 excitation=excitation,
             )
         )
-    return RobotIdentification(tuple(identified), inertias, gains, floor, explained.share, urdf)
+    return RobotIdentification(tuple(identified), inertias, gains, explained.share, urdf)
 
 
 def _runs_of(recordings: Sequence[Recording]) -> tuple[list[RobotRun], str]:

@@ -172,7 +172,6 @@ def _friction_section(robot: RobotIdentification) -> PageSection:
         (Heading("torque, RMS", numeric=True), lambda item: number_cell(item[1].torque)),
         (Heading("old friction", numeric=True), lambda item: number_cell(item[1].before)),
         (Heading("new friction", numeric=True), lambda item: number_cell(item[1].after)),
-        (Heading("between equal runs", numeric=True), lambda item: number_cell(item[2])),
         (
             Heading("used"),
             lambda item: Cell(words_of_decision(item[1]), tone="good" if item[1].answer is FrictionAnswer.NEW else ""),

@@ -34,13 +34,9 @@ def words_of_decision(friction: JointFriction) -> str:
 
 def words_of_base_set(item: NotIdentifiable) -> str:
     """Return why the full set of a robot's base parameters is not identifiable, with the numbers that show it."""
-    condition = item.numbers.get("condition_number", math.nan)
-    numbers = [_conditioned(condition)]
-    count, missing = (int(item.numbers.get(key, 0.0)) for key in ("base_parameters", "not_determined"))
-    if count:
-        numbers.append(f"{missing} of {count} not determined")
-    uncertain = item.numbers.get("uncertain_torque_share", math.nan)
-    if 0.0 < uncertain < 1.0:
+    count, missing = item.numbers["base_parameters"], item.numbers["not_determined"]
+    numbers = [_conditioned(item.numbers["condition_number"]), f"{missing:.0f} of {count:.0f} not determined"]
+    if 0.0 < (uncertain := item.numbers["uncertain_torque_share"]) < 1.0:
         numbers.append(f"together uncertain by {percent(uncertain)} of a joint's torque in other motion")
     others = words_of_needs([kind for kind in item.missing if kind is not Missing.OTHER_MOTION])
     needs = f"a motion of all joints at once{f', {others}' if others else ''}"
@@ -69,8 +65,6 @@ def words_of_robot(robot: RobotIdentification, joints: Sequence[JointIdentificat
         )
     if runs < FEWEST_RUNS:
         lines.append("the standard errors do not contain how friction differs from day to day: add logs of three days")
-    if not robot.repeated.pairs:
-        lines.append("no motion is repeated: the deviation between equal runs is not known")
     return lines
 
 
@@ -104,7 +98,6 @@ _REASONS: Mapping[Missing, str] = {
         "P and PI control, alone or under a position controller, do not explain the controller's output (feed-forward, "
         "or references of another log?)"
     ),
-    Missing.POSITION: "no position channel: a delay of the speed channel looks like damping",
 }
 # Numbers of a parameter that is not identifiable, as they are shown.
 _NUMBERS: Mapping[str, str] = {

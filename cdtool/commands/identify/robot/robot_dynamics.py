@@ -442,16 +442,11 @@ def jackknife_blocks(equations: Equations, residual: FloatArray) -> Index:
             chosen = own & (equations.joints == joint)
             length = max(length, _CORRELATION_TIMES * _correlation_time(equations.times[chosen], residual[chosen]))
     length = max(_SHORTEST_BLOCK, min(length, duration / _FEWEST_BLOCKS))
-    labels = np.stack((equations.runs, np.floor((equations.times - _starts(equations)) / length)), axis=1)
+    runs = np.unique(equations.runs, return_inverse=True)[1].ravel()
+    first = np.full(int(runs.max()) + 1, np.inf)
+    np.minimum.at(first, runs, equations.times)
+    labels = np.stack((equations.runs, np.floor((equations.times - first[runs]) / length)), axis=1)
     return np.asarray(np.unique(labels, axis=0, return_inverse=True)[1]).ravel()
-
-
-def _starts(equations: Equations) -> FloatArray:
-    starts = np.empty(len(equations.times))
-    for run in np.unique(equations.runs):
-        own = equations.runs == run
-        starts[own] = equations.times[own].min()
-    return starts
 
 
 def _correlation_time(times: FloatArray, residual: FloatArray) -> float:

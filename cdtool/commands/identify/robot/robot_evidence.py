@@ -10,7 +10,6 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.commands.identify.axis.excitation import Excitation, excitation_of
 from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, UnseenRun
-from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns
 from cdtool.commands.identify.robot.robot_dynamics import RobotFit, folds_of
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
@@ -21,13 +20,11 @@ from cdtool.machines.coupled import CoupledMachine
 _MOVING_SHARE, _HALF_WIDTH = 0.9, 0.1
 
 
-def joint_evidence(
-    joint: int, fit: RobotFit, is_new: bool, runs: Sequence[RobotRun], repeated: RepeatedRuns
-) -> ForceEvidence | None:
+def joint_evidence(joint: int, fit: RobotFit, is_new: bool, runs: Sequence[RobotRun]) -> ForceEvidence | None:
     """Return what a fit to these runs shows of a joint, its model or, unless `is_new`, the machine's own one.
 
-    Each part of the logs is predicted by a fit without it; the run is the one that is predicted worst. None without
-    motion of the joint.
+    Each part of the logs is predicted by a fit without it; the run is the one that is predicted worst; strokes that
+    repeat each other are not looked for. None without motion of the joint.
     """
     equations, left_out = fit.equations, fit.left_out
     own = np.flatnonzero(left_out.joints == joint)
@@ -41,7 +38,7 @@ def joint_evidence(
     time, force = equations.times[own][of_worst] - runs[worst].start, measured[of_worst]
     shown = UnseenRun(runs[worst].name, time, force, force - unseen[of_worst], len(runs))
     error, folds = float(np.sqrt(np.mean(unseen**2))), len(np.unique(folds_of(equations)))
-    validation = CrossValidation(error, folds, float(repeated.floor[joint]), repeated.pairs, shown)
+    validation = CrossValidation(error, folds, math.nan, 0, shown)
     friction, residual = measured - inertia, unseen
     if is_new:
         rows = equations.rows[own] / fit.weights[joint]
