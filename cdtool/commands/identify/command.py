@@ -185,7 +185,9 @@ def _show_frictions(robot: RobotIdentification) -> None:
     from cdtool.commands.identify.words import words_of_decision
 
     rows = []
-    for joint, friction in robot.rows:
+    for joint in robot.joints:
+        friction = joint.robot
+        assert friction is not None
         errors = [number(item) for item in (friction.torque, friction.before, friction.after)]
         rows.append([joint.joint, joint.units[1], *errors, words_of_decision(friction)])
     headings = ("torque", "old\nfriction", "new\nfriction")

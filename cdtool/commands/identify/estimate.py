@@ -95,8 +95,6 @@ class NotIdentifiable:
     @property
     def relative_error(self) -> float:
         """Return the relative standard error of a parameter that is too uncertain; NaN where it is not known."""
-        if "relative_standard_error" in self.numbers:
-            return self.numbers["relative_standard_error"]
         value = abs(self.numbers.get("value", 0.0))
         return self.numbers.get("standard_error", math.nan) / value if value > 0.0 else math.nan
 

@@ -26,9 +26,6 @@ class FrictionCurve:
     standard_error: FloatArray
     count: IntArray
 
-    def __len__(self) -> int:
-        return len(self.abscissa)
-
 
 def friction_curve(abscissa: FloatArray, force: FloatArray, stroke: IntArray, edges: FloatArray) -> FrictionCurve:
     """Return the mean force in intervals of speed or position.

@@ -22,7 +22,7 @@ from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.identifying_robot import RobotIdentification, identify_joints
 from cdtool.commands.identify.joint import JointIdentification
-from cdtool.commands.identify.machine_update import MachineChange, changes_of, described_runs, robot_files, updated_text
+from cdtool.commands.identify.machine_update import MachineChange, changes_of, robot_files, updated_text
 from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
@@ -179,7 +179,7 @@ def identify(
             "see docs/identification.md for the motion that is needed",
         )
     changes = changes_of(machine_file.machine, given, estimates, together)
-    origin = described_runs(len(recordings), date.today().isoformat())
+    origin = f"{counted(len(recordings), 'run')}, {date.today().isoformat()}"
     text = updated_text(read_text(path, ConfigurationError), changes, origin)
     identified = IdentifiedMachine(
         machine_file.machine.name,

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.remote.remote_path import joined
@@ -75,11 +74,6 @@ class RobotIdentification:
     gains: Identified | None
     unexplained_share: float
     urdf: str
-
-    @property
-    def rows(self) -> list[tuple[JointIdentification, JointFriction]]:
-        """Return each joint with its friction, as all outputs show them."""
-        return [(joint, joint.robot) for joint in self.joints if joint.robot]
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -269,13 +263,13 @@ def _predicts_better(fit: RobotFit, joints: Sequence[JointFriction]) -> bool:
     And no joint worse than new friction alone does.
     """
     moving = [item.joint for item in joints if math.isfinite(item.errors[FrictionForm.PREVIOUS])]
-    previous: dict[int, FloatArray] = {joint: fit.left_out.of_joint(joint, is_previous=True) for joint in moving}
-    if any(fit.left_out.is_worse(joint, previous[joint], 1.0) for joint in moving):
+    gains = [fit.left_out.gain(joint) for joint in moving]
+    if any(gain < -1.0 for gain in gains):
         return False
     new = [fit.left_out.error(joint) for joint in moving]
     alone = [joints[joint].errors[joints[joint].form] for joint in moving]
-    gain = sum(math.log(max(error, 1e-300) / max(own, 1e-300)) for error, own in zip(new, alone, strict=True))
-    return gain < 0.0 and any(fit.left_out.is_better(joint, previous[joint], 1.0) for joint in moving)
+    worse = sum(math.log(max(error, 1e-300) / max(own, 1e-300)) for error, own in zip(new, alone, strict=True))
+    return worse < 0.0 and any(gain > 1.0 for gain in gains)
 
 
 def _new_urdf(

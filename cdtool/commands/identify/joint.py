@@ -146,7 +146,6 @@ def _of_axis(joint: JointIdentification) -> dict[str, Any]:
         "two_mass": two_mass
         and {
             "condition_number": two_mass.condition_number,
-            "relative_error": two_mass.relative_error,
             "largest_wind_up": two_mass.largest_wind_up,
         },
         "controller": controller and {"kind": controller.kind.value, "residual_rms": controller.residual_rms},

@@ -90,7 +90,7 @@ def _excitation_table(joints: Sequence[JointIdentification]) -> Table:
     fields = (
         (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
         (Heading("unit"), lambda item: Cell(item[0].units[2])),
-        (Heading("speeds that are held [/s]"), lambda item: Cell(listed_numbers(item[1].speeds, 2) or NOTHING)),
+        (Heading("speeds that are held [/s]"), lambda item: Cell(listed_numbers(item[1].speeds) or NOTHING)),
         (Heading("highest speed [/s]", numeric=True), lambda item: number_cell(item[1].highest_speed)),
         (Heading("acceleration, RMS [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration)),
         (Heading("of which noise [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration_noise)),
@@ -165,7 +165,7 @@ def _robot_sections(done: IdentifiedMachine) -> list[PageSection]:
 
 
 def _friction_section(robot: RobotIdentification) -> PageSection:
-    rows = robot.rows
+    rows = [(joint, joint.robot) for joint in robot.joints if joint.robot]
     fields = (
         (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
         (Heading("unit"), lambda item: Cell(item[0].units[1])),

@@ -14,14 +14,9 @@ from cdtool.commands.identify.robot.robot_dynamics import FEWEST_RUNS
 from cdtool.report.number_text import number, percent
 
 
-def short_number(value: float, significant: int = 3) -> str:
-    """Return a number with few significant digits and without an exponent; a dash for one that is not finite."""
-    return digits(float(f"{value:.{significant}g}")) if math.isfinite(value) else "-"
-
-
-def listed_numbers(values: tuple[float, ...], significant: int = 3) -> str:
-    """Return numbers as 0.06, 0.11 and 0.2."""
-    texts = [short_number(value, significant) for value in values]
+def listed_numbers(values: tuple[float, ...]) -> str:
+    """Return numbers with two digits as 0.06, 0.11 and 0.2."""
+    texts = [digits(float(f"{value:.2g}")) for value in values]
     return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
@@ -53,7 +48,7 @@ def words_of_robot(robot: RobotIdentification, joints: Sequence[JointIdentificat
     if inertias.refused:
         lines.append(f"inertias kept: {inertias.refused}")
     if inertias.is_new:
-        count = len(inertias.base)
+        count = len(inertias.base.names)
         lines.append(f"new inertias: {counted(count, 'base parameter')}, {_conditioned(inertias.condition_number)}")
     for item in robot.gains.not_identifiable if robot.gains else ():
         name = joints[item.joint].joint

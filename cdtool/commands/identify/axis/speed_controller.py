@@ -249,10 +249,6 @@ class _Fit:
         return self.residual_rms < _ROUNDING * float(np.std(self.sections.output))
 
     @property
-    def explains_all(self) -> bool:
-        return self.residual_rms**2 < _EXPLAINED * float(np.var(self.sections.output))
-
-    @property
     def unexplained(self) -> float:
         """Return the residual's share in the output's variation within its sections, of means over 0.1 s [-].
 
@@ -634,7 +630,8 @@ def _search(runs: Sequence[AxisRun], settings: ControllerSettings) -> tuple[_Sou
         found = source, fit
         # What is left is noise of the torque, which no other source explains.
         is_noise = not source.is_command and _model_error(fit, False) == 0.0
-        if fit.explains_all or (is_noise and fit.unexplained < settings.most_unexplained):
+        is_explained = fit.residual_rms**2 < _EXPLAINED * float(np.var(sections.output))
+        if is_explained or (is_noise and fit.unexplained < settings.most_unexplained):
             break
     return found
 

@@ -69,9 +69,6 @@ class BaseParameterSet:
     together: float
     identifiable: tuple[bool, ...]
 
-    def __len__(self) -> int:
-        return len(self.names)
-
     @property
     def standard_errors(self) -> FloatArray:
         """Return the standard error of each combination (B,)."""

@@ -104,37 +104,23 @@ class LeftOutTorque:
     joints: Index
     blocks: Index
 
-    def of_joint(self, joint: int, is_previous: bool = False) -> FloatArray:
-        """Return the residuals of a joint."""
-        chosen = self.previous if is_previous else self.residual
-        return np.asarray(chosen[self.joints == joint])
-
     def error(self, joint: int, is_previous: bool = False) -> float:
         """Return the RMS of the residuals of a joint [N m, N]; NaN for one without motion."""
-        own = self.of_joint(joint, is_previous)
+        own = (self.previous if is_previous else self.residual)[self.joints == joint]
         return _rms(own) if len(own) else math.nan
 
-    def is_better(self, joint: int, than: FloatArray, errors: float) -> bool:
-        """Return whether a joint's squared residual is below another model's by more than so many standard errors."""
-        gain, error = self._gain(joint, than)
-        return gain > errors * error
+    def gain(self, joint: int, other: LeftOutTorque | None = None) -> float:
+        """Return by how many standard errors a joint's squared residual is below another model's, or the machine's own.
 
-    def is_worse(self, joint: int, than: FloatArray, errors: float) -> bool:
-        """Return whether a joint's squared residual is above another model's by more than so many standard errors."""
-        gain, error = self._gain(joint, than)
-        return gain < -errors * error
-
-    def _gain(self, joint: int, than: FloatArray) -> tuple[float, float]:
-        """Return by how much the squared residual of a block is smaller than the other's, and the standard error.
-
-        Fewer than eight blocks are no sample: the error is infinite.
+        They are those between blocks; 0 with fewer than eight, which are no sample.
         """
         own = self.joints == joint
+        than = self.previous[own] if other is None else other.residual[own]
         blocks = np.unique(self.blocks[own], return_inverse=True)[1].ravel()
         sums = np.bincount(blocks, weights=than**2 - self.residual[own] ** 2)
         if len(sums) < _FEWEST_BLOCKS:
-            return 0.0, math.inf
-        return float(sums.mean()), float(sums.std(ddof=1)) / math.sqrt(len(sums))
+            return 0.0
+        return float(sums.mean()) / max(float(sums.std(ddof=1)) / math.sqrt(len(sums)), 1e-300)
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,16 +221,13 @@ def joint_estimates(fit: RobotFit, joint: int, method: Method) -> tuple[tuple[Es
     known: list[Estimate] = []
     together: list[Estimate] = []
     for group in (ColumnGroup.VISCOUS, ColumnGroup.COULOMB, ColumnGroup.CONSTANT):
-        value = float(fit.parameters[_columns_of(fit, group)[joint]])
+        columns = [i for i, column in enumerate(fit.columns) if column.group is group]
+        value = float(fit.parameters[columns[joint]])
         error = errors.get((group.value, joint), math.nan)
         unit = _UNITS[group][is_prismatic(fit.machine, joint)]
         estimate = Estimate("machine", group.value, value, error, unit, method, joint)
         (known if math.isfinite(error) else together).append(estimate)
     return tuple(known), tuple(together)
-
-
-def _columns_of(fit: RobotFit, group: ColumnGroup) -> list[int]:
-    return [i for i, column in enumerate(fit.columns) if column.group is group]
 
 
 @dataclass(frozen=True, eq=False)
@@ -568,19 +551,9 @@ class _Judge:
 
     def outcome(self) -> Identified:
         """Return the estimates per joint, and one answer for the whole set of inertial parameters."""
-        estimates: list[Estimate] = []
-        missing: list[NotIdentifiable] = []
-        for index in self.grouping.columns:
-            column = self.columns[index]
-            if column.group is ColumnGroup.INERTIAL:
-                continue
-            found = self._of_joint(index, column)
-            if isinstance(found, Estimate):
-                estimates.append(found)
-            else:
-                missing.append(found)
-        missing.extend(self._of_set())
-        return Identified(tuple(estimates), tuple(missing))
+        every = [(index, self.columns[index]) for index in self.grouping.columns]
+        answers = [self._of_joint(*item) for item in every if item[1].group is not ColumnGroup.INERTIAL]
+        return Identified.of([*answers, *self._of_set()])
 
     def _of_joint(self, index: int, column: RegressorColumn) -> Estimate | NotIdentifiable:
         if not self.grouping.is_alone(index):
