@@ -29,10 +29,11 @@ from cdtool.commands.console.options import ForceOption, JobsOption, JsonOption,
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
+    from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit
     from cdtool.commands.identify.identifying import IdentifiedMachine
-    from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification
+    from cdtool.commands.identify.identifying_robot import RobotIdentification
     from cdtool.commands.identify.joint import JointIdentification
-    from cdtool.commands.identify.presses import PressLogs
+    from cdtool.commands.identify.robot.drive_gains import LoadedRuns
     from cdtool.execution.workers import Workers
 
 _PAYLOAD = re.compile(r"(?P<mass>[^@:]+?) ?kg(?:@(?P<link>[^:]+))?(?::(?P<centre>.+))?")
@@ -71,13 +72,6 @@ def identify(
         str | None,
         typer.Option("--payload", help="The payload of --loaded-logs: 3.2kg@LINK:X,Y,Z, with its centre of mass [m]."),
     ] = None,
-    presses: Annotated[
-        list[str] | None,
-        typer.Option("--presses", help="Logs of slow press and release on a load cell, for the torque's scale."),
-    ] = None,
-    lever_arm: Annotated[
-        float | None, typer.Option("--lever-arm", help="Of a rotary axis: distance of the load cell from it [m].")
-    ] = None,
     force: ForceOption = False,
     jobs: JobsOption = 1,
     quiet: QuietOption = False,
@@ -85,8 +79,7 @@ def identify(
 ) -> None:
     """Identify the model of an axis or robot from impact-free logs, with honest standard errors.
 
-    Of an axis: mass, drive, friction and controller; with --presses the scale of its torque. Of a robot: friction,
-    inertias, torque constants.
+    Of an axis: mass, drive, friction and controller. Of a robot: friction, inertias, torque constants.
     Every change of the machine file is shown; old values remain in its comments.
 
     Example: cdtool identify 'sample_logs/gate/free/*.csv' -m sample_logs/gate/machine.toml -o machine.toml
@@ -97,15 +90,12 @@ def identify(
     targets = output or []
     check_identification_files(targets, machine, force=force)
     loaded = _loaded_runs(loaded_logs or (), payload)
-    pressed = _press_logs(presses or (), lever_arm)
-    if loaded is not None and pressed is not None:
-        raise UsageError("--loaded-logs with --presses", "these are for robots, those for axes")
-    _identify_machine(logs, machine, targets, Workers(jobs), loaded or pressed, as_json=as_json, quiet=quiet)
+    _identify_machine(logs, machine, targets, Workers(jobs), loaded, as_json=as_json, quiet=quiet)
 
 
 def _loaded_runs(logs: Sequence[str], payload: str | None) -> LoadedRuns | None:
     """Return the runs with a payload; None without any. Raises UsageError for one without the other."""
-    from cdtool.commands.identify.identifying_robot import LoadedRuns
+    from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 
     if bool(logs) != (payload is not None):
         raise UsageError("--loaded-logs and --payload belong together", "give both, or neither")
@@ -127,25 +117,12 @@ def _is_point(centre: tuple[float, ...] | None) -> TypeGuard[tuple[float, float,
     return centre is None or (len(centre) == 3 and all(map(math.isfinite, centre)))
 
 
-def _press_logs(presses: Sequence[str], lever_arm: float | None) -> PressLogs | None:
-    """Return the logs with presses; None without any. Raises UsageError for a lever arm that does not fit."""
-    from cdtool.commands.identify.presses import PressLogs
-
-    if lever_arm is not None and not 0.0 < lever_arm < math.inf:
-        raise UsageError(f"--lever-arm is {lever_arm:g}", "give it in m, above 0")
-    if presses:
-        return PressLogs(tuple(presses), lever_arm)
-    if lever_arm is not None:
-        raise UsageError("--lever-arm without --presses", "give logs of presses too")
-    return None
-
-
 def _identify_machine(
     logs: Sequence[str],
     machine: Path,
     targets: Sequence[Path],
     workers: Workers,
-    other_logs: LoadedRuns | PressLogs | None,
+    loaded: LoadedRuns | None,
     *,
     as_json: bool,
     quiet: bool,
@@ -155,7 +132,7 @@ def _identify_machine(
     from cdtool.commands.judging.runs import find_logs
 
     with progress("identifying", quiet=quiet) as advance:
-        done = run(logs, machine, workers=replace(workers, progress=advance), other_logs=other_logs)
+        done = run(logs, machine, workers=replace(workers, progress=advance), loaded=loaded)
     written = write_identification(done, targets, find_logs(logs, Path()))
     done = replace(done, written=", ".join(str(path) for path in written if path.suffix.lower() == MACHINE))
     print_skipped(done.skipped, done.findings)
@@ -167,37 +144,35 @@ def _identify_machine(
 
 
 def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path], *, quiet: bool) -> None:
+    from cdtool.commands.identify.words import words_of_robot
+
     for joint in done.joints:
-        left = joint.rigid.cross_validation.left_over if joint.rigid and joint.rigid.cross_validation else math.nan
-        if left > _MUCH_MORE:
+        validation = joint.evidence.cross_validation if joint.evidence else None
+        if validation and (left := validation.left_over) > _MUCH_MORE:
             print_line(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
     runs = counted(len(done.runs), "impact-free run")
     print_line(f"{plain(done.machine)}: identified from {runs}")
     if done.changes and not quiet:
         _show_changes(done)
-    if done.robot is not None:
-        _show_robot(done, done.robot, quiet=quiet)
-    else:
-        for joint in done.joints:
-            _show_axis(joint, is_named=len(done.joints) > 1)
+    if done.robot is not None and not quiet:
+        _show_frictions(done.robot)
+    for joint in done.joints:
+        _show_joint(joint, f"{plain(joint.joint)}: " if len(done.joints) > 1 else "")
+    for line in words_of_robot(done.robot, done.joints, len(done.runs)) if done.robot else ():
+        print_line(plain(line))
     _show_files(done, written, targets)
 
 
-def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
-    if is_named:
-        print_line(f"joint {plain(joint.joint)}")
-    _show_quality(joint)
-    _show_missing(joint, "")
-    for method, reason in joint.refused.items():
-        print_line(f"not used: {method.replace('_', '-')}: {plain(reason)}")
-
-
-def _show_missing(joint: JointIdentification, name: str) -> None:
+def _show_joint(joint: JointIdentification, name: str) -> None:
     from cdtool.commands.identify.words import words_of_needs
 
+    if joint.rigid is not None:
+        _show_quality(joint, joint.rigid, name)
     for item in joint.not_identifiable:
         needs = words_of_needs(item.missing)
         print_line(f"{name}not identifiable: {item.section}.{item.key}{f': add {needs}' if needs else ''}")
+    for method, reason in joint.refused.items():
+        print_line(f"{name}not used: {method.replace('_', '-')}: {plain(reason)}")
 
 
 def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
@@ -216,26 +191,19 @@ def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Seque
         print_line("nothing is written: give -o machine.toml")
 
 
-def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, *, quiet: bool) -> None:
-    """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
-    from cdtool.commands.identify.words import words_of_decision, words_of_robot
+def _show_frictions(robot: RobotIdentification) -> None:
+    from cdtool.commands.identify.words import words_of_decision
 
     rows = []
-    for joint, friction, floor in robot.rows:
-        errors = [number(item) for item in (friction.torque, friction.before, friction.after, floor)]
+    for joint in robot.joints:
+        friction = joint.robot
+        assert friction is not None
+        errors = [number(item) for item in (friction.torque, friction.before, friction.after)]
         rows.append([joint.joint, joint.units[1], *errors, words_of_decision(friction)])
-    headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
+    headings = ("torque", "old\nfriction", "new\nfriction")
     columns = [("joint", "left"), ("unit", "left"), *((heading, "right") for heading in headings), ("used", "left")]
-    if not quiet:
-        say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
-        table(columns, rows)
-    for joint in done.joints:
-        name = plain(joint.joint)
-        _show_missing(joint, f"{name}: ")
-        for reason in joint.refused.values():
-            print_line(f"{name}: {plain(reason)}")
-    for line in words_of_robot(robot, done.joints, len(done.runs)):
-        print_line(plain(line))
+    say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
+    table(columns, rows)
 
 
 def _show_changes(done: IdentifiedMachine) -> None:
@@ -248,12 +216,11 @@ def _show_changes(done: IdentifiedMachine) -> None:
     table([(heading, "left") for heading in ("key", "old", "new", "standard error", "unit")], rows)
 
 
-def _show_quality(joint: JointIdentification) -> None:
-    validation = joint.rigid.cross_validation if joint.rigid else None
-    if validation is not None:
+def _show_quality(joint: JointIdentification, rigid: RigidAxisFit, name: str) -> None:
+    if validation := rigid.evidence.cross_validation:
         floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
-        print_line(f"force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")
-    for level in joint.rigid.levels if joint.rigid else ():
+        print_line(f"{name}force on unseen runs: {number(validation.error)} {joint.units[1]} RMS while moving{floor}")
+    for level in rigid.levels:
         way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
         force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
-        print_line(f"friction {way} at {speed}: {force}")
+        print_line(f"{name}friction {way} at {speed}: {force}")

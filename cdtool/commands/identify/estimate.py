@@ -21,7 +21,6 @@ class Method(Enum):
     LEAST_SQUARES = "least squares"
     INSTRUMENTAL_VARIABLES = "instrumental variables"
     OUTPUT_ERROR = "output error"
-    PRESSES = "presses on a load cell"
     LOADED_RUNS = "runs with and without a known payload"
     FEASIBLE_LEAST_SQUARES = "physically consistent least squares"
 
@@ -42,7 +41,6 @@ class Missing(Enum):
     MORE_RECORDINGS = "more recordings"
     HIGHER_RATE = "a higher sampling rate"
     GENTLER_START = "starts with less acceleration, which wind the drive up less"
-    POSITION = "the position channel"
     FINER_MOTION = "a speed or position channel with less noise or finer steps"
     OTHER_CONTROLLER = "references of a P or PI speed controller, alone or under a P position controller"
     TORQUE_FILTER = "the time constant of the torque's low-pass in [model.sensors]"
@@ -97,8 +95,6 @@ class NotIdentifiable:
     @property
     def relative_error(self) -> float:
         """Return the relative standard error of a parameter that is too uncertain; NaN where it is not known."""
-        if "relative_standard_error" in self.numbers:
-            return self.numbers["relative_standard_error"]
         value = abs(self.numbers.get("value", 0.0))
         return self.numbers.get("standard_error", math.nan) / value if value > 0.0 else math.nan
 

@@ -18,13 +18,12 @@ from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
 from cdtool.commands.identify.axis.speed_controller import ControllerSettings, identify_controller
-from cdtool.commands.identify.axis.torque_constant import TorqueScale, identify_torque_scale
 from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass
 from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.commands.identify.identifying_robot import LoadedRuns, RobotIdentification, identify_joints
+from cdtool.commands.identify.identifying_robot import RobotIdentification, identify_joints
 from cdtool.commands.identify.joint import JointIdentification
-from cdtool.commands.identify.machine_update import MachineChange, changes_of, described_runs, robot_files, updated_text
-from cdtool.commands.identify.presses import Presses, PressLogs, read_presses, scale_estimates, scaled
+from cdtool.commands.identify.machine_update import MachineChange, changes_of, robot_files, updated_text
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
 from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, Runs, find_logs, load_runs, several_logs
@@ -105,7 +104,7 @@ def identify(
     *,
     force: bool = False,
     workers: Workers | None = None,
-    other_logs: LoadedRuns | PressLogs | None = None,
+    loaded: LoadedRuns | None = None,
 ) -> IdentifiedMachine:
     """Identify the parameters of a machine's model from impact-free logs, and update its machine file.
 
@@ -124,9 +123,8 @@ def identify(
         Overwrite an existing file other than `machine`.
     workers : Workers, optional
         How the logs are read.
-    other_logs : LoadedRuns or PressLogs, optional
-        Of a robot: logs of motion with a known payload, which show the torque constants of its joints. Of an axis: logs
-        of slow presses on a load cell, which show the scale of its torque.
+    loaded : LoadedRuns, optional
+        Of a robot: logs of motion with a known payload, which show the torque constants of its joints.
 
     Returns
     -------
@@ -142,7 +140,7 @@ def identify(
     SignatureError
         No log is left.
     UsageError
-        The output exists, a payload is given for an axis, or presses for a robot or several joints.
+        The output exists, or a payload is given for an axis.
 
     Examples
     --------
@@ -157,30 +155,28 @@ def identify(
     if target is not None and target.exists() and not force and target.resolve() != path.resolve():
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
-    payload, press_logs = _for_this_machine(other_logs, machine_file)
+    if loaded is not None and not isinstance(machine_file.machine, CoupledMachine):
+        raise UsageError("a payload is given for an axis", "torque constants are identified of robots only")
     paths, reading = read_until(logs, workers)
     runs, recordings = _impact_free(paths, machine_file, reading)
     given = read_toml(path, "a machine file")
-    robot = _identify_robot(machine_file, recordings, given, payload, reading)
-    presses = read_presses(press_logs, machine_file) if press_logs else Presses()
+    robot = _identify_robot(machine_file, recordings, given, loaded, reading)
     if robot is not None:
         joints = robot.joints
     else:
         count = len(machine_file.machine.joints)
-        joints = tuple(_identify_joint(machine_file, joint, recordings, presses) for joint in range(count))
+        joints = tuple(_identify_joint(machine_file, joint, recordings) for joint in range(count))
     estimates = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.estimates]
     together = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.together]
     if robot is not None and robot.gains is not None:
         estimates += robot.gains.estimates
-    for joint in joints:
-        estimates += scale_estimates(joint.torque_scale, given) if joint.torque_scale else []
     if not estimates and not together and not _was_compared(joints):
         raise IdentificationError(
             f"nothing can be identified from {counted(len(recordings), 'log')}: {'; '.join(_reasons(joints))}",
             "see docs/identification.md for the motion that is needed",
         )
     changes = changes_of(machine_file.machine, given, estimates, together)
-    origin = described_runs(len(recordings), date.today().isoformat())
+    origin = f"{counted(len(recordings), 'run')}, {date.today().isoformat()}"
     text = updated_text(read_text(path, ConfigurationError), changes, origin)
     identified = IdentifiedMachine(
         machine_file.machine.name,
@@ -188,7 +184,7 @@ def identify(
         changes,
         text,
         tuple(recording.name for recording in recordings),
-        (*runs.skipped, *presses.skipped),
+        runs.skipped,
         runs.findings,
         robot=robot,
         source=path,
@@ -198,20 +194,6 @@ def identify(
         return identified
     write_texts(dict(files))
     return replace(identified, written=str(target))
-
-
-def _for_this_machine(
-    logs: LoadedRuns | PressLogs | None, machine_file: MachineFile
-) -> tuple[LoadedRuns | None, PressLogs | None]:
-    """Return the runs with a payload of a robot, and the presses of an axis; raises UsageError if they do not fit."""
-    machine = machine_file.machine
-    if isinstance(logs, LoadedRuns):
-        if not isinstance(machine, CoupledMachine):
-            raise UsageError("a payload is given for an axis", "press and release a load cell to identify its torque")
-        return logs, None
-    if logs is not None and (isinstance(machine, CoupledMachine) or len(machine.joints) > 1):
-        raise UsageError("presses on a load cell are given for several joints", "they are used for one axis only")
-    return None, logs
 
 
 def read_until(logs: Sequence[str | Path], workers: Workers | None = None) -> tuple[list[Path], RunReading]:
@@ -259,9 +241,8 @@ def _identify_robot(
         return None
     loaded = None
     if payload is not None:
-        body = payload.payload(machine)
         paths, _ = read_until(payload.logs)
-        loaded = _impact_free(paths, machine_file, reading)[1], body
+        loaded = _impact_free(paths, machine_file, reading)[1], payload
     return identify_joints(recordings, machine, given, machine_file.path.parent, loaded)
 
 
@@ -279,13 +260,10 @@ def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
     return list(dict.fromkeys(reasons))[:_MOST_REASONS]
 
 
-def _identify_joint(
-    machine_file: MachineFile, joint: int, recordings: Sequence[Recording], presses: Presses
-) -> JointIdentification:
+def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[Recording]) -> JointIdentification:
     machine: Any = machine_file.machine
     name = machine.joints[joint]
     refused: dict[str, str] = {}
-    scale, recordings = _by_presses(recordings, presses, float(machine.nominal_inertia[joint]), refused)
     runs: list[AxisRun] = []
     for recording in recordings:
         try:
@@ -329,13 +307,14 @@ def _identify_joint(
         if method == "rigid" and _has_opposite_sign(found.get("rigid")):
             reason = "the torque falls where the acceleration rises: check the signs (scale) of torque and speed"
             return JointIdentification(name, refused={"sign": reason})
-    units = (mass, force, travel, f"{force} s/{travel}")
+    units, rigid = (mass, force, travel, f"{force} s/{travel}"), found.get("rigid")
     return JointIdentification(
         name,
         units=units,
+        evidence=rigid and rigid.evidence,
+        excitation=rigid and rigid.excitation,
         has_torque_filter="torque_filter_time" in stated,
         refused=refused,
-        torque_scale=scale,
         **found,
     )
 
@@ -362,17 +341,3 @@ def _refuse_constant_force(fit: RigidAxisFit | None, unit: str) -> None:
             f"a constant force of {constant.value:.3g} {unit} acts, which the elastic drive's model does not have",
             "a vertical axis or one with a spring or counterweight: state [model.drive] stiffness from its data sheet",
         )
-
-
-def _by_presses(
-    recordings: Sequence[Recording], presses: Presses, total_mass: float, refused: dict[str, str]
-) -> tuple[TorqueScale | None, Sequence[Recording]]:
-    """Return the scale of the torque that presses show, and the recordings with torques by it."""
-    if not presses.recordings:
-        return None, recordings
-    try:
-        scale = identify_torque_scale(presses.recordings, total_mass, lever_arm=presses.lever_arm)
-    except CdtoolError as fault:
-        refused["torque_scale"] = str(fault)
-        return None, recordings
-    return scale, [scaled(item, scale.factor) for item in recordings]

@@ -10,31 +10,26 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.base.files.bounded_loading import read_text
 from cdtool.base.remote.remote_path import joined
-from cdtool.commands.identify.estimate import Estimate, IdentificationError, Identified, Method, NotIdentifiable
+from cdtool.commands.identify.estimate import IdentificationError, Identified, Method, NotIdentifiable
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.robot.base_parameters import BaseParameterSet
 from cdtool.commands.identify.robot.consistent_inertia import consistent_fit
-from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
-from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction, choose_friction
-from cdtool.commands.identify.robot.planar_links import planar_links
-from cdtool.commands.identify.robot.repeated_runs import RepeatedRuns, repeated_runs
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns, drive_gains
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer, FrictionForm, JointFriction, choose_friction
 from cdtool.commands.identify.robot.robot_dynamics import (
     RobotFit,
     identify_robot,
     is_prismatic,
     joint_estimates,
 )
-from cdtool.commands.identify.robot.robot_evidence import joint_evidence
-from cdtool.commands.identify.robot.robot_excitation import measure_joint_motion
+from cdtool.commands.identify.robot.robot_evidence import joint_evidence, joint_excitations
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.unexplained_torque import without_unexplained
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recordings.recording import Recording
 
@@ -44,30 +39,8 @@ _EXPLAINED = 0.5
 _MOST_UNEXPLAINED = 0.1
 # Units of inertia, force, travel and viscous friction.
 _REVOLUTE, _PRISMATIC = ("kg m2", "N m", "rad", "N m s/rad"), ("kg", "N", "m", "N s/m")
-# Physical links may raise the residual of least squares by this share, and shift a base parameter by so many errors.
-_MOST_RISE, _MOST_SHIFT = 0.1, 3.0
-
-
-@dataclass(frozen=True)
-class LoadedRuns:
-    """Logs of motion with a known payload: `mass` [kg], fixed to a link, its `centre` of mass in the link's frame [m].
-
-    `centre` None: not known, then it is free. `link`: of the URDF, or "arm" or "forearm"; empty: the link that the last
-    joint moves.
-    """
-
-    logs: tuple[str | Path, ...]
-    mass: float
-    link: str = ""
-    centre: tuple[float, float, float] | None = None
-
-    def payload(self, machine: CoupledMachine) -> Payload:
-        """Return the payload on its link; raises ConfigurationError for a mass that is not above 0."""
-        link = self.link
-        if not link and isinstance(machine, UrdfRobot):
-            last = len(machine.tree.joints) - 1
-            link = next(item.name for item in machine.tree.links if item.joint == last)
-        return Payload(link=link or machine.joints[-1], mass=self.mass, centre=self.centre)
+# Physical links may raise the residual of least squares by this share.
+_MOST_RISE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,15 +72,8 @@ class RobotIdentification:
     joints: tuple[JointIdentification, ...]
     inertias: InertiaIdentification
     gains: Identified | None
-    repeated: RepeatedRuns
     unexplained_share: float
     urdf: str
-
-    @property
-    def rows(self) -> list[tuple[JointIdentification, JointFriction, float]]:
-        """Return each joint with its friction and the deviation between equal runs, as all outputs show them."""
-        floors = self.repeated.floor.tolist()
-        return [(joint, joint.robot, floor) for joint, floor in zip(self.joints, floors, strict=True) if joint.robot]
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -131,8 +97,6 @@ class RobotIdentification:
                 "estimates": [item.summary for item in self.gains.estimates],
                 "not_identifiable": [item.summary for item in self.gains.not_identifiable],
             },
-            "run_to_run_torque": self.repeated.floor.tolist(),
-            "repeated_pairs": self.repeated.pairs,
             "unexplained_share": self.unexplained_share,
         }
 
@@ -142,7 +106,7 @@ def identify_joints(
     machine: CoupledMachine,
     given: Mapping[str, Any],
     folder: Path,
-    loaded: tuple[Sequence[Recording], Payload] | None = None,
+    loaded: tuple[Sequence[Recording], LoadedRuns] | None = None,
 ) -> RobotIdentification:
     """Return what contact-free recordings show of a robot.
 
@@ -194,15 +158,24 @@ def identify_joints(
     refused: tuple[Mapping[str, str], ...] = ({},) * len(joints)
     if not inertias.is_new:
         joints, refused = _refuse_unexplained(joints, machine)
-    floor = repeated_runs(runs)
     fits = {**fits, FrictionForm.WITH_INERTIAS: whole}
     identified = []
-    for motion, friction, reasons in zip(measure_joint_motion(runs, machine), joints, refused, strict=True):
-        units = _PRISMATIC if is_prismatic(machine, friction.joint) else _REVOLUTE
-        shown = joint_evidence(motion, friction.compared, fits, explained.runs)
-        name = machine.joints[friction.joint]
-        identified.append(JointIdentification(name, units=units, refused=reasons, robot=friction, evidence=shown))
-    return RobotIdentification(tuple(identified), inertias, gains, floor, explained.share, urdf)
+    for excitation, friction, reasons in zip(joint_excitations(runs, machine), joints, refused, strict=True):
+        shown = None
+        if friction.compared is not None:
+            is_new = friction.answer is FrictionAnswer.NEW
+            shown = joint_evidence(friction.joint, fits[friction.compared], is_new, explained.runs)
+        identified.append(
+            JointIdentification(
+                machine.joints[friction.joint],
+                units=_PRISMATIC if is_prismatic(machine, friction.joint) else _REVOLUTE,
+                refused=reasons,
+                robot=friction,
+                evidence=shown,
+                excitation=excitation,
+            )
+        )
+    return RobotIdentification(tuple(identified), inertias, gains, explained.share, urdf)
 
 
 def _runs_of(recordings: Sequence[Recording]) -> tuple[list[RobotRun], str]:
@@ -276,10 +249,10 @@ def _with_inertias(
         return found, joints, ""
     if not _predicts_better(fit, joints):
         return replace(found, refused="the present inertias predict unseen parts as well"), joints, ""
+    if not isinstance(fit.machine, UrdfRobot):
+        return replace(found, refused="new ones predict better, but only a URDF has a place for them"), joints, ""
     try:
-        if isinstance(fit.machine, UrdfRobot):
-            return _new_urdf(fit, found, joints, joined(folder, str(given["machine"]["urdf"])))
-        return _new_links(fit, found, joints)
+        return _new_urdf(fit, found, joints, joined(folder, str(given["machine"]["urdf"])))
     except CdtoolError as fault:
         return replace(found, refused=str(fault)), joints, ""
 
@@ -290,13 +263,13 @@ def _predicts_better(fit: RobotFit, joints: Sequence[JointFriction]) -> bool:
     And no joint worse than new friction alone does.
     """
     moving = [item.joint for item in joints if math.isfinite(item.errors[FrictionForm.PREVIOUS])]
-    previous: dict[int, FloatArray] = {joint: fit.left_out.of_joint(joint, is_previous=True) for joint in moving}
-    if any(fit.left_out.is_worse(joint, previous[joint], 1.0) for joint in moving):
+    gains = [fit.left_out.gain(joint) for joint in moving]
+    if any(gain < -1.0 for gain in gains):
         return False
     new = [fit.left_out.error(joint) for joint in moving]
     alone = [joints[joint].errors[joints[joint].form] for joint in moving]
-    gain = sum(math.log(max(error, 1e-300) / max(own, 1e-300)) for error, own in zip(new, alone, strict=True))
-    return gain < 0.0 and any(fit.left_out.is_better(joint, previous[joint], 1.0) for joint in moving)
+    worse = sum(math.log(max(error, 1e-300) / max(own, 1e-300)) for error, own in zip(new, alone, strict=True))
+    return worse < 0.0 and any(gain > 1.0 for gain in gains)
 
 
 def _new_urdf(
@@ -308,32 +281,16 @@ def _new_urdf(
             f"no physical links explain the torques: their residual is {100.0 * consistent.residual_rise:.0f} % higher",
             "check the signs and units of the channels, and the kinematics of the URDF",
         )
-    tree: KinematicTree = consistent.robot.tree
-    text = updated_urdf(read_text(path, ConfigurationError), tree)
+    text = updated_urdf(read_text(path, ConfigurationError), consistent.tree)
     found = replace(found, is_new=True, residual_rise=consistent.residual_rise)
-    return found, _joints_with_inertias(consistent.fit, joints, ()), text
+    return found, _joints_with_inertias(consistent.fit, joints), text
 
 
-def _new_links(
-    fit: RobotFit, found: InertiaIdentification, joints: tuple[JointFriction, ...]
-) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
-    links = planar_links(fit)
-    if links.shift > _MOST_SHIFT:
-        raise IdentificationError(
-            f"coupling and gravity of the forearm contradict each other by {links.shift:.1f} standard errors",
-            "check link_length and the order of the channels",
-        )
-    return replace(found, is_new=True), _joints_with_inertias(fit, joints, links.estimates), ""
-
-
-def _joints_with_inertias(
-    fit: RobotFit, joints: Sequence[JointFriction], links: Sequence[Estimate]
-) -> tuple[JointFriction, ...]:
+def _joints_with_inertias(fit: RobotFit, joints: Sequence[JointFriction]) -> tuple[JointFriction, ...]:
     """Return the joints with the friction that belongs to the new inertias."""
     complete = []
     for item in joints:
         known, together = joint_estimates(fit, item.joint, Method.FEASIBLE_LEAST_SQUARES)
-        own = tuple(estimate for estimate in links if estimate.joint == item.joint)
         refused = fit.identified.not_identifiable
         missing = tuple(entry for entry in refused if entry.joint == item.joint and entry.key != "base_parameters")
         errors = {**item.errors, FrictionForm.WITH_INERTIAS: fit.left_out.error(item.joint)}
@@ -342,7 +299,7 @@ def _joints_with_inertias(
                 item,
                 form=FrictionForm.WITH_INERTIAS,
                 compared=FrictionForm.WITH_INERTIAS,
-                identified=Identified((*own, *known), missing),
+                identified=Identified(known, missing),
                 together=together,
                 errors=errors,
             )

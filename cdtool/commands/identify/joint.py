@@ -10,11 +10,10 @@ from typing import Any
 from cdtool.commands.identify.axis.excitation import Excitation
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerFit
-from cdtool.commands.identify.axis.torque_constant import TorqueScale
 from cdtool.commands.identify.axis.two_mass import TwoMassFit
 from cdtool.commands.identify.estimate import Estimate, Method, NotIdentifiable
+from cdtool.commands.identify.evidence import ForceEvidence
 from cdtool.commands.identify.robot.friction_choice import JointFriction
-from cdtool.commands.identify.robot.robot_evidence import RobotJointEvidence
 from cdtool.machines.axis_model.model_table import finite_values
 
 _CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
@@ -24,9 +23,9 @@ _CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "
 class JointIdentification:
     """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
 
-    `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`
-    and `evidence`: of a joint of a robot or planar arm, which has none of the others. `torque_scale`: the factor by
-    which all torques were multiplied before; None without presses.
+    `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`:
+    of a robot or planar arm, whose joints have none of the other fits. `evidence` and `excitation`: how well the model
+    describes the logs, and what their motion excites; None without motion.
     """
 
     joint: str
@@ -37,8 +36,8 @@ class JointIdentification:
     has_torque_filter: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
     robot: JointFriction | None = None
-    evidence: RobotJointEvidence | None = None
-    torque_scale: TorqueScale | None = None
+    evidence: ForceEvidence | None = None
+    excitation: Excitation | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -57,14 +56,7 @@ class JointIdentification:
         if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
             # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
             found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
-        return tuple(map(self._with_scale_error, found.values()))
-
-    def _with_scale_error(self, estimate: Estimate) -> Estimate:
-        """Return an estimate whose standard error has that of the torque's scale, on which masses and forces depend."""
-        if self.torque_scale is None or not estimate.unit.startswith(("kg", "N")):
-            return estimate
-        relative = self.torque_scale.standard_error / self.torque_scale.factor
-        return replace(estimate, standard_error=math.hypot(estimate.standard_error, relative * estimate.value))
+        return tuple(found.values())
 
     @property
     def together(self) -> tuple[Estimate, ...]:
@@ -128,23 +120,18 @@ class JointIdentification:
         return tuple(found.values())
 
     @property
-    def excitation(self) -> Excitation | None:
-        """Return what the motion of the joint excites."""
-        if self.evidence:
-            return self.evidence.motion.excitation
-        return self.rigid.excitation if self.rigid else None
-
-    @property
     def summary(self) -> dict[str, Any]:
         """Return everything but the samples as JSON values."""
+        validation = self.evidence.cross_validation if self.evidence else None
         values = {
             "joint": self.joint,
             "estimates": [item.summary for item in self.estimates],
             "not_identifiable": [item.summary for item in self.not_identifiable],
             "refused": dict(self.refused),
-            "torque_scale": self.torque_scale and asdict(self.torque_scale),
+            "force_error_on_unseen_runs": validation and validation.summary,
+            "excitation": self.excitation and asdict(self.excitation),
         }
-        return {**values, **_of_axis(self), **_of_robot(self)}
+        return {**values, **({"friction_decision": self.robot.summary} if self.robot else _of_axis(self))}
 
 
 def _exact(section: str, key: str, value: float, unit: str) -> Estimate:
@@ -153,28 +140,13 @@ def _exact(section: str, key: str, value: float, unit: str) -> Estimate:
 
 def _of_axis(joint: JointIdentification) -> dict[str, Any]:
     rigid, two_mass, controller = joint.rigid, joint.two_mass, joint.controller
-    values: dict[str, Any] = {
-        "force_error_on_unseen_runs": rigid and rigid.cross_validation and rigid.cross_validation.summary,
+    return {
         "friction_at_speed": [asdict(level) for level in rigid.levels] if rigid else [],
+        "condition_number": rigid and rigid.condition_number,
         "two_mass": two_mass
         and {
             "condition_number": two_mass.condition_number,
-            "relative_error": two_mass.relative_error,
             "largest_wind_up": two_mass.largest_wind_up,
         },
         "controller": controller and {"kind": controller.kind.value, "residual_rms": controller.residual_rms},
-    }
-    if rigid:
-        values |= {"excitation": asdict(rigid.excitation), "condition_number": rigid.condition_number}
-    return values
-
-
-def _of_robot(joint: JointIdentification) -> dict[str, Any]:
-    friction, evidence = joint.robot, joint.evidence
-    if friction is None or evidence is None:
-        return {}
-    return {
-        "friction_decision": friction.summary,
-        "unseen_run": evidence.unseen and evidence.unseen.summary,
-        "motion": asdict(evidence.motion),
     }

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdtool.base.plain_text import counted, digits
+from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import joined, relative_name
 from cdtool.base.toml_text import opened_table
 from cdtool.commands.identify.estimate import Estimate, Method
@@ -108,16 +108,12 @@ def robot_files(text: str, urdf: str, source: Path, target: Path) -> tuple[tuple
         if target.absolute().parent != source.absolute().parent:
             table["urdf"] = relative_name(joined(source.parent, before), target.parent)
         return ((target, tomlkit.dumps(document)),)
-    name = _free_name(target)
+    names = (target.with_name(f"{target.stem}{part}.urdf") for part in ("", *(f"_{i}" for i in range(2, 10_000))))
+    name = next(path for path in names if not path.exists())
     item = tomlkit.item(name.name)
     item.comment(f"identified inertias; was {before}")
     table["urdf"] = item
     return ((target, tomlkit.dumps(document)), (name, urdf))
-
-
-def _free_name(target: Path) -> Path:
-    names = (target.with_name(f"{target.stem}{part}.urdf") for part in ("", *(f"_{i}" for i in range(2, 10_000))))
-    return next(name for name in names if not name.exists())
 
 
 def _comment(change: MachineChange, before: Any, origin: str) -> str:
@@ -183,8 +179,3 @@ def values_text(values: Sequence[float | None], significant: int = _DIGITS) -> s
     known = [math.nan if value is None else value for value in values]
     texts = [digits(float(f"{value:.{significant}g}")) if math.isfinite(value) else "-" for value in known]
     return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
-
-
-def described_runs(count: int, day: str) -> str:
-    """Return the origin of identified values in words."""
-    return f"{counted(count, 'run')}, {day}"

@@ -9,21 +9,23 @@ from collections.abc import Sequence
 from functools import partial
 
 from cdtool.base.plain_text import counted
-from cdtool.commands.identify.axis.rigid_axis import CrossValidation
+from cdtool.commands.identify.evidence import CrossValidation
 from cdtool.commands.identify.identifying import IdentifiedMachine
+from cdtool.commands.identify.identifying_robot import InertiaIdentification, RobotIdentification
 from cdtool.commands.identify.joint import JointIdentification
 from cdtool.commands.identify.machine_update import MachineChange, values_text
 from cdtool.commands.identify.plots import draw_controller, draw_friction, draw_starts, draw_unseen_run
-from cdtool.commands.identify.robot.sections import robot_sections
+from cdtool.commands.identify.robot.friction_choice import FrictionAnswer
 from cdtool.commands.identify.words import (
     listed_numbers,
-    short_number,
+    words_of_decision,
     words_of_needs,
     words_of_reason,
+    words_of_robot,
 )
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
-from cdtool.report.number_text import NOTHING, percent
+from cdtool.report.number_text import NOTHING, number, percent
 from cdtool.report.table import Cell, Heading, Table, name_cell, number_cell, tabulate
 
 
@@ -35,7 +37,7 @@ def identification_html(done: IdentifiedMachine) -> str:
     sections = [PageSection("Changes", (_changes_table(done.changes),), note=_ORIGIN)]
     for joint in done.joints:
         sections += _joint_sections(joint, f"{joint.joint}: " if len(done.joints) > 1 else "")
-    sections[1:1] = [*robot_sections(done), PageSection("Excitation", (_excitation_table(done.joints),))]
+    sections[1:1] = [*_robot_sections(done), PageSection("Excitation", (_excitation_table(done.joints),))]
     sections += left_out_sections(done.skipped, done.findings)
     return SectionsPage(
         "Identification",
@@ -57,7 +59,7 @@ _ORIGIN = (
 def _joint_sections(joint: JointIdentification, name: str) -> list[PageSection]:
     return [
         PageSection(f"{name}Not identifiable", (_missing_table(joint),) if joint.not_identifiable else ()),
-        *(_axis_sections(joint, name) if joint.rigid or joint.two_mass or joint.controller else ()),
+        *_figure_sections(joint, name),
         PageSection(f"{name}Methods not used", (_refused_table(joint),) if joint.refused else ()),
     ]
 
@@ -85,18 +87,11 @@ def _missing_table(joint: JointIdentification) -> Table:
 
 
 def _excitation_table(joints: Sequence[JointIdentification]) -> Table:
-    def range_of(joint: JointIdentification) -> str:
-        if joint.evidence is None:
-            return NOTHING
-        return f"{short_number(joint.evidence.motion.lowest)} to {short_number(joint.evidence.motion.highest)}"
-
     fields = (
         (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
         (Heading("unit"), lambda item: Cell(item[0].units[2])),
-        (Heading("range"), lambda item: Cell(range_of(item[0]))),
-        (Heading("speeds that are held [/s]"), lambda item: Cell(listed_numbers(item[1].speeds, 2) or NOTHING)),
+        (Heading("speeds that are held [/s]"), lambda item: Cell(listed_numbers(item[1].speeds) or NOTHING)),
         (Heading("highest speed [/s]", numeric=True), lambda item: number_cell(item[1].highest_speed)),
-        (Heading("highest acceleration [/s²]", numeric=True), lambda item: number_cell(item[1].highest_acceleration)),
         (Heading("acceleration, RMS [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration)),
         (Heading("of which noise [/s²]", numeric=True), lambda item: number_cell(item[1].acceleration_noise)),
         (Heading("forward"), lambda item: Cell(percent(item[1].forward_share) if item[1].moving_time else NOTHING)),
@@ -106,16 +101,15 @@ def _excitation_table(joints: Sequence[JointIdentification]) -> Table:
     return tabulate("excitation", "What the logged motion excites", fields, rows)
 
 
-def _axis_sections(joint: JointIdentification, name: str) -> list[PageSection]:
-    """Return the figures of an axis: how well the model describes its logs."""
+def _figure_sections(joint: JointIdentification, name: str) -> list[PageSection]:
+    """Return the figures of a joint: how well the model describes its logs."""
     sections, units = [], (joint.units[1], f"{joint.units[2]}/s", joint.units[2])
-    if joint.rigid is not None and joint.rigid.cross_validation is not None:
-        validation = joint.rigid.cross_validation
-        image = images_of([(partial(draw_unseen_run, validation, units[0]), _UNSEEN)])
-        table = _prediction_table(validation, units[0])
-        sections.append(PageSection(f"{name}Prediction of unseen runs", (table,), image))
-    if joint.rigid is not None:
-        image = images_of([(partial(draw_friction, joint.rigid, units), _FRICTION)])
+    if joint.evidence is not None:
+        if validation := joint.evidence.cross_validation:
+            image = images_of([(partial(draw_unseen_run, validation, units[0]), _UNSEEN)])
+            table = _prediction_table(validation, units[0])
+            sections.append(PageSection(f"{name}Prediction of unseen runs", (table,), image))
+        image = images_of([(partial(draw_friction, joint.evidence, units), _FRICTION)])
         sections.append(PageSection(f"{name}Friction", images=image))
     if joint.two_mass is not None:
         image = images_of([(partial(draw_starts, start, units), _STARTS) for start in joint.two_mass.starts])
@@ -131,7 +125,7 @@ def _axis_sections(joint: JointIdentification, name: str) -> list[PageSection]:
 _UNSEEN = "A run that was left out of the fit: a residual beyond the grey band is the model's error."
 _FRICTION = (
     "Left: force minus that of the inertia, per interval of speed, and the model. Right: what the model leaves over "
-    "along the travel. Bars are two standard errors between strokes."
+    "along the travel. Bars are two standard errors between strokes, or blocks of the log."
 )
 _STARTS = (
     "The force of the model is the measured one with a weak correction towards the measured speed: what they differ by "
@@ -143,7 +137,7 @@ def _prediction_table(validation: CrossValidation, force: str) -> Table:
     rows = [
         [Cell("identified model"), number_cell(validation.error)],
         [
-            Cell(f"between equal strokes ({validation.repeats}): no model can be better"),
+            Cell(f"between equal motions ({validation.repeats}): no model can be better"),
             number_cell(validation.floor if validation.repeats else None),
         ],
     ]
@@ -155,3 +149,61 @@ def _prediction_table(validation: CrossValidation, force: str) -> Table:
 def _refused_table(joint: JointIdentification) -> Table:
     rows = [[Cell(method.replace("_", "-")), Cell(visible(reason))] for method, reason in joint.refused.items()]
     return Table("refused", "Methods that could not be used", (Heading("method"), Heading("reason")), rows)
+
+
+def _robot_sections(done: IdentifiedMachine) -> list[PageSection]:
+    """Return the sections of a robot; none of an axis."""
+    robot = done.robot
+    if robot is None:
+        return []
+    sections = [_friction_section(robot), _inertia_section(robot.inertias)]
+    lines = words_of_robot(robot, done.joints, len(done.runs))
+    if lines:
+        table = Table("robot", "The whole robot", (Heading("finding"),), [[Cell(visible(line))] for line in lines])
+        sections.append(PageSection("Whole robot", (table,)))
+    return sections
+
+
+def _friction_section(robot: RobotIdentification) -> PageSection:
+    rows = [(joint, joint.robot) for joint in robot.joints if joint.robot]
+    fields = (
+        (Heading("joint"), lambda item: name_cell(visible(item[0].joint))),
+        (Heading("unit"), lambda item: Cell(item[0].units[1])),
+        (Heading("torque, RMS", numeric=True), lambda item: number_cell(item[1].torque)),
+        (Heading("old friction", numeric=True), lambda item: number_cell(item[1].before)),
+        (Heading("new friction", numeric=True), lambda item: number_cell(item[1].after)),
+        (
+            Heading("used"),
+            lambda item: Cell(words_of_decision(item[1]), tone="good" if item[1].answer is FrictionAnswer.NEW else ""),
+        ),
+    )
+    title = "Torque that is not explained in what was left out of the fit, RMS"
+    return PageSection("Friction of the joints", (tabulate("torque", title, fields, rows),))
+
+
+def _inertia_section(found: InertiaIdentification) -> PageSection:
+    base = found.base
+    fields = zip(base.names, base.values, base.standard_errors, base.excitation, base.identifiable, strict=True)
+    rows = [
+        [
+            Cell(visible(name)),
+            number_cell(float(value)),
+            number_cell(float(error)),
+            Cell(f"{number(float(share))}", key=float(share)),
+            Cell("yes" if known else "no", tone="" if known else "unknown"),
+        ]
+        for name, value, error, share, known in fields
+    ]
+    columns = (
+        Heading("base parameter"),
+        Heading("value", numeric=True),
+        Heading("standard error", numeric=True),
+        Heading("excitation", numeric=True),
+        Heading("identifiable"),
+    )
+    note = (
+        "Excitation: the part of a parameter's torque that no other parameter explains, relative to random motion of "
+        "the same speeds. Values of parameters that are not identifiable are worthless."
+    )
+    table = Table("inertias", "Parameters that act on the torques, friction included", columns, rows)
+    return PageSection("Inertias", (table,), note=note)

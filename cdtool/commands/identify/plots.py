@@ -9,10 +9,9 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
-from cdtool.commands.identify.axis.friction_curve import FrictionCurve
-from cdtool.commands.identify.axis.rigid_axis import CrossValidation, RigidAxisFit
 from cdtool.commands.identify.axis.speed_controller import ControllerComparison
 from cdtool.commands.identify.axis.two_mass import StartComparison
+from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, FrictionCurve
 from cdtool.detectors.look import BLUE, RED
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure
@@ -33,15 +32,17 @@ def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
     The band is the deviation between equal strokes: what is left over beyond it is the model's.
     """
     unseen = validation.worst
-    index = thinned(np.arange(len(unseen.time)))
+    index = _thinned(np.arange(len(unseen.time)))
     time = unseen.time[index]
     measured, predicted = (_gaps(time, values[index]) for values in (unseen.measured, unseen.predicted))
-    what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "strokes of the only run"
+    what = f"run with the largest error of {unseen.of_runs}" if unseen.of_runs > 1 else "parts of the only run"
     floor = np.full(len(time), validation.floor) if validation.repeats else None
     with drawing():
         figure = new_figure(_WIDTH, 4.6)
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        compare(panels, time, (measured, predicted), f"force [{unit}]", (floor, "between equal strokes (± 1 st. dev.)"))
+        _compare(
+            panels, time, (measured, predicted), f"force [{unit}]", (floor, "between equal motions (± 1 st. dev.)")
+        )
         title = f"{label(unseen.run)}, left out of the fit ({what}): {number(unseen.error)} {unit} RMS"
         panels[0].set_title(title, loc="left")
         for panel in panels:
@@ -49,7 +50,7 @@ def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
         return figure
 
 
-def draw_friction(fit: RigidAxisFit, units: tuple[str, str, str]) -> Figure:
+def draw_friction(shown: ForceEvidence, units: tuple[str, str, str]) -> Figure:
     """Draw the friction over speed with the model, and the rest over position; `units` of force, speed and travel.
 
     Bars are two standard errors between strokes. The left panel has the measured force minus that of the inertia; a
@@ -57,25 +58,25 @@ def draw_friction(fit: RigidAxisFit, units: tuple[str, str, str]) -> Figure:
     a profile there is friction that depends on the position.
     """
     force, speed, travel = units
-    curve = fit.friction_curve
+    curve = shown.friction_curve
     with drawing():
         figure = new_figure(_WIDTH, 3.4)
         left, right = figure.subplots(1, 2)
-        every = thinned(np.arange(len(fit.speed)))
-        left.plot(fit.speed[every], fit.friction[every], ".", color="0.8", markersize=1.5, zorder=1)
-        bars(left, curve, _MEASURED, "measured, mean ± 2 standard errors")
+        every = _thinned(np.arange(len(shown.speed)))
+        left.plot(shown.speed[every], shown.friction[every], ".", color="0.8", markersize=1.5, zorder=1)
+        _bars(left, curve, _MEASURED, "measured, mean ± 2 standard errors")
         for side in (1.0, -1.0):
-            inside = np.sign(fit.speed) == side
+            inside = np.sign(shown.speed) == side
             if inside.any():
-                x, y = _model_curve(fit.speed[inside], (fit.friction - fit.residual)[inside])
+                x, y = _model_curve(shown.speed[inside], (shown.friction - shown.residual)[inside])
                 left.plot(x, y, color=_MODEL, linewidth=1.6, zorder=3, label="model")
         left.set_xlabel(f"speed [{speed}]")
         left.set_ylabel(f"friction [{force}]")
         _fit_to(left, curve)
         _legend_once(left)
         names = {1: "forward", -1: "backward"}
-        for direction, item in fit.position_curves.items():
-            bars(right, item, _RESIDUAL if direction > 0 else _MODEL, names[direction], line=True)
+        for direction, item in shown.position_curves.items():
+            _bars(right, item, _RESIDUAL if direction > 0 else _MODEL, names[direction], line=True)
         right.axhline(0.0, color="0.3", linewidth=0.6)
         right.set_xlabel(f"position [{travel}]")
         right.set_ylabel(f"residual [{force}]")
@@ -103,7 +104,7 @@ def draw_starts(start: StartComparison, units: tuple[str, str, str]) -> Figure:
             lines = ensemble.mean[name], start.modelled[name]
             band = ensemble.deviation[name] if ensemble.count > 1 else None
             axis = f"{titles[name]} [{of_channel[name]}]"
-            compare(column, time, lines, axis, (band, "between runs (± 1 st. dev.)"))
+            _compare(column, time, lines, axis, (band, "between runs (± 1 st. dev.)"))
             column[1].set_xlabel("time from the start of the motion [s]")
         panels[0, 0].legend(loc="lower right")
         panels[1, 0].legend(loc="upper right")
@@ -116,20 +117,20 @@ def draw_starts(start: StartComparison, units: tuple[str, str, str]) -> Figure:
 
 def draw_controller(compared: ControllerComparison, unit: str) -> Figure:
     """Draw the logged command and the identified controller's, and their difference."""
-    index = thinned(np.arange(len(compared.time)))
+    index = _thinned(np.arange(len(compared.time)))
     lines = compared.measured[index], compared.computed[index]
     name = "torque reference" if compared.is_command else "force"
     with drawing():
         figure = new_figure(_WIDTH, 4.2)
         panels = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        compare(panels, compared.time[index], lines, f"{name} [{unit}]")
+        _compare(panels, compared.time[index], lines, f"{name} [{unit}]")
         error = number(float(np.sqrt(np.mean((compared.measured - compared.computed) ** 2))))
         panels[0].set_title(f"{name}, difference {error} {unit} RMS", loc="left")
         panels[0].legend(loc="upper right", ncols=2)
         return figure
 
 
-def compare(
+def _compare(
     panels: Sequence[Axes],
     time: FloatArray,
     lines: tuple[FloatArray, FloatArray],
@@ -149,7 +150,7 @@ def compare(
     below.set_xlabel("time [s]")
 
 
-def thinned(index: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _thinned(index: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Return indices, evenly left out if they are more than a picture shows."""
     return index[:: max(len(index) // _MOST_POINTS, 1)]
 
@@ -162,7 +163,7 @@ def _gaps(time: FloatArray, values: FloatArray) -> FloatArray:
     return np.where(steps > 5.0 * float(np.median(steps[1:])), np.nan, values)
 
 
-def bars(axes: Axes, curve: FrictionCurve, colour: str, name: str, *, line: bool = False) -> None:
+def _bars(axes: Axes, curve: FrictionCurve, colour: str, name: str, *, line: bool = False) -> None:
     """Draw a curve with two standard errors."""
     errors = 2.0 * np.nan_to_num(curve.standard_error)
     axes.errorbar(

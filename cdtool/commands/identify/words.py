@@ -14,14 +14,9 @@ from cdtool.commands.identify.robot.robot_dynamics import FEWEST_RUNS
 from cdtool.report.number_text import number, percent
 
 
-def short_number(value: float, significant: int = 3) -> str:
-    """Return a number with few significant digits and without an exponent; a dash for one that is not finite."""
-    return digits(float(f"{value:.{significant}g}")) if math.isfinite(value) else "-"
-
-
-def listed_numbers(values: tuple[float, ...], significant: int = 3) -> str:
-    """Return numbers as 0.06, 0.11 and 0.2."""
-    texts = [short_number(value, significant) for value in values]
+def listed_numbers(values: tuple[float, ...]) -> str:
+    """Return numbers with two digits as 0.06, 0.11 and 0.2."""
+    texts = [digits(float(f"{value:.2g}")) for value in values]
     return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
@@ -34,13 +29,9 @@ def words_of_decision(friction: JointFriction) -> str:
 
 def words_of_base_set(item: NotIdentifiable) -> str:
     """Return why the full set of a robot's base parameters is not identifiable, with the numbers that show it."""
-    condition = item.numbers.get("condition_number", math.nan)
-    numbers = [_conditioned(condition)]
-    count, missing = (int(item.numbers.get(key, 0.0)) for key in ("base_parameters", "not_determined"))
-    if count:
-        numbers.append(f"{missing} of {count} not determined")
-    uncertain = item.numbers.get("uncertain_torque_share", math.nan)
-    if 0.0 < uncertain < 1.0:
+    count, missing = item.numbers["base_parameters"], item.numbers["not_determined"]
+    numbers = [_conditioned(item.numbers["condition_number"]), f"{missing:.0f} of {count:.0f} not determined"]
+    if 0.0 < (uncertain := item.numbers["uncertain_torque_share"]) < 1.0:
         numbers.append(f"together uncertain by {percent(uncertain)} of a joint's torque in other motion")
     others = words_of_needs([kind for kind in item.missing if kind is not Missing.OTHER_MOTION])
     needs = f"a motion of all joints at once{f', {others}' if others else ''}"
@@ -57,7 +48,7 @@ def words_of_robot(robot: RobotIdentification, joints: Sequence[JointIdentificat
     if inertias.refused:
         lines.append(f"inertias kept: {inertias.refused}")
     if inertias.is_new:
-        count = len(inertias.base)
+        count = len(inertias.base.names)
         lines.append(f"new inertias: {counted(count, 'base parameter')}, {_conditioned(inertias.condition_number)}")
     for item in robot.gains.not_identifiable if robot.gains else ():
         name = joints[item.joint].joint
@@ -69,8 +60,6 @@ def words_of_robot(robot: RobotIdentification, joints: Sequence[JointIdentificat
         )
     if runs < FEWEST_RUNS:
         lines.append("the standard errors do not contain how friction differs from day to day: add logs of three days")
-    if not robot.repeated.pairs:
-        lines.append("no motion is repeated: the deviation between equal runs is not known")
     return lines
 
 
@@ -99,12 +88,11 @@ _REASONS: Mapping[Missing, str] = {
     Missing.ACCELERATION: "hardly any acceleration",
     Missing.MORE_RECORDINGS: "too few runs",
     Missing.SATURATION: "the command never reached a limit",
-    Missing.TORQUE_FILTER: "the lag between command and measured torque contains that of the torque's low-pass",
+    Missing.TORQUE_FILTER: "the lag of the logged torque is in it",
     Missing.OTHER_CONTROLLER: (
         "P and PI control, alone or under a position controller, do not explain the controller's output (feed-forward, "
         "or references of another log?)"
     ),
-    Missing.POSITION: "no position channel: a delay of the speed channel looks like damping",
 }
 # Numbers of a parameter that is not identifiable, as they are shown.
 _NUMBERS: Mapping[str, str] = {

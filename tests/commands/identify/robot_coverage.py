@@ -17,8 +17,8 @@ import numpy as np
 import cdtool
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.commands.identify.identifying_robot import LoadedRuns
-from tests.synthetic.strange_robots import GRAVITY, KINDS, LOGS, carrying, robot, write_log, write_machine
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns
+from tests.synthetic.strange_robots import GRAVITY, KINDS, LOGS, Link, carrying, robot, write_log, write_machine
 
 COVERED = 1.96
 
@@ -41,7 +41,7 @@ class Value:
 
 
 def friction_values(kind: str, seed: int, folder: Path, logs: int = LOGS) -> list[Value]:
-    """Return friction, and of planar arms the links, of a robot that is identified from free motion."""
+    """Return friction, and of planar arms the base parameters, of a robot that is identified from free motion."""
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     links = robot(kind, rng)
     machine = write_machine(folder, links, kind, rng)
@@ -51,10 +51,7 @@ def friction_values(kind: str, seed: int, folder: Path, logs: int = LOGS) -> lis
         "coulomb_friction": [link.coulomb for link in links],
         "constant_force": [link.offset for link in links],
     }
-    if kind == "planar":
-        truth["centre_of_mass"] = [float(link.centre[0]) for link in links]
-        truth["link_inertia"] = [float(link.inertia[1, 1]) for link in links]
-    elif "drive_inertia" not in machine.read_text(encoding="utf-8"):
+    if kind != "planar" and "drive_inertia" not in machine.read_text(encoding="utf-8"):
         truth["drive_inertia"] = [link.drive for link in links]
     if kind == "scara":
         # The constant force of a vertical slide holds what its links weigh more than in the file.
@@ -63,7 +60,24 @@ def friction_values(kind: str, seed: int, folder: Path, logs: int = LOGS) -> lis
             link.mass - float(mass) for link, mass in zip(links, re.findall('mass value="(.+?)"', text), strict=True)
         ]
         truth["constant_force"][2] += GRAVITY * sum(wrong[2:])
-    return [item for key, values in truth.items() for item in _values(f"{kind} {seed}", done, key, values)]
+    values = [item for key, values in truth.items() for item in _values(f"{kind} {seed}", done, key, values)]
+    return values + (_base_values(f"{kind} {seed}", done, links) if kind == "planar" else [])
+
+
+def _base_values(name: str, done: IdentifiedMachine | None, links: Sequence[Link]) -> list[Value]:
+    """Return the inertial base parameters M11, M22, h, g1 and g2 of a planar arm."""
+    (m1, m2), (c1, c2), length = [one.mass for one in links], [one.centre[0] for one in links], links[1].origin[0]
+    own = [one.inertia[1, 1] + one.mass * one.centre[0] ** 2 for one in links]
+    moments = (m1 * c1 + m2 * length, m2 * c2)
+    truth = (own[0] + m2 * length**2, own[1], m2 * length * c2, *(GRAVITY * item for item in moments))
+    if done is None or done.robot is None:
+        return [Value(name, "base parameter", 0, float(true), math.nan, math.nan) for true in truth]
+    base = done.robot.inertias.base
+    rows = zip(truth, base.values.tolist(), base.standard_errors.tolist(), base.identifiable, strict=False)
+    return [
+        Value(name, "base parameter", 0, float(true), value, error if known else math.nan)
+        for true, value, error, known in rows
+    ]
 
 
 def gain_values(
@@ -94,7 +108,7 @@ def gain_values_with_centre(kind: str, seed: int, folder: Path) -> list[Value]:
 
 def _identified(logs: Sequence[Path], machine: Path, loaded: LoadedRuns | None = None) -> IdentifiedMachine | None:
     try:
-        return cdtool.identify(logs, machine, other_logs=loaded)
+        return cdtool.identify(logs, machine, loaded=loaded)
     except CdtoolError:
         return None
 

@@ -102,7 +102,9 @@ def test_the_names_of_logs_and_machines_are_text_in_the_page(identified: Identif
 
 
 def test_a_machine_without_fits_has_a_page_too(identified: IdentifiedMachine, tmp_path: Path) -> None:
-    bare = replace(identified, joints=(replace(identified.joints[0], rigid=None, two_mass=None, controller=None),))
+    bare = replace(
+        identified, joints=(replace(identified.joints[0], rigid=None, two_mass=None, controller=None, evidence=None),)
+    )
     write_identification(bare, [tmp_path / "page.html"])
     assert "data:image" not in (tmp_path / "page.html").read_text(encoding="utf-8")
     assert bare.summary["joints"][0]["not_identifiable"] == []
@@ -148,8 +150,8 @@ def test_the_unseen_part_of_the_real_axis_is_predicted_within_the_required_error
     assert DATA is not None
     machine = ROOT / "docs" / "examples" / "emps.toml"
     (joint,) = cdtool.identify([DATA / "emps" / "DATA_EMPS.mat"], machine).joints
-    assert joint.rigid is not None and joint.rigid.cross_validation is not None
-    assert joint.rigid.cross_validation.error < 2.2
+    assert joint.evidence is not None and joint.evidence.cross_validation is not None
+    assert joint.evidence.cross_validation.error < 2.2
     assert joint.controller is not None and joint.controller.comparison is not None
     difference = joint.controller.comparison.measured - joint.controller.comparison.computed
     assert np.sqrt(np.mean(difference**2)) < 0.5

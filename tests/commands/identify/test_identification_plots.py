@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.axis.rigid_axis import CrossValidation, UnseenRun, identify_rigid_axis
+from cdtool.commands.identify.axis.rigid_axis import identify_rigid_axis
+from cdtool.commands.identify.evidence import CrossValidation, UnseenRun
 from cdtool.commands.identify.plots import draw_friction, draw_unseen_run
 from cdtool.report.plots.figures import encoded
 from tests.synthetic.gate_runs import GATE, free_runs
@@ -27,7 +28,7 @@ def validation(wrong_by: float) -> CrossValidation:
 
 
 def test_friction_has_bars_of_two_standard_errors_and_the_model_over_the_same_speeds() -> None:
-    fit = identify_rigid_axis(free_runs(GATE, 404, 3), GATE.motor_mass)
+    fit = identify_rigid_axis(free_runs(GATE, 404, 3), GATE.motor_mass).evidence
     left, right = draw_friction(fit, UNITS).axes
     model = lines(left)["model"]
     # One speed: the model is flat, the measured friction is not.

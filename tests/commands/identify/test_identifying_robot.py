@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -14,15 +15,16 @@ from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.files.strict_json import strict_json
 from cdtool.commands.identify.estimate import IdentificationError, Missing
 from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.commands.identify.identifying_robot import LoadedRuns
 from cdtool.commands.identify.robot.consistent_inertia import is_consistent
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns
 from cdtool.commands.identify.robot.friction_choice import FrictionForm
-from cdtool.commands.identify.robot.robot_regressor import body_parameters, with_bodies
-from cdtool.commands.identify.robot.robot_run import RobotRun
+from cdtool.commands.identify.robot.robot_regressor import body_parameters, regressor_of, with_bodies
+from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
+from cdtool.machines.urdf_reader import read_urdf
 from cdtool.machines.urdf_robot import UrdfRobot
 from tests.commands.identify.robot_motion import (
     PANDA_JOINTS,
@@ -37,7 +39,7 @@ from tests.commands.identify.robot_motion import (
     ur10e_run,
     write_log,
 )
-from tests.data_folder import UR10E_LOGS
+from tests.data_folder import UR10E_LOGS, data, needs_data
 
 ROOT = Path(__file__).parents[3]
 ARM = """[machine]
@@ -87,20 +89,21 @@ def test_missing_friction_of_a_planar_arm_is_found_and_its_drawing_stays(tmp_pat
     assert '"form": "' in strict_json(done.summary)
 
 
-def test_wrong_links_of_a_planar_arm_are_replaced(tmp_path: Path) -> None:
+def test_wrong_links_of_a_planar_arm_show_in_its_base_parameters_and_stay(tmp_path: Path) -> None:
     wrong = ARM.replace("[0.14, 0.18]", "[0.10, 0.25]").replace("[0.012, 0.018]", "[0.05, 0.002]")
     path = files(tmp_path, TRUE, wrong, [fourier(seed, 2, 12.0, 0.01) for seed in (1, 2)])
     done = cdtool.identify([str(tmp_path / "run*.csv")], path, tmp_path / "identified.toml")
     assert done.robot is not None
-    assert done.robot.inertias is not None
-    assert done.robot.inertias.is_new
-    new = read_machine_file(done.written).machine
-    assert isinstance(new, PlanarArm)
-    assert new.centre_of_mass == pytest.approx((0.14, 0.18), abs=0.004)
-    assert new.nominal_inertia == pytest.approx(TRUE.nominal_inertia, rel=0.05)
-    other = fourier(7, 2, 5.0, 0.01)
-    motion = other.position, other.speed, other.acceleration
-    assert new.required_torque(*motion) == pytest.approx(TRUE.required_torque(*motion), abs=0.25)
+    inertias = done.robot.inertias
+    assert not inertias.is_new
+    assert "only a URDF" in inertias.refused
+    true = regressor_of(TRUE).values[:5]
+    assert [name[:2] for name in inertias.base.names[:5]] == ["M1", "M2", "h", "g1", "g2"]
+    assert (np.abs(inertias.base.values[:5] - true) < 4.0 * inertias.base.standard_errors[:5]).all()
+    assert inertias.base.values[:5] == pytest.approx(true, rel=0.1)
+    written = read_machine_file(done.written).machine
+    assert isinstance(written, PlanarArm)
+    assert written.centre_of_mass == (0.10, 0.25)
 
 
 def test_one_direction_gives_friction_that_is_known_only_together(tmp_path: Path) -> None:
@@ -180,11 +183,9 @@ def test_the_free_runs_of_the_sample_arm_repeat_one_motion(tmp_path: Path) -> No
     assert first.robot is not None
     assert second.robot is not None
     assert second.robot.form is FrictionForm.PREVIOUS
-    assert done.robot is not None
-    assert done.robot.repeated.pairs == 9
-    floor = done.robot.repeated.floor[0]
-    assert floor < first.robot.errors[first.robot.form] < 2.0 * floor
-    assert first.robot.errors[FrictionForm.PREVIOUS] > 10.0 * floor
+    # One run deviates from an equal one by 0.14 N m (RMS).
+    assert 0.14 < first.robot.errors[first.robot.form] < 0.28
+    assert first.robot.errors[FrictionForm.PREVIOUS] > 1.4
     assert read_machine_file(tmp_path / "arm.toml").machine.joints == ("arm", "forearm")
 
 
@@ -204,7 +205,7 @@ def test_torque_constants_from_runs_with_a_payload(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_text(ARM + channels_of(2, "[10.0, 10.0]"), encoding="utf-8")
     payload = LoadedRuns((tmp_path / "loaded.csv",), 0.7, centre=(0.25, 0.0, 0.0))
-    done = cdtool.identify([tmp_path / "free.csv"], path, tmp_path / "new.toml", other_logs=payload)
+    done = cdtool.identify([tmp_path / "free.csv"], path, tmp_path / "new.toml", loaded=payload)
     values = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
     assert values["channels"]["torque"]["scale"] == pytest.approx([12.0, 8.0], rel=0.03)
     assert values["channels"]["torque"]["columns"] == ["t0", "t1"]
@@ -216,11 +217,11 @@ def test_torque_constants_from_runs_with_a_payload(tmp_path: Path) -> None:
 def test_a_payload_of_an_axis_or_of_an_unknown_link_is_refused(tmp_path: Path) -> None:
     gate = ROOT / "sample_logs" / "gate"
     with pytest.raises(UsageError, match="payload is given for an axis"):
-        cdtool.identify([gate / "free" / "03.csv"], gate / "machine.toml", other_logs=LoadedRuns(("x.csv",), 1.0))
+        cdtool.identify([gate / "free" / "03.csv"], gate / "machine.toml", loaded=LoadedRuns(("x.csv",), 1.0))
     path = files(tmp_path, TRUE, ARM, [fourier(1, 2, 6.0, 0.01)])
     payload = LoadedRuns((tmp_path / "run0.csv",), 1.0, "hand")
     with pytest.raises(ConfigurationError, match="unknown link 'hand'"):
-        cdtool.identify([tmp_path / "run0.csv"], path, other_logs=payload)
+        cdtool.identify([tmp_path / "run0.csv"], path, loaded=payload)
 
 
 PANDA = """[machine]
@@ -325,3 +326,30 @@ def test_the_ur10e_keeps_its_inertias(real) -> None:
     assert Missing.OTHER_MOTION in found.missing
     assert found.numbers["not_determined"] == 12.0
     assert done.joints[1].robot.form is FrictionForm.PREVIOUS
+
+
+@needs_data("ur10e_motions/ur-20_02_05-20sec_12harm.csv", "ur10e_motions/ur-20_02_06-20sec_5harm.csv")
+def test_the_ur10e_with_links_of_another_robot_gets_its_own_from_a_motion_of_all_joints(tmp_path: Path) -> None:
+    """With links that are wrong by a factor of 0.5 to 2, those from one motion predict another one."""
+    pytest.importorskip("cvxpy")
+    ur10e(tmp_path)
+    text = (UR10E_LOGS / "ur10e.urdf").read_text(encoding="utf-8")
+    tree = read_urdf(UR10E_LOGS / "ur10e.urdf", tuple(f"joint{i}" for i in range(1, 7)), {})
+    factors = np.array([1.0, 2.0, 0.5, 2.0, 0.5, 1.5])[:, np.newaxis]
+    wrong = with_bodies(tree, factors * np.array([body_parameters(joint) for joint in tree.joints]))
+    (tmp_path / "wrong.urdf").write_text(updated_urdf(text, wrong), encoding="utf-8")
+    path = tmp_path / "machine.toml"
+    path.write_text(re.sub('urdf = ".+"', 'urdf = "wrong.urdf"', path.read_text(encoding="utf-8")), encoding="utf-8")
+    learned, other = (data(f"ur10e_motions/ur-20_02_0{name}harm.csv") for name in ("5-20sec_12", "6-20sec_5"))
+    done = cdtool.identify([learned], path, tmp_path / "new.toml")
+    assert done.robot is not None
+    assert done.robot.inertias.is_new
+    assert done.robot.inertias.residual_rise < 0.02
+    run = robot_run(cdtool.read(other, path))
+    motion = run.position, run.speed, run.acceleration()
+    before, after = (
+        np.sqrt(np.nanmean((run.torque - read_machine_file(file).machine.required_torque(*motion)) ** 2, axis=0))
+        for file in (path, tmp_path / "new.toml")
+    )
+    assert (after < 1.1 * before).all()
+    assert (after[1:4] < 0.75 * before[1:4]).all()

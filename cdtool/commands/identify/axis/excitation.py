@@ -29,8 +29,8 @@ class Excitation:
 
     `speeds`: distinct speeds at which at least 5 % of the moving time is spent, in ascending order, without sign
     [m/s]. `forward_share`: of the moving time [-]. `highest_speed` [m/s]: the 99 % quantile of |speed|.
-    `acceleration` [m/s2]: the root mean square while moving, and `acceleration_noise` that of the noise in it;
-    `highest_acceleration` [m/s2]: the 99 % quantile of its magnitude. `moving_time` [s]: of all runs.
+    `acceleration` [m/s2]: the root mean square while moving, and `acceleration_noise` that of the noise in it.
+    `moving_time` [s]: of all runs.
     """
 
     speeds: tuple[float, ...]
@@ -39,7 +39,6 @@ class Excitation:
     acceleration: float
     acceleration_noise: float
     moving_time: float
-    highest_acceleration: float
 
     @property
     def is_one_way(self) -> bool:
@@ -70,7 +69,7 @@ def excitation_of(speed: FloatArray, acceleration: FloatArray, duration: FloatAr
     """Return what samples of motion excite (n,): speed, acceleration, time that each lasts [s], its noise or NaN."""
     total = float(np.sum(duration))
     if total <= 0.0:
-        return Excitation((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return Excitation((), 0.0, 0.0, 0.0, 0.0, 0.0)
     size, share = np.abs(speed), duration / total
     highest = float(np.quantile(size, 0.99))
     return Excitation(
@@ -80,7 +79,6 @@ def excitation_of(speed: FloatArray, acceleration: FloatArray, duration: FloatAr
         math.sqrt(float(share @ acceleration**2)),
         math.sqrt(float(share @ noise**2)),
         total,
-        float(np.quantile(np.abs(acceleration), 0.99)),
     )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -56,24 +55,6 @@ _DEPENDENT = 1e7
 _LEAST_REMAINING = 1e-6
 # A coefficient takes part in a combination that is lost if its share is above this [-].
 _INVOLVED = 1e-3
-
-
-class LagForm(Enum):
-    """How a channel lags: through a first-order low-pass, or by a pure delay."""
-
-    LOW_PASS = "low-pass"
-    DELAY = "delay"
-
-
-@dataclass(frozen=True)
-class TorqueLag:
-    """The lag of the logged torque behind the true one [s]; 0 for none."""
-
-    time: float = 0.0
-    form: LagForm = LagForm.LOW_PASS
-
-
-NO_LAG = TorqueLag()
 
 
 class LowPass:
@@ -141,12 +122,6 @@ def _convolved(signal: FloatArray, weights: FloatArray) -> FloatArray:
         reach = len(weights) // 2
         result[reach : len(signal) - reach] = np.convolve(signal, weights, mode="valid")
     return result
-
-
-def shifted(signal: FloatArray, samples: float) -> FloatArray:
-    """Return the signal (n,) that many samples, or parts of one, earlier; NaN where it is not known."""
-    index = np.arange(len(signal), dtype=np.float64)
-    return np.asarray(np.interp(index + samples, index, signal, left=np.nan, right=np.nan))
 
 
 def known_sections(known: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -304,12 +279,12 @@ def _usual_highest(speed: FloatArray) -> float:
     return float(np.quantile(known, 0.95)) if len(known) else 0.0
 
 
-def filter_run(run: AxisRun, corner: float, torque_lag: TorqueLag = NO_LAG) -> FilteredRun:
+def filter_run(run: AxisRun, corner: float, torque_lag: float = 0.0) -> FilteredRun:
     """Return a run's channels through a low-pass of `corner` [Hz].
 
     Speed and acceleration come from the measured position, or from the speed if the position is missing or is
     its integral. The sign of the speed is unknown below 0.5 % of the usual highest speed, and below 4 standard
-    deviations of the speed's noise. `torque_lag` is undone: F + lag F' for a low-pass, a shift for a delay. Raises
+    deviations of the speed's noise. `torque_lag` [s], of a low-pass of the torque, is undone: F + lag F'. Raises
     IdentificationError without position and speed.
     """
     low_pass, inner = LowPass(corner, run.period), LowPass(2.0 * corner, run.period)
@@ -333,15 +308,11 @@ def filter_run(run: AxisRun, corner: float, torque_lag: TorqueLag = NO_LAG) -> F
     if position is None:
         position = np.cumsum(np.nan_to_num(source)) * run.period
     force, slope, curvature = low_pass.value(run.torque), low_pass.slope(run.torque), low_pass.curvature(run.torque)
-    if torque_lag.form is LagForm.LOW_PASS:
-        force, slope = force + torque_lag.time * slope, slope + torque_lag.time * curvature
-    else:
-        force, slope = (shifted(item, torque_lag.time / run.period) for item in (force, slope))
     return FilteredRun(
         run,
         low_pass,
-        force,
-        slope,
+        force + torque_lag * slope,
+        slope + torque_lag * curvature,
         acceleration,
         speed,
         low_pass.value(position),

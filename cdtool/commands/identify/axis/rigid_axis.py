@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -20,18 +19,11 @@ from cdtool.commands.identify.axis.filtered_regression import (
     FilteredRun,
     IntArray,
     LinearFit,
-    TorqueLag,
     block_covariance,
     filter_run,
     fit_linear,
 )
-from cdtool.commands.identify.axis.friction_curve import (
-    FrictionCurve,
-    friction_curve,
-    profile_covariance,
-    speed_edges,
-)
-from cdtool.commands.identify.axis.torque_lag import apparent_lag, best_lag
+from cdtool.commands.identify.axis.profile_covariance import profile_covariance
 from cdtool.commands.identify.estimate import (
     Estimate,
     IdentificationError,
@@ -40,6 +32,7 @@ from cdtool.commands.identify.estimate import (
     Missing,
     NotIdentifiable,
 )
+from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, UnseenRun
 from cdtool.machines.axis_model.axis_run import AxisRun
 
 
@@ -48,8 +41,8 @@ class RigidAxisSettings:
     """How a rigid axis is identified.
 
     `low_pass_hz`: corner of the low-pass of every term. `units`: of inertia, force and travel. `torque_filter_time`
-    [s]: of the low-pass through which the torque was logged, 0 for none; None if it is not known: a lag that the runs
-    show is then undone.
+    [s]: of the low-pass through which the torque was logged, 0 for none; None if it is not known: where the runs show
+    a lag, the mass is then not identifiable.
     """
 
     low_pass_hz: float = 20.0
@@ -65,9 +58,11 @@ class RigidAxisSettings:
     largest_coulomb_error: float = 0.5
     #: Acceleration with this share of noise is not fitted by least squares: it would lower the mass by its square.
     noisy: float = 0.2
-    #: The form of an identified lag of the torque is a guess: this share of what it changes in the mass is an error ...
-    lag_form: float = 0.25
-    #: ... and this share of what a lag that is not certain would change.
+    #: A lag of the torque is there if it is this many times its standard error ...
+    certain_lag: float = 3.0
+    #: ... and explains this share of the residual's variance.
+    least_explained: float = 0.05
+    #: This share of what a lag would change in the mass is an error, if it is not certain or left by a stated one.
     lag_left: float = 0.5
     #: The most folds of a cross-validation.
     folds: int = 8
@@ -78,52 +73,6 @@ _ENOUGH_STROKES, _PIECES = 3, 6
 # Strokes repeat each other within this share of duration and travel; their forces are compared at so many times within
 # this share of them, as their ends do not agree to a sample.
 _SAME_STROKE, _TIMES, _INNER = 0.02, 400, 0.98
-
-
-@dataclass(frozen=True, eq=False)
-class UnseenRun:
-    """The force on a run whose parts were left out of the fit in turn: (n,) [N, N m] at `time` [s] while moving.
-
-    `of_runs`: the number of runs it is the worst of.
-    """
-
-    run: str
-    time: FloatArray
-    measured: FloatArray
-    predicted: FloatArray
-    of_runs: int
-
-    @property
-    def error(self) -> float:
-        """Return the root mean square of what the prediction leaves over [N, N m]."""
-        return float(np.sqrt(np.mean((self.measured - self.predicted) ** 2)))
-
-
-@dataclass(frozen=True, eq=False)
-class CrossValidation:
-    """How well the force is predicted while moving, in runs, or strokes of a single run, left out of the fit.
-
-    `error` [N, N m]: root mean square. `folds`: how often something was left out. `floor` [N, N m]: standard deviation
-    of the force between strokes that repeat each other, over `repeats` strokes; NaN without repeats. `worst`: the run
-    that is described worst.
-    """
-
-    error: float
-    folds: int
-    floor: float
-    repeats: int
-    worst: UnseenRun
-
-    @property
-    def left_over(self) -> float:
-        """Return the error over the floor; NaN without a floor."""
-        return self.error / self.floor if self.floor > 0.0 else math.nan
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """Return the errors as JSON values."""
-        worst = {"worst_run": self.worst.run, "error_of_worst_run": self.worst.error, "of_runs": self.worst.of_runs}
-        return {"error": self.error, "floor": self.floor, "repeats": self.repeats, **worst}
 
 
 @dataclass(frozen=True)
@@ -145,10 +94,7 @@ class RigidAxisFit:
     """An identified rigid axis.
 
     `identified`: per parameter an estimate or what is missing. `total_mass` [kg, kg m2] with its standard error: motor
-    and load. `levels`: per direction. `speed`, `friction`, `residual` (m,): of each equation, the force without that of
-    the inertia, and what the model leaves over. `friction_curve`: the friction over signed speed; `position_curves`:
-    the residual over position, per direction (1, -1). `cross_validation` is None with a single stroke. `torque_lag`:
-    behind the motion, stated or found; all forces are without it.
+    and load. `levels`: per direction. All forces are without a stated lag.
     """
 
     identified: Identified
@@ -157,13 +103,7 @@ class RigidAxisFit:
     levels: tuple[FrictionLevel, ...]
     condition_number: float
     excitation: Excitation
-    speed: FloatArray = field(repr=False)
-    friction: FloatArray = field(repr=False)
-    residual: FloatArray = field(repr=False)
-    friction_curve: FrictionCurve = field(repr=False)
-    position_curves: dict[int, FrictionCurve] = field(repr=False)
-    cross_validation: CrossValidation | None
-    torque_lag: TorqueLag
+    evidence: ForceEvidence = field(repr=False)
 
 
 def identify_rigid_axis(
@@ -184,8 +124,7 @@ def identify_rigid_axis(
     RigidAxisFit
         `identified` has in section "machine" `load_mass` (total minus motor), `viscous_friction`, `coulomb_friction`
         (mean of the directions) and `constant_force`, which includes half the difference of the directions; in section
-        "model.friction" `coulomb_forward` and `coulomb_backward` with the whole difference, for an offset of 0; in
-        section "model.sensors" `torque_filter_time`, if it is not stated and the torque lags the motion.
+        "model.friction" `coulomb_forward` and `coulomb_backward` with the whole difference, for an offset of 0.
 
     Raises
     ------
@@ -205,39 +144,41 @@ def identify_rigid_axis(
     * The viscous friction needs three speeds. With fewer, neither it nor the Coulomb friction is identifiable; the
       mass is then the middle between no viscous friction and the best one, and half the difference is in its error.
     * Standard errors: jackknife over strokes plus random friction profiles of the residuals' spectrum.
-    * A torque that lags the motion is found by `torque_lag.apparent_lag` and undone, unless the acceleration is too
-      noisy to show it; a quarter of what this changes in the mass is in its error.
+    * To a first-order lag T the equation is F + T F' = M a + friction with the logged force F: T is one more
+      coefficient. A mass from a torque that lags is too small: it is refused, with T, until the lag is stated.
     * Fails: a drive that winds up while it accelerates (its mass is some percent wrong).
     """
     if not runs:
         raise IdentificationError("no runs", "give at least one impact-free recording")
-    filtered = [filter_run(run, settings.low_pass_hz, TorqueLag(settings.torque_filter_time or 0.0)) for run in runs]
+    filtered = [filter_run(run, settings.low_pass_hz, settings.torque_filter_time or 0.0) for run in runs]
     excitation = measure_excitation(filtered)
     equations = _equations(filtered, excitation, settings)
     if len(equations.force) < settings.fewest_equations:
         raise _too_few(filtered, excitation, len(equations.force), settings)
     lag = _torque_lag(equations, excitation, settings)
-    if lag.is_found:
-        filtered = [filter_run(run, settings.low_pass_hz, lag.lag) for run in runs]
-        equations = _equations(filtered, excitation, settings)
     solution = _with_noise_error(_solve(equations, excitation), excitation)
     levels = _levels(equations, solution.mass, excitation)
-    solution = replace(solution, mass_error=math.hypot(solution.mass_error, lag.mass_error), levels=levels)
-    speed, friction = equations.regressors[:, 1], equations.force - solution.mass * equations.regressors[:, 0]
+    mass_error = math.hypot(solution.mass_error, settings.lag_left * abs(lag.mass_change))
+    solution = replace(solution, mass_error=mass_error, levels=levels)
     return RigidAxisFit(
-        Identified.of(_answers(solution, excitation, motor_mass, settings, lag)),
+        Identified.of(
+            [
+                _load_mass(solution, excitation, motor_mass, settings, lag),
+                *_frictions(solution, excitation, settings),
+            ]
+        ),
         solution.mass,
         solution.mass_error,
         solution.levels,
         solution.fit.condition_number,
         excitation,
-        speed,
-        friction,
-        solution.fit.residuals,
-        friction_curve(speed, friction, equations.stroke, speed_edges(speed)),
-        _position_curves(equations, solution.fit.residuals),
-        _cross_validate(equations, settings.folds),
-        lag.lag,
+        ForceEvidence.of(
+            (equations.regressors[:, 1], equations.position),
+            equations.force - solution.mass * equations.regressors[:, 0],
+            solution.fit.residuals,
+            equations.stroke,
+            _cross_validate(equations, settings.folds),
+        ),
     )
 
 
@@ -263,20 +204,20 @@ def _too_few(
 class _Equations:
     """The equations of all runs, one per average of the low-pass; arrays (m,), columns (m, 4).
 
-    `regressors` are the `columns` of the runs; `instruments` has the same of the reference, or is None. `rows`: of
-    each run.
+    `regressors` are the `columns` of the runs; `instruments` has the same of the reference, or is None.
+    `force_slope`: the force's derivative [N/s, N m/s].
     """
 
     regressors: FloatArray
     instruments: FloatArray | None
     force: FloatArray
+    force_slope: FloatArray
     position: FloatArray
     run: IntArray
     time: FloatArray
     stroke: IntArray
     direction: FloatArray
     filtered: Sequence[FilteredRun]
-    rows: Sequence[IntArray]
 
     @property
     def block(self) -> IntArray:
@@ -339,40 +280,41 @@ def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings
         gather([run.columns for run in filtered]),
         None if instruments is None else gather(instruments),
         gather([run.force for run in filtered]),
+        gather([run.force_slope for run in filtered]),
         gather([run.position for run in filtered]),
         np.repeat(np.arange(len(rows)), [len(item) for item in rows]),
         gather([run.run.time for run in filtered]),
         np.concatenate([run.stroke[item] + first for run, item, first in zip(filtered, rows, offsets, strict=False)]),
         np.sign(gather([run.inner_speed for run in filtered])),
         filtered,
-        rows,
     )
 
 
 @dataclass(frozen=True)
-class _LagAnswer:
-    """The lag of the torque, stated or found, and the standard error of the mass that comes from it."""
+class _TorqueLag:
+    """The lag of the torque behind the motion [s], as one more coefficient, and what it adds to the mass."""
 
-    lag: TorqueLag
-    mass_error: float = 0.0
-    is_found: bool = False
+    time: float = 0.0
+    mass_change: float = 0.0
+    is_certain: bool = False
 
 
-def _torque_lag(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _LagAnswer:
-    stated = _LagAnswer(TorqueLag(settings.torque_filter_time or 0.0))
+def _torque_lag(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _TorqueLag:
+    """Return the lag that the stated one leaves; none where the acceleration is too noisy to show it."""
     if _is_noisy(excitation, settings) or not excitation.is_accelerated:
-        return stated
-    fitted = equations.filtered, equations.rows, _chosen_columns(excitation)
+        return _TorqueLag()
+    regressors = equations.regressors[:, _chosen_columns(excitation)]
     try:
-        apparent = apparent_lag(*fitted, equations.block)
-        if settings.torque_filter_time is not None or not apparent.is_certain:
-            return replace(stated, mass_error=settings.lag_left * abs(apparent.mass_change))
-        lag = best_lag(*fitted, apparent.time)
+        without = fit_linear(regressors, equations.force)
+        lagged = fit_linear(np.column_stack((regressors, -equations.force_slope)), equations.force)
     except IdentificationError:
-        return stated
-    # The mass is changed by the lag that was found, in proportion to the part of it that the least squares see.
-    change = apparent.mass_change * max(lag.time / apparent.time, 1.0)
-    return _LagAnswer(lag, settings.lag_form * abs(change), is_found=True)
+        return _TorqueLag()
+    time, variance = float(lagged.coefficients[-1]), block_covariance(lagged, equations.block)[-1, -1]
+    error = math.sqrt(variance) if variance >= 0.0 else math.inf
+    before, left = float(np.mean(without.residuals**2)), float(np.mean(lagged.residuals**2))
+    explains = before > 0.0 and 1.0 - left / before >= settings.least_explained
+    change = float(lagged.coefficients[0] - without.coefficients[0])
+    return _TorqueLag(time, change, explains and time > settings.certain_lag * error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -474,24 +416,12 @@ def _is_certain(value: float, error: float, most: float) -> bool:
     return value > 0.0 and error <= most * value
 
 
-def _answers(
-    solution: _AxisSolution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings, lag: _LagAnswer
-) -> list[Estimate | NotIdentifiable]:
-    answers = [
-        _load_mass(solution, excitation, motor_mass, settings),
-        *_frictions(solution, excitation, settings),
-    ]
-    if lag.is_found:
-        time, error = lag.lag.time, settings.lag_form * lag.lag.time
-        answers.append(Estimate("model.sensors", "torque_filter_time", time, error, "s", solution.method))
-    return answers
-
-
 def _load_mass(
-    solution: _AxisSolution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings
+    solution: _AxisSolution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings, lag: _TorqueLag
 ) -> Estimate | NotIdentifiable:
     load, error, most = solution.mass - motor_mass, solution.mass_error, settings.largest_mass_error
-    if excitation.is_accelerated and _is_certain(load, error, most):
+    has_lag = lag.is_certain and settings.torque_filter_time is None
+    if excitation.is_accelerated and _is_certain(load, error, most) and not has_lag:
         return Estimate("machine", "load_mass", load, error, settings.units[0], solution.method)
     numbers = {
         "total_mass": solution.mass,
@@ -500,6 +430,8 @@ def _load_mass(
         "acceleration": excitation.acceleration,
         "acceleration_noise": excitation.acceleration_noise,
     }
+    if has_lag:
+        return NotIdentifiable("machine", "load_mass", (Missing.TORQUE_FILTER,), {**numbers, "lag_s": lag.time})
     missing = [Missing.ACCELERATION]
     if _is_noisy(excitation, settings):
         missing.append(Missing.FINER_MOTION)
@@ -511,22 +443,10 @@ def _load_mass(
     return NotIdentifiable("machine", "load_mass", tuple(missing), numbers)
 
 
-def _speed_numbers(solution: _AxisSolution, excitation: Excitation) -> dict[str, float]:
-    numbers = {
-        "speeds": float(len(excitation.speeds)),
-        "speeds_needed": float(SPEEDS_NEEDED),
-        "condition_number": solution.fit.condition_number,
-    }
-    for level in solution.levels:
-        side = "forward" if level.direction > 0 else "backward"
-        numbers |= {f"{side}_speed": level.speed, f"{side}_friction": level.force}
-    return numbers
-
-
 def _frictions(
     solution: _AxisSolution, excitation: Excitation, settings: RigidAxisSettings
 ) -> list[Estimate | NotIdentifiable]:
-    numbers = {**_speed_numbers(solution, excitation), "forward_share": excitation.forward_share}
+    numbers = {"speeds": float(len(excitation.speeds)), "forward_share": excitation.forward_share}
     speeds = () if "viscous" in solution.names else (Missing.SECOND_SPEED,)
     reversals = (Missing.REVERSALS,) if excitation.is_one_way else ()
     force, unit = settings.units[1], f"{settings.units[1]} s/{settings.units[2]}"
@@ -556,16 +476,6 @@ _FRICTIONS = (
     ("model.friction", "coulomb_backward", {"coulomb": 1.0, "constant": -1.0}),
     ("machine", "constant_force", {"constant": 1.0}),
 )
-
-
-def _position_curves(equations: _Equations, residual: FloatArray) -> dict[int, FrictionCurve]:
-    position, curves = equations.position, {}
-    edges = np.linspace(position.min(), position.max(), 51)
-    for direction in (1, -1):
-        inside = equations.direction == direction
-        if np.any(inside) and edges[-1] > edges[0]:
-            curves[direction] = friction_curve(position[inside], residual[inside], equations.stroke[inside], edges)
-    return curves
 
 
 def _cross_validate(equations: _Equations, most: int) -> CrossValidation | None:

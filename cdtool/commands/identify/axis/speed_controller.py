@@ -20,7 +20,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.commands.identify.axis.filtered_regression import known_sections
-from cdtool.commands.identify.axis.observed_slope import observed_slope
 from cdtool.commands.identify.axis.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.commands.identify.estimate import (
     Estimate,
@@ -114,14 +113,22 @@ _LEAST_LAG, _LONGEST_FIRST_LAG = 0.2, 15.0
 _LONGEST_LAG = 0.2
 # A command above its limit by more than the log's rounding has another limit, or none.
 _BEYOND_LIMIT = 1.005
-# A value reached by so many samples, all within the log's quantum, is a limit.
-_PLATEAU_SAMPLES = 20
 # The noise of a torque is compared over these times [s]; a larger ratio of the variances of means is no noise.
 _NOISE_WINDOWS, _MORE_THAN_NOISE = (0.05, 0.4), 2.5
 # A controller that may be faster than its log is also simulated so many times per sample.
 _SUBSTEPS = 10.0
 # Evaluations of a trial, of a chosen structure, and of the last fit.
 _TRIAL, _CHOSEN, _LAST = 10, 25, 50
+# The median of the magnitude of normal noise over its standard deviation.
+_MEDIAN_TO_DEVIATION = 0.6745
+# The largest of thousands of values of noise, in standard deviations.
+_NOISE_DEVIATIONS = 4.0
+# A measured torque is averaged over at least so many samples.
+_FEWEST_AVERAGED = 4
+# Lags of the torque over which its slope is taken: it has followed the command by then.
+_SLOPE_LAGS = 3.0
+# Windows, in shortest ones.
+_SLOPE_WINDOWS = (1, 2, 4, 8, 16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,22 +149,15 @@ class ControllerFit:
     """An identified controller.
 
     `controller`: to simulate with; None if the speed gain is not identifiable. `kind`: its structure. `residual_rms`
-    [N, N m]: of the command, or of the measured force where that was compared (`is_command`). `delay_samples`: may be
-    -1 in a log that writes a command before the error from which it was computed. `lag` [s]: from the command to the
-    measured torque, through drive and torque sensor; NaN if unknown. `speed_feed_forward`: whether the position
-    reference's derivative is added to the speed reference. `speed_from_position`: whether the speed was computed from
-    the position because no logged speed explains the command. `comparison`: None without references or gains.
+    [N, N m]: of the command, or of the measured force where that was compared. `lag` [s]: from the command to the
+    measured torque, through drive and torque sensor; NaN if unknown. `comparison`: None without references or gains.
     """
 
     identified: Identified
     controller: Controller | None
     kind: ControllerKind
     residual_rms: float
-    is_command: bool = True
-    delay_samples: int = 0
     lag: float = math.nan
-    speed_feed_forward: bool = False
-    speed_from_position: bool = False
     comparison: ControllerComparison | None = None
 
 
@@ -247,10 +247,6 @@ class _Fit:
     def is_exact(self) -> bool:
         """Whether only the rounding of doubles is left."""
         return self.residual_rms < _ROUNDING * float(np.std(self.sections.output))
-
-    @property
-    def explains_all(self) -> bool:
-        return self.residual_rms**2 < _EXPLAINED * float(np.var(self.sections.output))
 
     @property
     def unexplained(self) -> float:
@@ -487,14 +483,13 @@ class _Source:
 
     `is_command`: the output is the logged command, else the measured torque. `from_position`: the speed is the
     position's difference, to be filtered, else the logged one. `has_position_loop`: a position error is known.
-    `has_speed_reference`: a speed reference is known. `feed_forward`: it is the position reference's difference.
+    `has_speed_reference`: a speed reference is known.
     """
 
     is_command: bool
     from_position: bool = False
     has_position_loop: bool = False
     has_speed_reference: bool = False
-    feed_forward: bool = False
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -527,9 +522,7 @@ def _sources(runs: Sequence[AxisRun]) -> list[_Source]:
         return []
     ways = ([False] if logged("speed") else []) + ([True] if logged("position") else [])
     return [
-        _Source(logged("reference_torque"), from_position, loop, logged("reference_speed"), feed_forward)
-        for from_position in ways
-        for feed_forward in ((False,) if logged("reference_speed") else (False, True))
+        _Source(logged("reference_torque"), from_position, loop, logged("reference_speed")) for from_position in ways
     ]
 
 
@@ -570,7 +563,7 @@ def _run_pieces(run: AxisRun, source: _Source, settings: ControllerSettings) -> 
     demanded = _rate(run, reference)
     speed_reference = _values(run, "reference_speed", source.has_speed_reference)
     rows = (
-        speed_reference + demanded if source.feed_forward else speed_reference,
+        speed_reference,
         reference - position if source.has_position_loop else np.zeros(len(run)),
         _rate(run, position) if source.from_position else _values(run, "speed"),
         _values(run, source.output),
@@ -637,7 +630,8 @@ def _search(runs: Sequence[AxisRun], settings: ControllerSettings) -> tuple[_Sou
         found = source, fit
         # What is left is noise of the torque, which no other source explains.
         is_noise = not source.is_command and _model_error(fit, False) == 0.0
-        if fit.explains_all or (is_noise and fit.unexplained < settings.most_unexplained):
+        is_explained = fit.residual_rms**2 < _EXPLAINED * float(np.var(sections.output))
+        if is_explained or (is_noise and fit.unexplained < settings.most_unexplained):
             break
     return found
 
@@ -688,10 +682,13 @@ def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[
     filtered = {"speed_filter_hz": _FIRST_CORNER / period} if "speed_filter_hz" in model.free else {}
     lag = min(model.values["lag"], _LONGEST_FIRST_LAG * period)
     first = {**filtered, "lag": lag, "anti_windup_rate": model.values["anti_windup_rate"] or _FIRST_ANTI_WINDUP}
-    for name, candidates in (("slew_limit", _slew_candidates), ("force_limit", _force_candidates)):
+    # Above this only noise is.
+    largest = float(np.quantile(np.abs(fit.sections.output), 0.995))
+    for name, candidates in (("slew_limit", _slopes(fit, source)), ("force_limit", [largest])):
         if name not in model.free:
-            for value in candidates(fit, source):
-                yield model.with_values({**first, name: value}, (name, "anti_windup_rate"))
+            for value in candidates:
+                if value > 0.0:
+                    yield model.with_values({**first, name: value}, (name, "anti_windup_rate"))
     present, every = model.values["delay_samples"], range(-1 if source.is_command else 0, settings.largest_delay + 1)
     for delay in every:
         # In a measured torque, which lags, a delay shows from sample to sample only.
@@ -704,49 +701,61 @@ def _exceeds_its_limit(fit: _Fit) -> bool:
     return _largest(fit.sections.output) > _BEYOND_LIMIT * fit.model.values["force_limit"]
 
 
-def _slew_candidates(fit: _Fit, source: _Source) -> list[float]:
-    """Return slew limits to try [N/s]: a plateau of a command, else high quantiles of the slope."""
+def _slopes(fit: _Fit, source: _Source) -> list[float]:
+    """Return high quantiles of the output's slope [N/s]: slew limits to try."""
     sections = fit.sections
-    if source.is_command:
-        change: FloatArray = np.abs(np.diff(sections.output))
-        change[sections.starts[1:-1] - 1] = 0.0
-        plateau = _plateau(change)
-        if plateau is not None:
-            return [plateau / sections.period]
     lags = min(fit.model.values["lag"] / sections.period, _LONGEST_FIRST_LAG)
     window = 4 if source.is_command else max(4, round(3.0 * lags))
     if window >= len(sections) // 4:
         return []
     smooth = sections.output if source.is_command else _mean_over(sections.output, window)
     slope = np.abs(smooth[window:] - smooth[:-window]) / (window * sections.period)
-    return [float(value) for value in np.quantile(slope, (0.8, 0.95, 0.99)) if value > 0.0]
-
-
-def _force_candidates(fit: _Fit, source: _Source) -> list[float]:
-    """Return a force limit to try [N]: a plateau of a command, else that above which only noise is."""
-    size = np.abs(fit.sections.output)
-    plateau = _plateau(size) if source.is_command else None
-    largest = float(np.quantile(size, 0.995)) if plateau is None else plateau
-    return [largest] if largest > 0.0 else []
-
-
-def _plateau(values: FloatArray) -> float | None:
-    """Return the value in the upper half at which most lie within the quantum; None where no 20 do."""
-    ordered = np.sort(values)
-    if not len(ordered) or ordered[-1] <= 0.0:
-        return None
-    width = max(2.0 * _quantum(ordered), 1e-6 * float(ordered[-1]))
-    upper = ordered[ordered > 0.5 * ordered[-1]]
-    within = np.searchsorted(upper, upper + width, side="right") - np.arange(len(upper))
-    most = int(np.argmax(within))
-    around = np.searchsorted(upper, upper[most] + 10.0 * width) - np.searchsorted(upper, upper[most] - 10.0 * width)
-    if within[most] < _PLATEAU_SAMPLES or within[most] < 0.5 * around:
-        return None
-    return float(np.median(upper[most : most + within[most]]))
+    return [float(value) for value in np.quantile(slope, (0.8, 0.95, 0.99))]
 
 
 def _largest(values: FloatArray) -> float:
     return float(np.max(np.abs(values), initial=0.0))
+
+
+def observed_slope(runs: Sequence[AxisRun], is_command: bool, lag: float = math.nan) -> float:
+    """Return a slope that the command reached in these runs [N/s, N m/s]; NaN where no run is long enough.
+
+    Of a logged command it is the largest change from sample to sample. Of the measured torque, which follows the
+    command later and flatter by the time constant `lag` [s], it is the largest mean slope over a window of at
+    least three lags, less what noise adds: never more than the command had.
+    """
+    found = [slope for run in runs if math.isfinite(slope := _slope_of_run(run, is_command, lag))]
+    return max(found, default=math.nan)
+
+
+def _slope_of_run(run: AxisRun, is_command: bool, lag: float) -> float:
+    values = run.reference_torque if is_command else run.torque
+    if values is None:
+        return math.nan
+    if is_command:
+        return float(np.fmax.reduce(np.abs(np.diff(values)), initial=math.nan)) / run.period
+    shortest = max(_FEWEST_AVERAGED, round(_SLOPE_LAGS * lag / run.period) if math.isfinite(lag) else 0)
+    known = np.isfinite(values)
+    # A long window has little noise, a short one sees a short rise: each is a bound, and the highest counts.
+    slopes = [
+        _rise(values[a:b], window) / (window * run.period)
+        for a, b in known_sections(known)
+        for window in (shortest * factor for factor in _SLOPE_WINDOWS)
+        if b - a > 3 * window
+    ]
+    return max(slopes, default=math.nan)
+
+
+def _rise(values: FloatArray, window: int) -> float:
+    """Return the largest change of the mean over a window to the next window, less what noise adds to it.
+
+    The noise of a measured torque has passed its filter and is not white: its size is that of the usual change, which
+    is noise alone as long as the torque is steady for more than half of the run.
+    """
+    means = np.convolve(values, np.full(window, 1.0 / window), mode="valid")
+    changes = np.abs(means[window:] - means[:-window])
+    noise = float(np.median(changes)) / _MEDIAN_TO_DEVIATION
+    return max(float(np.max(changes)) - _NOISE_DEVIATIONS * noise, 0.0)
 
 
 def identify_controller(runs: Sequence[AxisRun], settings: ControllerSettings | None = None) -> ControllerFit:
@@ -856,7 +865,7 @@ def _moved_by_noise(fit: _Fit) -> FloatArray:
     sections = fit.sections
     fourth = np.diff(sections.inputs[2], 4)
     # Median, as at the edges of sections the differences are large; 70 is the sum of the squared weights.
-    deviation = float(np.median(np.abs(fourth))) / (0.6745 * math.sqrt(70.0))
+    deviation = float(np.median(np.abs(fourth))) / (_MEDIAN_TO_DEVIATION * math.sqrt(70.0))
     inputs = sections.inputs.copy()
     inputs[2] += deviation * np.random.default_rng(0).standard_normal(len(sections))
     noisier = _OutputError(replace(sections, inputs=inputs), fit.model).fit(_LAST, 1e-9)
@@ -918,11 +927,7 @@ def _reported(
         controller=controller,
         kind=_kind(model),
         residual_rms=fit.residual_rms,
-        is_command=source.is_command,
-        delay_samples=int(model.values["delay_samples"]),
         lag=lag.value,
-        speed_feed_forward=source.feed_forward,
-        speed_from_position=source.from_position,
         comparison=_comparison(fit, source.is_command) if controller is not None else None,
     )
 

@@ -122,20 +122,6 @@ class TwoMassFit:
     condition_number: float
     largest_wind_up: float
 
-    @property
-    def relative_error(self) -> dict[str, float]:
-        """Return the RMS error by channel over its RMS."""
-        totals: dict[str, list[tuple[float, float]]] = {}
-        for start in self.starts:
-            for name, values in start.modelled.items():
-                measured = start.ensemble.mean[name]
-                squares = float(np.mean((values - measured) ** 2)), float(np.mean(measured**2))
-                totals.setdefault(name, []).append(squares)
-        return {
-            name: math.sqrt(sum(a for a, _ in pairs) / max(sum(b for _, b in pairs), 1e-300))
-            for name, pairs in totals.items()
-        }
-
 
 def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> TwoMassFit:
     """Return load, drive stiffness and friction from the starts of impact-free runs.
@@ -462,8 +448,8 @@ class _Problem:
             if judged <= self.settings.largest_relative_error:
                 estimates.append(Estimate(section, key, float(value), float(error * value), unit, Method.OUTPUT_ERROR))
             else:
-                numbers = {"relative_standard_error": float(error), "condition_number": condition}
-                missing.append(NotIdentifiable(section, key, needed, numbers))
+                known = {"value": float(value), "standard_error": float(error * value)}
+                missing.append(NotIdentifiable(section, key, needed, {**known, "condition_number": condition}))
         return Identified(tuple(estimates), tuple(missing))
 
     def _directions(self) -> list[str]:

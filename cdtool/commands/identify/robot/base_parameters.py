@@ -23,31 +23,17 @@ _ROUNDING, _ZERO = 1e-8, 1e-10
 _SEED = 20_210
 
 
-@dataclass(frozen=True)
-class Range:
-    """Speeds and accelerations (J,) within which random motion is drawn; positions are within +-pi, rad or m."""
-
-    speed: tuple[float, ...]
-    acceleration: tuple[float, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class Grouping:
     """The base parameters of a choice of columns: beta = combination @ pi, Y pi = Y[:, base] beta for every motion.
 
     `columns`: indices into the regressor's columns (P,); `base`: the B of them whose column stands for a combination;
-    `combination` (B, P), the identity in the base columns; `absent`: columns without any effect on the torques.
+    `combination` (B, P), the identity in the base columns, 0 in those without any effect on the torques.
     """
 
     columns: tuple[int, ...]
     base: tuple[int, ...]
     combination: FloatArray
-    absent: tuple[int, ...]
-
-    @property
-    def grouped(self) -> tuple[int, ...]:
-        """Return the columns that occur in the combination of another column."""
-        return tuple(item for item in self.columns if item not in self.base and item not in self.absent)
 
     def is_alone(self, column: int) -> bool:
         """Return whether a column is a base parameter that contains no other parameter."""
@@ -72,7 +58,7 @@ class BaseParameterSet:
 
     `excitation` (B,): the part of the combination's column that is independent of all others, in the logged motion
     relative to random motion of the same speeds. `uncertainty` (B,): the standard error as a share of a joint's torque
-    in such motion. The value of a combination that is not `identifiable` (B,) is worthless.
+    in such motion; `together`: that of all. The value of a combination that is not `identifiable` (B,) is worthless.
     """
 
     names: tuple[str, ...]
@@ -80,10 +66,8 @@ class BaseParameterSet:
     covariance: FloatArray
     excitation: FloatArray
     uncertainty: FloatArray
+    together: float
     identifiable: tuple[bool, ...]
-
-    def __len__(self) -> int:
-        return len(self.names)
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -91,11 +75,10 @@ class BaseParameterSet:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
-def group_columns(regressor: Regressor, columns: tuple[int, ...], limits: Range | None = None) -> Grouping:
+def group_columns(regressor: Regressor, columns: tuple[int, ...]) -> Grouping:
     """Return the base parameters of these columns of a regressor, from random motion (seeded)."""
     joints = 1 + max(column.joint for column in regressor.columns)
-    limits = limits or Range((2.0,) * joints, (5.0,) * joints)
-    rows = random_rows(regressor, columns, limits)
+    rows = random_rows(regressor, columns, np.full(joints, 2.0), np.full(joints, 5.0))
     from scipy.linalg import qr, solve_triangular
 
     norms = np.linalg.norm(rows, axis=0)
@@ -110,22 +93,22 @@ def group_columns(regressor: Regressor, columns: tuple[int, ...], limits: Range 
     combination[np.arange(rank), kept] = 1.0
     combination[:, rest] = np.where(np.abs(factors) > _DEPENDENT, factors, 0.0)
     sequence = np.argsort(kept)
-    absent = sorted(set(range(len(columns))) - set(present.tolist()))
     return Grouping(
         columns=tuple(columns),
         base=tuple(columns[place] for place in kept[sequence].tolist()),
         combination=combination[sequence],
-        absent=tuple(columns[place] for place in absent),
     )
 
 
-def random_rows(regressor: Regressor, columns: tuple[int, ...], limits: Range) -> FloatArray:
-    """Return the regressor (n J, columns) of random motion, uniform within +-pi [rad, m] and the limits."""
-    joints = len(limits.speed)
+def random_rows(
+    regressor: Regressor, columns: tuple[int, ...], highest_speed: FloatArray, highest_acceleration: FloatArray
+) -> FloatArray:
+    """Return the regressor (n J, columns) of random motion, uniform within +-pi [rad, m] and the limits (J,)."""
+    joints = len(highest_speed)
     count = max(_FEWEST_STATES, 2 * len(columns))
     position, speed, acceleration = np.random.default_rng(_SEED).uniform(-1.0, 1.0, (3, count, joints))
     position = np.pi * position
-    motion = position, speed * limits.speed, acceleration * limits.acceleration
+    motion = position, speed * highest_speed, acceleration * highest_acceleration
     return stacked_torque(regressor, list(columns), *motion).reshape(count * joints, len(columns))
 
 

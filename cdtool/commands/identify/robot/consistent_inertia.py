@@ -12,17 +12,19 @@ torques do not determine the parameters of single links. Needs the extra cdtool[
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import ConfigurationError, UsageError, installing
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.errors import ConfigurationError, installing
 from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.commands.identify.robot.robot_dynamics import RobotFit, fitted_robot
-from cdtool.commands.identify.robot.robot_regressor import BODY_PARAMETERS, ColumnGroup, RegressorColumn, regressor_of
+from cdtool.commands.identify.robot.robot_dynamics import RobotFit
+from cdtool.commands.identify.robot.robot_regressor import BODY_PARAMETERS, ColumnGroup, regressor_of, with_bodies
+from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_robot import UrdfRobot
 
 _PER_BODY = len(BODY_PARAMETERS)
@@ -32,7 +34,6 @@ _MARGIN = 1e-7
 _FLAT = 1e-12
 # How much the distance to the machine's parameters counts beside the residual.
 _NEARNESS = 1e-8
-_NOT_NEGATIVE = (ColumnGroup.DRIVE_INERTIA, ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 # Relative to the torques: a rise of the residual below it is the solver's.
 _ROUNDING = 1e-7
 _TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
@@ -40,14 +41,14 @@ _TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
 
 @dataclass(frozen=True, eq=False)
 class ConsistentFit:
-    """A fit whose links are physical.
+    """A fit whose links are physical: `fit` with the consistent `parameters`, `tree` with their links.
 
-    `fit` with the consistent `parameters`; `robot` with them. `residual_rise`: relative rise of the RMS of the weighted
-    residual, about 0 if the parameters of least squares are consistent.
+    `residual_rise`: relative rise of the RMS of the weighted residual, about 0 if the parameters of least squares are
+    consistent.
     """
 
     fit: RobotFit
-    robot: UrdfRobot
+    tree: KinematicTree
     residual_rise: float
 
 
@@ -84,21 +85,39 @@ def is_consistent(parameters: FloatArray) -> bool:
 def consistent_fit(fit: RobotFit) -> ConsistentFit:
     """Return the fit with consistent parameters for every link, its residual raised as little as possible.
 
-    `fit`: of a UrdfRobot, with free inertial parameters. Friction and drive inertia are fitted again where they were
-    free, not below 0. Raises ConfigurationError if cvxpy or clarabel is not installed, UsageError for another machine
-    or without inertial parameters, IdentificationError if the solver fails.
+    `fit`: of a UrdfRobot, with free inertial parameters; its friction is fitted again, not below 0. Raises
+    ConfigurationError if cvxpy or clarabel is not installed, IdentificationError if the solver fails.
     """
-    if not isinstance(fit.machine, UrdfRobot):
-        raise UsageError(f"machine '{fit.machine.name}': has no URDF", "consistent_fit is for type = 'urdf_robot'")
-    if not any(fit.columns[i].group is ColumnGroup.INERTIAL for i in fit.grouping.columns):
-        raise UsageError("the inertial parameters were not free", "identify with free INERTIAL columns")
-    solver = _solver()
-    problem = _InertiaProblem(fit, solver)
-    values = problem.least_rise()
+    cvxpy, machine, free = _solver(), fit.machine, list(fit.grouping.columns)
+    assert isinstance(machine, UrdfRobot)
+    groups = [fit.columns[i].group for i in free]
+    is_inertial = np.array([group is ColumnGroup.INERTIAL for group in groups])
+    bodies = np.flatnonzero(is_inertial).reshape(-1, _PER_BODY)
+    prior = regressor_of(machine).values[free]
+    scale = _scales(machine, prior, is_inertial)
+    upper: FloatArray = np.asarray(np.linalg.qr(np.column_stack((fit.equations.rows, fit.equations.torques)), mode="r"))
+    rows, target = upper[:, :-1], upper[:, -1]
+    size = max(float(np.linalg.norm(target)), 1e-300)
+    # In units in which the numbers of the robot are about 1.
+    pi = cvxpy.Variable(len(free))
+    rest = (rows @ (fit.grouping.combination * scale) / size) @ pi - target / size
+    basis = np.array([pseudo_inertia(row).ravel() for row in np.eye(_PER_BODY)]).T
+    constraints = [cvxpy.reshape(basis @ pi[own], (4, 4), order="C") >> _MARGIN * np.eye(4) for own in bodies]
+    bounded = [i for i, group in enumerate(groups) if group in (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)]
+    constraints.append(pi[bounded] >= 0.0)
+    objective = cvxpy.sum_squares(rest) + _NEARNESS * cvxpy.sum_squares(pi - prior / scale)
+    values = _solved(cvxpy, cvxpy.Problem(cvxpy.Minimize(objective), constraints), pi, scale)
+    values[bounded] = np.maximum(values[bounded], 0.0)
+    if not all(is_consistent(values[own]) for own in bodies):
+        raise IdentificationError(
+            "no consistent inertial parameters were found", "check the signs of torque and gravity, or the URDF"
+        )
+    least = float(np.linalg.norm(target - rows @ fit.base.values))
+    now = float(np.linalg.norm(target - rows @ (fit.grouping.combination @ values)))
+    rise = max(0.0, now / max(least, _ROUNDING * size) - 1.0)
     parameters = fit.parameters.copy()
-    parameters[list(fit.grouping.columns)] = values
-    repaired = replace(fit, parameters=parameters)
-    return ConsistentFit(repaired, fitted_robot(repaired), problem.rise(values))
+    parameters[free] = values
+    return ConsistentFit(replace(fit, parameters=parameters), with_bodies(machine.tree, values[bodies]), rise)
 
 
 def _solver() -> Any:
@@ -113,103 +132,19 @@ def _solver() -> Any:
         ) from fault
 
 
-class _InertiaProblem:
-    """The semidefinite problem, in units in which the numbers of the robot are about 1.
-
-    Lengths are divided by `reach`, masses by the robot's `mass`; base parameters and residual by their own size.
-    """
-
-    def __init__(self, fit: RobotFit, cvxpy: Any) -> None:
-        self._cvxpy = cvxpy
-        self._fit = fit
-        columns = fit.grouping.columns
-        self._columns = [fit.columns[i] for i in columns]
-        machine = fit.machine
-        assert isinstance(machine, UrdfRobot)
-        self._bodies = len(machine.tree.joints)
-        prior = regressor_of(machine).values[list(columns)]
-        self._scale = _scales(machine, prior, self._columns)
-        self._prior = prior / self._scale
-        rows, torques = fit.equations.rows, fit.equations.torques
-        upper: FloatArray = np.asarray(np.linalg.qr(np.column_stack((rows, torques)), mode="r"))
-        self._upper, self._target = upper[:, :-1], upper[:, -1]
-        # K pi, with pi in these units.
-        self._combination = fit.grouping.combination * self._scale
-        self._size = max(float(np.linalg.norm(self._target)), 1e-300)
-
-    def least_rise(self) -> FloatArray:
-        """Return the consistent parameters of the least residual; raises IdentificationError if the solver fails."""
-        pi, constraints = self._variables()
-        rest = (self._upper @ self._combination / self._size) @ pi - self._target / self._size
-        nearness = _NEARNESS * self._cvxpy.sum_squares(pi - self._prior)
-        found = self._solved(self._cvxpy.Minimize(self._cvxpy.sum_squares(rest) + nearness), constraints, pi)
-        if found is None:
-            raise IdentificationError(
-                "no consistent inertial parameters were found", "check the signs of torque and gravity, or the URDF"
-            )
-        return found
-
-    def rise(self, values: FloatArray) -> float:
-        """Return the relative rise of the RMS of the weighted residual."""
-        base = self._fit.grouping.combination @ values
-        least = float(np.linalg.norm(self._target - self._upper @ self._fit.base.values))
-        now = float(np.linalg.norm(self._target - self._upper @ base))
-        return max(0.0, now / max(least, _ROUNDING * self._size) - 1.0)
-
-    def _variables(self) -> tuple[Any, list[Any]]:
-        pi = self._cvxpy.Variable(len(self._columns))
-        constraints = []
-        order = [place for place, column in enumerate(self._columns) if column.group is ColumnGroup.INERTIAL]
-        for body in range(self._bodies):
-            first = order[body * _PER_BODY]
-            constraints.append(_matrix(self._cvxpy, pi[first : first + _PER_BODY]) >> _MARGIN * np.eye(4))
-        positive = [place for place, column in enumerate(self._columns) if column.group in _NOT_NEGATIVE]
-        if positive:
-            constraints.append(pi[positive] >= 0.0)
-        return pi, constraints
-
-    def _solved(self, objective: Any, constraints: list[Any], pi: Any) -> FloatArray | None:
-        """Return the parameters in SI units; None if the problem has no solution."""
-        problem = self._cvxpy.Problem(objective, constraints)
-        with warnings.catch_warnings():
-            # That a solution may be inaccurate: whether it is consistent is checked.
-            warnings.simplefilter("ignore", UserWarning)
-            try:
-                problem.solve(solver=self._cvxpy.CLARABEL, **_TOLERANCES)
-            except self._cvxpy.SolverError:
-                return None
-        if problem.status not in ("optimal", "optimal_inaccurate") or pi.value is None:
-            return None
-        values = np.asarray(pi.value, dtype=np.float64)
-        return self._checked(values * self._scale)
-
-    def _checked(self, values: FloatArray) -> FloatArray | None:
-        """Return the parameters if every link is consistent; those that must not be negative are not."""
-        order = [place for place, column in enumerate(self._columns) if column.group is ColumnGroup.INERTIAL]
-        bodies = values[order].reshape(self._bodies, _PER_BODY)
-        if not all(is_consistent(body) for body in bodies):
-            return None
-        positive = [place for place, column in enumerate(self._columns) if column.group in _NOT_NEGATIVE]
-        values[positive] = np.maximum(values[positive], 0.0)
-        return values
+def _solved(cvxpy: Any, problem: Any, pi: Any, scale: FloatArray) -> FloatArray:
+    """Return the parameters in SI units; zeros, which are no body, if the problem has no solution."""
+    with warnings.catch_warnings(), suppress(cvxpy.SolverError):
+        # That a solution may be inaccurate: whether it is consistent is checked.
+        warnings.simplefilter("ignore", UserWarning)
+        problem.solve(solver=cvxpy.CLARABEL, **_TOLERANCES)
+    return np.zeros(len(scale)) if pi.value is None else np.asarray(pi.value * scale, dtype=np.float64)
 
 
-def _matrix(cvxpy: Any, pi: Any) -> Any:
-    """Return the pseudo-inertia of ten variables."""
-    basis = [pseudo_inertia(row).ravel() for row in np.eye(_PER_BODY)]
-    return cvxpy.reshape(np.array(basis).T @ pi, (4, 4), order="C")
-
-
-def _scales(machine: UrdfRobot, prior: FloatArray, columns: list[RegressorColumn]) -> FloatArray:
+def _scales(machine: UrdfRobot, prior: FloatArray, is_inertial: BoolArray) -> FloatArray:
     """Return the unit of each column: the robot's mass times a power of its reach, or the size of a friction."""
     reach = max(sum(float(np.linalg.norm(joint.translation)) for joint in machine.tree.joints), 1e-3)
     mass = max(sum(joint.mass for joint in machine.tree.joints), 1e-3)
-    inertial = np.array([1.0] + [reach] * 3 + [reach**2] * 6) * mass
-    scales, seen = [], 0
-    for column, value in zip(columns, prior.tolist(), strict=True):
-        if column.group is ColumnGroup.INERTIAL:
-            scales.append(float(inertial[seen % _PER_BODY]))
-            seen += 1
-        else:
-            scales.append(max(abs(value), 1.0))
-    return np.array(scales)
+    scales = np.maximum(np.abs(prior), 1.0)
+    scales[is_inertial] = mass * np.tile([1.0] + [reach] * 3 + [reach**2] * 6, len(machine.tree.joints))
+    return scales

@@ -15,14 +15,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.errors import ConfigurationError, UsageError, nearest
+from cdtool.base.errors import ConfigurationError, nearest
 from cdtool.commands.identify.estimate import (
     Estimate,
-    IdentificationError,
     Identified,
     Method,
     Missing,
@@ -31,11 +31,9 @@ from cdtool.commands.identify.estimate import (
 from cdtool.commands.identify.robot.robot_dynamics import (
     HALF_WIDTH,
     Equations,
-    Window,
     jackknife_blocks,
     jackknife_covariance,
-    resting_windows,
-    window_of_column,
+    windows_of,
 )
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, Regressor, TreeRegressor, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
@@ -56,16 +54,17 @@ _WORST_ERROR = 0.2
 _FRICTION = (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Payload:
-    """A known body fixed to a link: `mass` [kg], `centre` of mass (3) in the link's frame [m], None if not known.
+@dataclass(frozen=True)
+class LoadedRuns:
+    """Logs of motion with a known payload: `mass` [kg], fixed to a link, its `centre` of mass in the link's frame [m].
 
-    A planar arm's links are "arm" and "forearm", x along the link. Raises ConfigurationError for a mass that is not
-    above 0.
+    `centre` None: not known, then it is free. `link`: of the URDF, or "arm" or "forearm", x along it; empty: the link
+    that the last joint moves. Raises ConfigurationError for a mass that is not above 0.
     """
 
-    link: str
+    logs: tuple[str | Path, ...]
     mass: float
+    link: str = ""
     centre: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -76,7 +75,7 @@ class Payload:
 def drive_gains(
     unloaded: Sequence[RobotRun],
     loaded: Sequence[RobotRun],
-    payload: Payload,
+    payload: LoadedRuns,
     machine: CoupledMachine,
     scale: Sequence[float],
 ) -> Identified:
@@ -85,16 +84,14 @@ def drive_gains(
     `unloaded`, `loaded`: contact-free runs without and with the payload. `scale`: the present scale of the torque
     channel, one per joint. NotIdentifiable for a joint that
     the payload does not load, or not independently of its other torques, as with an unknown centre of mass. Raises
-    IdentificationError without runs of both kinds, ConfigurationError for an unknown link.
+    IdentificationError without motion, ConfigurationError for an unknown link.
     """
-    if not unloaded or not loaded:
-        raise IdentificationError("torque constants need runs with and without the payload", "give both")
-    if len(scale) != len(machine.joints):
-        raise UsageError(f"{len(scale)} values of scale", f"the machine has {len(machine.joints)} joints")
     regressor = regressor_of(machine)
     columns = _payload_columns(machine, regressor, payload)
-    parts = [_part(run, index, regressor, index >= len(unloaded)) for index, run in enumerate((*unloaded, *loaded))]
-    joints = [_JointWindows.of(joint, parts, regressor, columns) for joint in range(len(machine.joints))]
+    every = range(len(regressor.columns))
+    equations = windows_of((*unloaded, *loaded), regressor, every, frozenset(ColumnGroup), HALF_WIDTH)
+    is_loaded = equations.runs >= len(unloaded)
+    joints = [_JointWindows.of(joint, equations, is_loaded, regressor, columns) for joint in range(len(machine.joints))]
     most = max(float(np.linalg.norm(joint.load)) for joint in joints)
     has_centre = payload.centre is not None
     return Identified.of(
@@ -115,30 +112,6 @@ class _PayloadColumns:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """The windows of a run: `rows` (K, J, P), `torques`, `moves` (K, J), `times` and the run's `index` (K,)."""
-
-    rows: FloatArray
-    torques: FloatArray
-    moves: BoolArray
-    times: FloatArray
-    index: FloatArray
-    is_loaded: bool
-
-
-def _part(run: RobotRun, index: int, regressor: Regressor, is_loaded: bool) -> _Part:
-    if run.joint_count != len(regressor.machine.joints):
-        raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(regressor.machine.joints)}")
-    window = Window.of(HALF_WIDTH, run.period)
-    columns = [window_of_column(run, regressor, window, column) for column in range(len(regressor.columns))]
-    rows, torques = np.stack(columns, axis=2), window.average(run.torque)
-    times = run.start + run.period * (np.arange(len(torques)) * float(window.step) + len(window.weights) // 2)
-    known = np.isfinite(torques) & np.isfinite(rows).all(axis=2)
-    moves = known & ~resting_windows(run, regressor.machine, window)
-    return _Part(rows, torques, moves, np.asarray(times, np.float64), np.full(len(times), float(index)), is_loaded)
-
-
-@dataclass(frozen=True, eq=False)
 class _JointWindows:
     """A joint's windows: what they contain beside the payload, its `load` (m,), that of its `shifts` (m, k)."""
 
@@ -149,18 +122,16 @@ class _JointWindows:
     equations: Equations
 
     @classmethod
-    def of(cls, joint: int, parts: Sequence[_Part], regressor: Regressor, columns: _PayloadColumns) -> _JointWindows:
+    def of(
+        cls, joint: int, every: Equations, is_loaded: BoolArray, regressor: Regressor, columns: _PayloadColumns
+    ) -> _JointWindows:
         # Friction of its own for the runs with the payload.
         own = [column.joint == joint and column.group in _FRICTION for column in regressor.columns]
         free = np.concatenate((columns.free, np.eye(len(own))[own]))
-        rows, torques, times, runs = (
-            np.concatenate([getattr(part, name)[part.moves[:, joint]] for part in parts])
-            for name in ("rows", "torques", "times", "index")
-        )
-        plain = rows[:, joint]
-        loaded = plain * np.isin(runs, [part.index[0] for part in parts if part.is_loaded])[:, np.newaxis]
-        equations = Equations(plain, torques[:, joint], np.full(len(times), float(joint)), times, runs, 0.0 * times)
-        everything = np.column_stack((plain, loaded @ free.T))
+        chosen = every.joints == joint
+        equations = every.where(chosen)
+        loaded = equations.rows * is_loaded[chosen][:, np.newaxis]
+        everything = np.column_stack((equations.rows, loaded @ free.T))
         return cls(joint, everything, loaded @ columns.mass, loaded @ columns.shifts.T, equations)
 
     def constant(self, present: float, most: float, has_centre: bool) -> Estimate | NotIdentifiable:
@@ -200,13 +171,14 @@ def _basis(rows: FloatArray) -> FloatArray:
     return np.asarray(left[:, values > _UNSEEN * values[0]])
 
 
-def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Payload) -> _PayloadColumns:
+def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: LoadedRuns) -> _PayloadColumns:
     """Return what a payload adds to the regressor: its mass, first moments and inertias are columns of its link."""
     unit = np.eye(len(regressor.columns))
     if isinstance(regressor, TreeRegressor):
-        link = next((item for item in regressor.tree.links if item.name == payload.link), None)
-        if link is None or link.joint < 0:
-            moving = [item.name for item in regressor.tree.links if item.joint >= 0]
+        moving = {item.name: item for item in regressor.tree.links if item.joint >= 0}
+        last = next(item for item in moving.values() if item.joint == len(regressor.tree.joints) - 1)
+        link = moving.get(payload.link) if payload.link else last
+        if link is None:
             raise ConfigurationError(f"payload: no moving link '{payload.link}'", nearest(payload.link, moving))
         own = unit[10 * link.joint : 10 * (link.joint + 1)]
         mass, moments, inertias = own[0], own[1:4], own[4:]
@@ -214,11 +186,12 @@ def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Pay
         centre = None if payload.centre is None else turn @ np.array(payload.centre) + shift
     else:
         assert isinstance(machine, PlanarArm)
-        if payload.link not in machine.joints:
+        name = payload.link or machine.joints[-1]
+        if name not in machine.joints:
             raise ConfigurationError(f"payload: unknown link '{payload.link}'", nearest(payload.link, machine.joints))
         if payload.centre is not None and any(payload.centre[1:]):
             raise ConfigurationError("payload: its centre is off the link's axis", "give y = z = 0")
-        place, length, gravity = machine.joints.index(payload.link), machine.link_length, machine.gravity_acceleration
+        place, length, gravity = machine.joints.index(name), machine.link_length, machine.gravity_acceleration
         # On the forearm its mass moves with the end of the arm, and couples both links.
         mass = place * (length**2 * unit[0] + length * gravity * unit[3])
         moments = (place * length * unit[2] + gravity * unit[3 + place])[np.newaxis]

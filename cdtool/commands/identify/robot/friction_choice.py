@@ -31,7 +31,6 @@ class FrictionForm(Enum):
     """What of a joint's friction is new, the inertias of the links as they were unless stated."""
 
     PREVIOUS = "as before"
-    OFFSET = "constant force"
     FRICTION_ALONE = "viscous and Coulomb friction"
     FRICTION = "viscous and Coulomb friction, constant force"
     DRIVE_INERTIA = "viscous and Coulomb friction, constant force, drive inertia"
@@ -42,7 +41,6 @@ class FrictionForm(Enum):
         """Return the groups of parameters that are free in its fit."""
         friction = (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
         return {
-            FrictionForm.OFFSET: (ColumnGroup.CONSTANT,),
             FrictionForm.FRICTION_ALONE: friction,
             FrictionForm.FRICTION: (*friction, ColumnGroup.CONSTANT),
             FrictionForm.DRIVE_INERTIA: (ColumnGroup.DRIVE_INERTIA, *friction, ColumnGroup.CONSTANT),
@@ -139,7 +137,7 @@ def choose_friction(
     return tuple(joints), fits
 
 
-_TRIED = (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE, FrictionForm.OFFSET, FrictionForm.DRIVE_INERTIA)
+_TRIED = (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE, FrictionForm.DRIVE_INERTIA)
 
 
 def _of_joint(
@@ -155,15 +153,17 @@ def _of_joint(
     errors = {form: item.error(joint) for form, item in left_out.items()}
     whole = fits[FrictionForm.FRICTION]
     compared = _compared(joint, errors, left_out)
-    is_better = False
-    if compared is not None:
-        is_better = left_out[compared].is_better(joint, whole.left_out.of_joint(joint, is_previous=True), 1.0)
+    is_better = compared is not None and left_out[compared].gain(joint) > 1.0
     known = estimates[compared] if compared and is_better else ()
     missing = tuple(item for item in whole.identified.not_identifiable if item.joint == joint)
     # In one direction only the sum of constant force and Coulomb friction is identifiable.
     one_way = any(Missing.REVERSALS in item.missing for item in missing)
-    alone = tuple(item for item in known if not one_way and not _is_vague(item))
-    missing += tuple(_as_missing(item) for item in known if not one_way and _is_vague(item))
+    # Such a viscous friction describes nothing but the speeds of the logs.
+    vague = [item for item in known if item.key == ColumnGroup.VISCOUS.value and item.relative_error > _WORST_VISCOUS]
+    alone = tuple(item for item in known if not one_way and item not in vague)
+    for item in () if one_way else vague:
+        numbers = {"value": item.value, "standard_error": item.standard_error}
+        missing += (NotIdentifiable(item.section, item.key, (Missing.SECOND_SPEED,), numbers, joint),)
     return JointFriction(
         joint=joint,
         form=compared if compared and is_better else FrictionForm.PREVIOUS,
@@ -187,22 +187,10 @@ def _compared(
 ) -> FrictionForm | None:
     """Return the form that predicts best, with a drive inertia only if that is clear; None without any."""
     simple = [form for form in (FrictionForm.FRICTION_ALONE, FrictionForm.FRICTION) if form in errors]
-    chosen = FrictionForm.OFFSET if FrictionForm.OFFSET in errors else None
-    if simple:
-        chosen = min(simple, key=lambda form: errors[form])
-    if chosen is None:
+    if not simple:
         return None
+    chosen = min(simple, key=lambda form: errors[form])
     drive = left_out.get(FrictionForm.DRIVE_INERTIA)
-    if drive is not None and drive.is_better(joint, left_out[chosen].of_joint(joint), 2.0):
+    if drive is not None and drive.gain(joint, left_out[chosen]) > 2.0:
         return FrictionForm.DRIVE_INERTIA
     return chosen
-
-
-def _is_vague(estimate: Estimate) -> bool:
-    """Return whether a viscous friction describes nothing but the speeds of the logs."""
-    return estimate.key == ColumnGroup.VISCOUS.value and estimate.relative_error > _WORST_VISCOUS
-
-
-def _as_missing(item: Estimate) -> NotIdentifiable:
-    numbers = {"value": item.value, "standard_error": item.standard_error}
-    return NotIdentifiable(item.section, item.key, (Missing.SECOND_SPEED,), numbers, item.joint)

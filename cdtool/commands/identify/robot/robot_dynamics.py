@@ -32,7 +32,6 @@ from cdtool.commands.identify.estimate import (
 from cdtool.commands.identify.robot.base_parameters import (
     BaseParameterSet,
     Grouping,
-    Range,
     column_scale,
     condition_number,
     group_columns,
@@ -44,7 +43,6 @@ from cdtool.commands.identify.robot.robot_regressor import (
     Regressor,
     RegressorColumn,
     regressor_of,
-    with_bodies,
 )
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
@@ -106,37 +104,23 @@ class LeftOutTorque:
     joints: Index
     blocks: Index
 
-    def of_joint(self, joint: int, is_previous: bool = False) -> FloatArray:
-        """Return the residuals of a joint."""
-        chosen = self.previous if is_previous else self.residual
-        return np.asarray(chosen[self.joints == joint])
-
     def error(self, joint: int, is_previous: bool = False) -> float:
         """Return the RMS of the residuals of a joint [N m, N]; NaN for one without motion."""
-        own = self.of_joint(joint, is_previous)
+        own = (self.previous if is_previous else self.residual)[self.joints == joint]
         return _rms(own) if len(own) else math.nan
 
-    def is_better(self, joint: int, than: FloatArray, errors: float) -> bool:
-        """Return whether a joint's squared residual is below another model's by more than so many standard errors."""
-        gain, error = self._gain(joint, than)
-        return gain > errors * error
+    def gain(self, joint: int, other: LeftOutTorque | None = None) -> float:
+        """Return by how many standard errors a joint's squared residual is below another model's, or the machine's own.
 
-    def is_worse(self, joint: int, than: FloatArray, errors: float) -> bool:
-        """Return whether a joint's squared residual is above another model's by more than so many standard errors."""
-        gain, error = self._gain(joint, than)
-        return gain < -errors * error
-
-    def _gain(self, joint: int, than: FloatArray) -> tuple[float, float]:
-        """Return by how much the squared residual of a block is smaller than the other's, and the standard error.
-
-        Fewer than eight blocks are no sample: the error is infinite.
+        They are those between blocks; 0 with fewer than eight, which are no sample.
         """
         own = self.joints == joint
+        than = self.previous[own] if other is None else other.residual[own]
         blocks = np.unique(self.blocks[own], return_inverse=True)[1].ravel()
         sums = np.bincount(blocks, weights=than**2 - self.residual[own] ** 2)
         if len(sums) < _FEWEST_BLOCKS:
-            return 0.0, math.inf
-        return float(sums.mean()), float(sums.std(ddof=1)) / math.sqrt(len(sums))
+            return 0.0
+        return float(sums.mean()) / max(float(sums.std(ddof=1)) / math.sqrt(len(sums)), 1e-300)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +128,8 @@ class Equations:
     """Weighted equations of the runs: `rows` (m, B) of the base parameters, `torques` (m,), both times the weight.
 
     `joints`, `times` [s], `runs` (m,): the joint, the window's centre and the index of the run of each. `rigid` (m,):
-    the torque of the links, of which the inertias are taken as known; 0 where they are free.
+    the torque of the links, of which the inertias are taken as known; 0 where they are free. `averages` (m, 4), without
+    weight: torque, that of inertia and gravity by the machine's own parameters, speed, position.
     """
 
     rows: FloatArray
@@ -153,6 +138,11 @@ class Equations:
     times: FloatArray
     runs: FloatArray
     rigid: FloatArray
+    averages: FloatArray
+
+    def where(self, chosen: BoolArray) -> Equations:
+        """Return the chosen (m,) equations."""
+        return Equations(*(values[chosen] for values in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,8 +150,8 @@ class RobotFit:
     """The identified model of a robot.
 
     `parameters` (P,): every column of the regressor, those not identified as in the machine; `base` and its `grouping`
-    for all free columns; `condition_number` of the scaled equations; `equations`, weighted by joint, for what further
-    restricts the parameters; `machine` as it was.
+    for all free columns; `condition_number` of the scaled equations; `equations`, times the `weights` (J,) of the
+    joints, for what further restricts the parameters; `machine` as it was.
     """
 
     machine: CoupledMachine
@@ -173,6 +163,7 @@ class RobotFit:
     left_out: LeftOutTorque
     condition_number: float
     equations: Equations
+    weights: FloatArray
 
 
 def identify_robot(
@@ -198,15 +189,14 @@ def identify_robot(
     start = grouping.combination @ known[list(free)]
     bounded = _bounds(regressor.columns, grouping)
     solution = _Solution.of(
-        _windows_of(runs, regressor, grouping, free_groups, half_width), start, bounded, len(machine.joints)
+        windows_of(runs, regressor, grouping.base, free_groups, half_width), start, bounded, len(machine.joints)
     )
     equations = solution.equations
     parameters = known.copy()
     parameters[list(grouping.base)] += solution.values - start
-    transfer = _Transfer.of(runs, regressor, grouping, solution)
-    base = _base_set(regressor.columns, grouping, solution, transfer)
+    base = _base_set(runs, regressor, grouping, solution)
     condition = condition_number(equations.rows)
-    judge = _Judge(runs, machine, regressor.columns, grouping, base, transfer, condition, solution)
+    judge = _Judge(runs, machine, regressor.columns, grouping, base, condition, solution)
     left_out = _left_out(solution, start, bounded)
     return RobotFit(
         machine=machine,
@@ -218,29 +208,7 @@ def identify_robot(
         left_out=left_out,
         condition_number=condition,
         equations=equations,
-    )
-
-
-def fitted_robot(fit: RobotFit) -> UrdfRobot:
-    """Return the robot with all fitted parameters; raises UsageError for another machine than one from a URDF.
-
-    With free inertial parameters its motion as a whole is right; a single link may be unphysical, see
-    consistent_inertia.py.
-    """
-    machine = fit.machine
-    if not isinstance(machine, UrdfRobot):
-        raise UsageError(f"machine '{machine.name}': has no URDF", "fitted_robot is for type = 'urdf_robot'")
-    values = {group: np.array([fit.parameters[i] for i in _columns_of(fit, group)]) for group in ColumnGroup}
-    ratio = np.array(machine.transmission_ratio)
-    tree = with_bodies(machine.tree, values[ColumnGroup.INERTIAL])
-    drives = dict(zip(tree.order, values[ColumnGroup.DRIVE_INERTIA].tolist(), strict=True))
-    joints = tuple(replace(joint, drive_inertia=drives[joint.name]) for joint in tree.joints)
-    return replace(
-        machine,
-        tree=replace(tree, joints=joints),
-        viscous_friction=tuple((values[ColumnGroup.VISCOUS] * ratio**2).tolist()),
-        coulomb_friction=tuple((values[ColumnGroup.COULOMB] * np.abs(ratio)).tolist()),
-        constant_force=tuple((values[ColumnGroup.CONSTANT] * ratio).tolist()),
+        weights=solution.weights,
     )
 
 
@@ -253,16 +221,13 @@ def joint_estimates(fit: RobotFit, joint: int, method: Method) -> tuple[tuple[Es
     known: list[Estimate] = []
     together: list[Estimate] = []
     for group in (ColumnGroup.VISCOUS, ColumnGroup.COULOMB, ColumnGroup.CONSTANT):
-        value = float(fit.parameters[_columns_of(fit, group)[joint]])
+        columns = [i for i, column in enumerate(fit.columns) if column.group is group]
+        value = float(fit.parameters[columns[joint]])
         error = errors.get((group.value, joint), math.nan)
         unit = _UNITS[group][is_prismatic(fit.machine, joint)]
         estimate = Estimate("machine", group.value, value, error, unit, method, joint)
         (known if math.isfinite(error) else together).append(estimate)
     return tuple(known), tuple(together)
-
-
-def _columns_of(fit: RobotFit, group: ColumnGroup) -> list[int]:
-    return [i for i, column in enumerate(fit.columns) if column.group is group]
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,13 +263,12 @@ class Window:
         return np.asarray(windows @ weights)
 
 
-def resting_windows(run: RobotRun, machine: CoupledMachine, window: Window) -> BoolArray:
-    """Return which windows (K, J) hold a sample of a joint at rest or so slow that its dry friction is unknown."""
-    return window.average(run.slow(machine.stick_speed).astype(np.float64)) > 0.0
-
-
-def _windows_of(
-    runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, free: frozenset[ColumnGroup], half_width: float
+def windows_of(
+    runs: Sequence[RobotRun],
+    regressor: Regressor,
+    columns: Sequence[int],
+    free: frozenset[ColumnGroup],
+    half_width: float,
 ) -> Equations:
     """Return all equations, unweighted; what is not free is subtracted. Raises IdentificationError, UsageError."""
     machine, parts = regressor.machine, []
@@ -312,10 +276,13 @@ def _windows_of(
         if run.joint_count != len(machine.joints):
             raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
         window = Window.of(half_width, run.period)
-        rigid = rigid_torque(run, machine, window) * (ColumnGroup.INERTIAL not in free)
-        torque = window.average(run.torque) - rigid - _known_torque(run, regressor, window, free)
-        rows = np.stack([window_of_column(run, regressor, window, own) for own in grouping.base], axis=2)
-        valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
+        own = _rigid_torque(run, machine, window)
+        rigid = own * (ColumnGroup.INERTIAL not in free)
+        averages = window.average(run.torque), own, window.average(run.speed), window.average(run.position)
+        torque = averages[0] - rigid - _known_torque(run, regressor, window, free)
+        rows = np.stack([_window_of_column(run, regressor, window, column) for column in columns], axis=2)
+        rests = window.average(run.slow(machine.stick_speed).astype(np.float64)) > 0.0
+        valid = ~rests & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
         place, joint = np.nonzero(valid)
         times = run.start + run.period * (place * window.step + len(window.weights) // 2)
         parts.append(
@@ -326,6 +293,7 @@ def _windows_of(
                 times,
                 np.full(len(place), 1.0 * index),
                 rigid[valid],
+                np.stack(averages, axis=2)[valid],
             )
         )
     if not any(len(part[1]) for part in parts):
@@ -335,20 +303,20 @@ def _windows_of(
     return Equations(*(np.concatenate(item) for item in zip(*parts, strict=True)))
 
 
-def window_of_column(run: RobotRun, regressor: Regressor, window: Window, column: int) -> FloatArray:
+def _window_of_column(run: RobotRun, regressor: Regressor, window: Window, column: int) -> FloatArray:
     """Return the windows (K, J) of a column of the regressor: int -w' p + w h dt."""
     momentum, rest = regressor.momentum(column, run.position, run.speed)
     return window.rate(momentum) + window.average(rest)
 
 
-def rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> FloatArray:
+def _rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> FloatArray:
     """Return the windows' torques (K, J) of inertia and gravity, drives included."""
     momentum, velocity_force, gravity = machine.momentum_terms(run.position, run.speed)
     return window.rate(momentum) + window.average(gravity - velocity_force)
 
 
 def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: frozenset[ColumnGroup]) -> FloatArray:
-    """Return the windows' torques (K, J) of friction and drives that are not free, beside those of rigid_torque."""
+    """Return the windows' torques (K, J) of friction and drives that are not free, beside those of _rigid_torque."""
     values = regressor.values
     total = np.zeros_like(window.average(run.position))
     for column, item in enumerate(regressor.columns):
@@ -356,7 +324,7 @@ def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: fro
         contained = item.group is ColumnGroup.DRIVE_INERTIA and ColumnGroup.INERTIAL not in free
         factor = (0.0 if item.group in free else 1.0) - (1.0 if contained else 0.0)
         if item.group is not ColumnGroup.INERTIAL and values[column] and factor:
-            total += factor * values[column] * window_of_column(run, regressor, window, column)
+            total += factor * values[column] * _window_of_column(run, regressor, window, column)
     return total
 
 
@@ -457,16 +425,11 @@ def jackknife_blocks(equations: Equations, residual: FloatArray) -> Index:
             chosen = own & (equations.joints == joint)
             length = max(length, _CORRELATION_TIMES * _correlation_time(equations.times[chosen], residual[chosen]))
     length = max(_SHORTEST_BLOCK, min(length, duration / _FEWEST_BLOCKS))
-    labels = np.stack((equations.runs, np.floor((equations.times - _starts(equations)) / length)), axis=1)
+    runs = np.unique(equations.runs, return_inverse=True)[1].ravel()
+    first = np.full(int(runs.max()) + 1, np.inf)
+    np.minimum.at(first, runs, equations.times)
+    labels = np.stack((equations.runs, np.floor((equations.times - first[runs]) / length)), axis=1)
     return np.asarray(np.unique(labels, axis=0, return_inverse=True)[1]).ravel()
-
-
-def _starts(equations: Equations) -> FloatArray:
-    starts = np.empty(len(equations.times))
-    for run in np.unique(equations.runs):
-        own = equations.runs == run
-        starts[own] = equations.times[own].min()
-    return starts
 
 
 def _correlation_time(times: FloatArray, residual: FloatArray) -> float:
@@ -527,44 +490,6 @@ def _jackknife(equations: Equations, values: FloatArray, blocks: Index) -> Float
     return np.asarray(factor * changes.T @ changes)
 
 
-@dataclass(frozen=True, eq=False)
-class _Transfer:
-    """What the equations are worth for other motion: random poses at the speeds and accelerations of the runs.
-
-    `excitation` (B,): the independent part of each base column, per window, relative to that of random motion.
-    `uncertainty` (B,): the standard error of a parameter as a share of the torque in random motion, of the joint where
-    it is largest; `together`: that of all parameters.
-    """
-
-    excitation: FloatArray
-    uncertainty: FloatArray
-    together: float
-
-    @classmethod
-    def of(cls, runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, solution: _Solution) -> _Transfer:
-        machine = regressor.machine
-        stick = 10.0 * np.array(machine.stick_speed)
-        speed = np.max([_percentile(run.speed) for run in runs], axis=0)
-        acceleration = np.max([_percentile(run.acceleration()) for run in runs], axis=0)
-        limits = Range(tuple(np.maximum(speed, stick).tolist()), tuple(np.maximum(acceleration, stick).tolist()))
-        random = random_rows(regressor, grouping.base, limits).reshape(-1, len(stick), len(grouping.base))
-        flat = (random * solution.weights[:, np.newaxis]).reshape(-1, len(grouping.base))
-        equations = solution.equations
-        windows = len(np.unique(np.stack((equations.runs, equations.times)), axis=1).T)
-        wanted = independent_norms(flat) / math.sqrt(len(random))
-        seen = independent_norms(equations.rows) / math.sqrt(windows)
-        excitation = np.divide(seen, wanted, out=np.zeros_like(seen), where=wanted > 0.0)
-        # The torque of a joint, as a scale: what the model says, and at least what the runs had.
-        torque = np.sqrt(np.mean((random @ solution.values) ** 2, axis=0))
-        logged = np.sqrt(np.nanmean(np.concatenate([run.torque for run in runs]) ** 2, axis=0))
-        scale = np.maximum(torque, np.nan_to_num(logged)) + 1e-300
-        covariance = np.nan_to_num(solution.covariance, posinf=1e300)
-        single = np.sqrt(np.mean(random**2, axis=0)) * np.sqrt(np.diag(covariance)) / scale[:, np.newaxis]
-        variance = np.mean(np.einsum("njb,bc,njc->nj", random, covariance, random, optimize=True), axis=0)
-        together = float(np.max(np.sqrt(np.maximum(variance, 0.0)) / scale))
-        return cls(excitation, np.max(single, axis=0), together)
-
-
 def _percentile(values: FloatArray) -> FloatArray:
     """Return the 99th percentile of |values| of each joint (J,); 0 without values."""
     high = np.zeros(values.shape[1])
@@ -575,18 +500,39 @@ def _percentile(values: FloatArray) -> FloatArray:
 
 
 def _base_set(
-    columns: tuple[RegressorColumn, ...], grouping: Grouping, solution: _Solution, transfer: _Transfer
+    runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, solution: _Solution
 ) -> BaseParameterSet:
-    inertial = [columns[i].group is ColumnGroup.INERTIAL for i in grouping.base]
-    excited = transfer.excitation >= np.where(inertial, _EXCITED_INERTIAL, _EXCITED)
-    certain = transfer.uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT)
+    """Return the base parameters, and what they are worth for other motion of the same speeds and accelerations."""
+    stick = 10.0 * np.array(regressor.machine.stick_speed)
+    speed = np.max([_percentile(run.speed) for run in runs], axis=0)
+    acceleration = np.max([_percentile(run.acceleration()) for run in runs], axis=0)
+    limits = np.maximum(speed, stick), np.maximum(acceleration, stick)
+    random = random_rows(regressor, grouping.base, *limits).reshape(-1, len(stick), len(grouping.base))
+    flat = (random * solution.weights[:, np.newaxis]).reshape(-1, len(grouping.base))
+    equations = solution.equations
+    windows = len(np.unique(np.stack((equations.runs, equations.times)), axis=1).T)
+    wanted = independent_norms(flat) / math.sqrt(len(random))
+    seen = independent_norms(equations.rows) / math.sqrt(windows)
+    excitation = np.divide(seen, wanted, out=np.zeros_like(seen), where=wanted > 0.0)
+    # The torque of a joint, as a scale: what the model says, and at least what the runs had.
+    torque = np.sqrt(np.mean((random @ solution.values) ** 2, axis=0))
+    logged = np.sqrt(np.nanmean(np.concatenate([run.torque for run in runs]) ** 2, axis=0))
+    scale = np.maximum(torque, np.nan_to_num(logged)) + 1e-300
+    covariance = np.nan_to_num(solution.covariance, posinf=1e300)
+    single = np.sqrt(np.mean(random**2, axis=0)) * np.sqrt(np.diag(covariance)) / scale[:, np.newaxis]
+    uncertainty = np.max(single, axis=0)
+    variance = np.mean(np.einsum("njb,bc,njc->nj", random, covariance, random, optimize=True), axis=0)
+    inertial = [regressor.columns[i].group is ColumnGroup.INERTIAL for i in grouping.base]
+    excited = excitation >= np.where(inertial, _EXCITED_INERTIAL, _EXCITED)
+    certain = uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT)
     trusted = excited & certain & (solution.block_count >= _FEWEST_BLOCKS)
     return BaseParameterSet(
-        names=tuple(grouping.name(row, columns) for row in range(len(grouping.base))),
+        names=tuple(grouping.name(row, regressor.columns) for row in range(len(grouping.base))),
         values=solution.values,
         covariance=solution.covariance,
-        excitation=transfer.excitation,
-        uncertainty=transfer.uncertainty,
+        excitation=excitation,
+        uncertainty=uncertainty,
+        together=float(np.max(np.sqrt(np.maximum(variance, 0.0)) / scale)),
         identifiable=tuple(trusted.tolist()),
     )
 
@@ -600,25 +546,14 @@ class _Judge:
     columns: tuple[RegressorColumn, ...]
     grouping: Grouping
     base: BaseParameterSet
-    transfer: _Transfer
     condition: float
     solution: _Solution
 
     def outcome(self) -> Identified:
         """Return the estimates per joint, and one answer for the whole set of inertial parameters."""
-        estimates: list[Estimate] = []
-        missing: list[NotIdentifiable] = []
-        for index in self.grouping.columns:
-            column = self.columns[index]
-            if column.group is ColumnGroup.INERTIAL:
-                continue
-            found = self._of_joint(index, column)
-            if isinstance(found, Estimate):
-                estimates.append(found)
-            else:
-                missing.append(found)
-        missing.extend(self._of_set())
-        return Identified(tuple(estimates), tuple(missing))
+        every = [(index, self.columns[index]) for index in self.grouping.columns]
+        answers = [self._of_joint(*item) for item in every if item[1].group is not ColumnGroup.INERTIAL]
+        return Identified.of([*answers, *self._of_set()])
 
     def _of_joint(self, index: int, column: RegressorColumn) -> Estimate | NotIdentifiable:
         if not self.grouping.is_alone(index):
@@ -677,7 +612,7 @@ class _Judge:
         if not inertial:
             return []
         unexcited = [row for row in inertial if not self.base.identifiable[row]]
-        is_certain = self.transfer.together <= _UNCERTAIN_TORQUE
+        is_certain = self.base.together <= _UNCERTAIN_TORQUE
         if not unexcited and is_certain and self.condition <= _WORST_CONDITION:
             return []
         few_blocks = self.solution.block_count < _FEWEST_BLOCKS
@@ -686,7 +621,7 @@ class _Judge:
             "base_parameters": float(len(inertial)),
             "not_determined": float(len(unexcited)),
             "least_excitation": float(np.min(self.base.excitation[inertial])),
-            "uncertain_torque_share": self.transfer.together,
+            "uncertain_torque_share": self.base.together,
             "blocks": float(self.solution.block_count),
         }
         needed = (Missing.OTHER_MOTION, Missing.MORE_RECORDINGS) if few_blocks else (Missing.OTHER_MOTION,)
@@ -705,10 +640,10 @@ def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> 
     """Return the residuals of each fold by the fit without it, unweighted."""
     equations = solution.equations
     residual = np.empty(len(equations.torques))
-    folds = _folds(equations)
+    folds = folds_of(equations)
     for fold in np.unique(folds):
         own = folds == fold
-        rest = replace(equations, rows=equations.rows[~own], torques=equations.torques[~own])
+        rest = equations.where(~own)
         values = _not_negative(rest, start, _solve(rest, start), is_bounded) if len(rest.torques) else start
         residual[own] = equations.torques[own] - equations.rows[own] @ values
     joints = equations.joints.astype(np.int64)
@@ -717,7 +652,7 @@ def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> 
     return LeftOutTorque(residual * scale, previous, joints, solution.blocks)
 
 
-def _folds(equations: Equations) -> Index:
+def folds_of(equations: Equations) -> Index:
     """Return the fold of each equation (m,): its run, or its fifth of the only one."""
     if len(np.unique(equations.runs)) > 1:
         return equations.runs.astype(np.int64)

@@ -1,164 +1,79 @@
-"""What the outputs show of a robot's joints: unseen torque, friction over speed, motion."""
+"""What the logs show of a robot's joints: unseen torque, friction over speed, motion."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from cdtool.base.arrays import FloatArray
-from cdtool.commands.identify.axis.friction_curve import FrictionCurve, friction_curve, speed_edges
-from cdtool.commands.identify.robot.friction_choice import FrictionForm
-from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, Window, rigid_torque, window_of_column
-from cdtool.commands.identify.robot.robot_excitation import JointMotion
-from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, Regressor, regressor_of
+from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.commands.identify.axis.excitation import Excitation, excitation_of
+from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, UnseenRun
+from cdtool.commands.identify.robot.robot_dynamics import RobotFit, folds_of
+from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
+from cdtool.machines.coupled import CoupledMachine
 
-Indices = np.ndarray[tuple[int], np.dtype[np.int64]]
+# A joint moves where this share of the samples within the window's half width [s] is above its stick speed: less is
+# noise of the speed at rest.
+_MOVING_SHARE, _HALF_WIDTH = 0.9, 0.1
 
-# A line is interrupted where windows are further apart than this many usual steps.
-_GAP = 1.5
 
+def joint_evidence(joint: int, fit: RobotFit, is_new: bool, runs: Sequence[RobotRun]) -> ForceEvidence | None:
+    """Return what a fit to these runs shows of a joint, its model or, unless `is_new`, the machine's own one.
 
-@dataclass(frozen=True, eq=False)
-class UnseenTorque:
-    """Torque of a joint along a run, each part predicted by a fit without it; arrays (n,) [N m, N], low-passed.
-
-    NaN where a line is interrupted: windows at rest, near gaps and unexplained moments have no prediction. `predicted`
-    with the `form`, `previous` with the old friction and inertias. `parts`: a run, or fifths of the only one.
+    Each part of the logs is predicted by a fit without it; the run is the one that is predicted worst; strokes that
+    repeat each other are not looked for. None without motion of the joint.
     """
-
-    run: str
-    of_runs: int
-    form: FrictionForm
-    time: FloatArray
-    measured: FloatArray
-    predicted: FloatArray
-    previous: FloatArray
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """Return the run, and the RMS of its residuals [N m, N], as JSON values."""
-        return {
-            "run": self.run,
-            "of_runs": self.of_runs,
-            "form": self.form.name.lower(),
-            "error": _rms(self.measured - self.predicted),
-            "previous_error": _rms(self.measured - self.previous),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class JointFrictionCurve:
-    """Friction of a joint over speed: measured torque less that of inertia and gravity, and the models.
-
-    `points`: mean per interval of speed with the standard error between blocks of the log. `speed`, `new`, `previous`
-    (n,): the models [N m, N] over the speed [rad/s, m/s].
-    """
-
-    points: FrictionCurve
-    form: FrictionForm
-    speed: FloatArray
-    new: FloatArray
-    previous: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class RobotJointEvidence:
-    """What the logs show of one joint; `unseen` and `friction` are None for a joint without enough motion."""
-
-    motion: JointMotion
-    unseen: UnseenTorque | None = None
-    friction: JointFrictionCurve | None = None
-
-
-def _rms(residual: FloatArray) -> float:
-    known = residual[np.isfinite(residual)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else math.nan
-
-
-def joint_evidence(
-    motion: JointMotion, form: FrictionForm | None, fits: Mapping[FrictionForm, RobotFit], runs: Sequence[RobotRun]
-) -> RobotJointEvidence:
-    """Return what the fit of a form, to these runs, shows of a joint; without a form only its motion."""
-    if form is None or not (fits[form].equations.joints == motion.joint).any():
-        return RobotJointEvidence(motion)
-    windows = _FittedWindows.of(motion.joint, fits[form], runs)
-    return RobotJointEvidence(
-        motion, _unseen(windows, form, fits[form], runs), _friction(windows, motion.joint, form, fits[form])
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _FittedWindows:
-    """The equations of a joint (n,): where they are in all, run, place and time of the window, averages over it.
-
-    `friction`: the torque less that of inertia and gravity, the machine's own and what the fit changed.
-    """
-
-    rows: Indices
-    run: Indices
-    place: Indices
-    time: FloatArray
-    torque: FloatArray
-    speed: FloatArray
-    friction: FloatArray
-
-    @classmethod
-    def of(cls, joint: int, fit: RobotFit, runs: Sequence[RobotRun]) -> _FittedWindows:
-        """Return the windows of a joint, run by run, as the equations are."""
-        equations, regressor, parts = fit.equations, regressor_of(fit.machine), []
-        change = fit.parameters - regressor.values
-        inertial = (ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA)
-        changed = [i for i in np.flatnonzero(change).tolist() if regressor.columns[i].group in inertial]
-        for index, run in enumerate(runs):
-            rows = np.flatnonzero((equations.joints == joint) & (equations.runs == index))
-            window, time = Window.of(HALF_WIDTH, run.period), equations.times[rows] - run.start
-            place = np.rint((time / run.period - len(window.weights) // 2) / window.step).astype(np.int64)
-            rigid = rigid_torque(run, fit.machine, window)[:, joint]
-            for column in changed:
-                rigid = rigid + change[column] * window_of_column(run, regressor, window, column)[:, joint]
-            torque, speed = window.average(run.torque)[place, joint], window.average(run.speed)[place, joint]
-            parts.append((rows, np.full(len(rows), index), place, time, torque, speed, torque - rigid[place]))
-        return cls(*(np.concatenate(item) for item in zip(*parts, strict=True)))
-
-
-def _unseen(windows: _FittedWindows, form: FrictionForm, fit: RobotFit, runs: Sequence[RobotRun]) -> UnseenTorque:
-    """Return the torque along the run that is predicted worst, relative to the torque of all runs."""
-    residual, previous = fit.left_out.residual[windows.rows], fit.left_out.previous[windows.rows]
-    worst = int(np.argmax(np.bincount(windows.run, residual**2) / np.maximum(np.bincount(windows.run), 1)))
-    own = windows.run == worst
-    time, measured = windows.time[own], windows.torque[own]
-    gaps = np.flatnonzero(np.diff(windows.place[own]) > _GAP) + 1
-    lines = (measured, measured - residual[own], measured - previous[own])
-    broken = [np.insert(line, gaps, np.nan) for line in lines]
-    return UnseenTorque(runs[worst].name, len(runs), form, np.insert(time, gaps, time[gaps]), *broken)
-
-
-def _friction(windows: _FittedWindows, joint: int, form: FrictionForm, fit: RobotFit) -> JointFrictionCurve | None:
-    """Return the friction over speed, with the inertias that belong to the form."""
-    speed = windows.speed
-    points = friction_curve(speed, windows.friction, fit.left_out.blocks[windows.rows], speed_edges(speed))
-    if not len(points):
+    equations, left_out = fit.equations, fit.left_out
+    own = np.flatnonzero(left_out.joints == joint)
+    if not len(own):
         return None
-    reach = float(np.max(np.abs(speed)))
-    at = np.linspace(-reach if speed.min() < 0.0 else 0.0, reach if speed.max() > 0.0 else 0.0, 81)
-    regressor = regressor_of(fit.machine)
-    lines = (_modelled(regressor, joint, values, at) for values in (fit.parameters, regressor.values))
-    return JointFrictionCurve(points, form, at, *lines)
+    measured, inertia, speed, position = equations.averages[own].T
+    unseen = (left_out.residual if is_new else left_out.previous)[own]
+    run = equations.runs[own].astype(np.int64)
+    worst = int(np.argmax(np.bincount(run, unseen**2) / np.maximum(np.bincount(run), 1)))
+    of_worst = run == worst
+    time, force = equations.times[own][of_worst] - runs[worst].start, measured[of_worst]
+    shown = UnseenRun(runs[worst].name, time, force, force - unseen[of_worst], len(runs))
+    error, folds = float(np.sqrt(np.mean(unseen**2))), len(np.unique(folds_of(equations)))
+    validation = CrossValidation(error, folds, math.nan, 0, shown)
+    friction, residual = measured - inertia, unseen
+    if is_new:
+        rows = equations.rows[own] / fit.weights[joint]
+        groups = [fit.columns[column].group for column in fit.grouping.base]
+        inertial = np.array([group in (ColumnGroup.INERTIAL, ColumnGroup.DRIVE_INERTIA) for group in groups])
+        start = fit.grouping.combination @ regressor_of(fit.machine).values[list(fit.grouping.columns)]
+        friction = friction - rows[:, inertial] @ (fit.base.values - start)[inertial]
+        residual = equations.torques[own] / fit.weights[joint] - rows @ fit.base.values
+    return ForceEvidence.of((speed, position), friction, residual, left_out.blocks[own], validation)
 
 
-def _modelled(regressor: Regressor, joint: int, parameters: FloatArray, speed: FloatArray) -> FloatArray:
-    """Return the friction of a joint over the speed (n,)."""
-    values = {
-        column.group: float(value)
-        for column, value in zip(regressor.columns, parameters, strict=True)
-        if column.joint == joint and column.group is not ColumnGroup.INERTIAL
-    }
-    slope = regressor.machine.coulomb_slope[joint]
-    direction = np.tanh(slope * speed) if slope else np.sign(speed)
-    viscous, coulomb = values[ColumnGroup.VISCOUS] * speed, values[ColumnGroup.COULOMB] * direction
-    return np.asarray(viscous + coulomb + values[ColumnGroup.CONSTANT])
+def joint_excitations(runs: Sequence[RobotRun], machine: CoupledMachine) -> list[Excitation]:
+    """Return what the runs excite of each joint, which moves where it stays above its stick speed.
+
+    A joint that does not move has no speeds, and every number is 0. The acceleration is a smoothed derivative; the
+    noise in it is not known (NaN). Raises IndexError for runs of another machine.
+    """
+    accelerations = [run.acceleration() for run in runs]
+    found = []
+    for joint, stick in enumerate(machine.stick_speed):
+        columns = [np.zeros((3, 0))]
+        for run, acceleration in zip(runs, accelerations, strict=True):
+            moving = _moving(run.speed[:, joint], stick, run.period)
+            rate = np.nan_to_num(acceleration[moving, joint])
+            columns.append(np.vstack((run.speed[moving, joint], rate, np.full(len(rate), run.period))))
+        speed, rate, duration = np.concatenate(columns, axis=1)
+        found.append(excitation_of(speed, rate, duration, np.full_like(speed, math.nan)))
+    return found
+
+
+def _moving(speed: FloatArray, stick: float, period: float) -> BoolArray:
+    """Return where a joint moves (n,): above the stick speed, and nearly always so around it."""
+    above = np.abs(np.nan_to_num(speed)) > stick
+    width = 2 * max(1, round(_HALF_WIDTH / period)) + 1
+    if len(above) < width:
+        return np.zeros(len(above), dtype=np.bool_)
+    share = np.convolve(above.astype(np.float64), np.full(width, 1.0 / width), mode="same")
+    return np.asarray(above & (share >= _MOVING_SHARE))

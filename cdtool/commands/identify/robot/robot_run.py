@@ -85,9 +85,8 @@ class RobotRun:
         return np.asarray(~(speed >= least) & np.isfinite(speed))
 
     def without(self, excluded: BoolArray) -> RobotRun:
-        """Return the run with NaN for the torques of the excluded samples, (n,) or (n, J)."""
-        columns = excluded if excluded.ndim == 2 else excluded[:, np.newaxis]
-        return replace(self, torque=np.where(columns, np.nan, self.torque))
+        """Return the run with NaN for the torques of the excluded samples (n,)."""
+        return replace(self, torque=np.where(excluded[:, np.newaxis], np.nan, self.torque))
 
 
 def robot_run(recording: Recording) -> RobotRun:

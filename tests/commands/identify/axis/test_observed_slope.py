@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.axis.observed_slope import observed_slope
+from cdtool.commands.identify.axis.speed_controller import observed_slope
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.sensor_filters import first_order_low_pass
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdtool.commands.identify.estimate import Identified, Method, Missing
-from cdtool.commands.identify.robot.drive_gains import Payload, drive_gains
+from cdtool.commands.identify.robot.drive_gains import LoadedRuns, drive_gains
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_robot import UrdfRobot
@@ -16,7 +16,7 @@ from tests.commands.identify.robot_motion import Motion, coloured, fourier, plan
 
 FACTORS = (1.2, 0.8)
 MASS, ALONG, TURNING = 0.7, 0.25, 0.002
-TOOL = Payload(link="forearm", mass=MASS, centre=(ALONG, 0.0, 0.0))
+TOOL = LoadedRuns((), MASS, "forearm", (ALONG, 0.0, 0.0))
 ARM = planar_arm(coulomb_slope=50.0)
 
 

@@ -55,7 +55,7 @@ def test_the_base_parameters_of_seven_joints_are_recovered_to_a_millionth(tmp_pa
     run = fourier(1, 7, 12.0, 0.002).run(machine)
     fit = identify_robot([run], unknown(machine), EVERYTHING, half_width=0.2)
     wanted = true_base(fit, machine)
-    assert len(fit.base) == 43 + 3 * 7
+    assert len(fit.base.names) == 43 + 3 * 7
     assert np.linalg.norm(fit.base.values - wanted) < 1e-6 * np.linalg.norm(wanted)
     np.testing.assert_allclose(fit.base.values, wanted, rtol=1e-5, atol=2e-6)
     assert refused(fit, "base_parameters") == {}

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.commands.identify.axis.friction_curve import friction_curve, speed_edges
+from cdtool.commands.identify.evidence import friction_curve, speed_edges
 
 
 def test_the_curve_of_a_line_is_the_line():
     speed = np.linspace(-0.3, 0.3, 6001)
     edges = speed_edges(speed)
     curve = friction_curve(speed, 200.0 * speed, np.arange(6001) % 5, edges)
-    assert len(curve) == len(edges) - 1
+    assert len(curve.mean) == len(edges) - 1
     np.testing.assert_allclose(curve.mean, 200.0 * curve.abscissa, atol=0.05)
     assert curve.count.sum() == 6001
 

@@ -1,10 +1,8 @@
-"""Friction over speed and over position: as a curve, and as a source of standard errors."""
+"""A friction that depends on the position, as a source of standard errors."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,76 +13,6 @@ from cdtool.commands.identify.axis.filtered_regression import IntArray
 _ABSORBED = 2
 # The most points of a profile over the travel, and the fewest equations per point.
 _MOST_POINTS, _FEWEST_PER_POINT = 256, 4
-
-
-@dataclass(frozen=True, eq=False)
-class FrictionCurve:
-    """A force over speed or position: mean, standard error and number of equations of each point, all (g,).
-
-    `abscissa`: signed speed [m/s, rad/s] or position [m, rad]; the middle of each interval. `mean` and
-    `standard_error` [N, N m]. The standard error is that between strokes (NaN for a single stroke). An interval that
-    no equation falls into is left out.
-    """
-
-    abscissa: FloatArray
-    mean: FloatArray
-    standard_error: FloatArray
-    count: IntArray
-
-    def __len__(self) -> int:
-        return len(self.abscissa)
-
-
-def friction_curve(abscissa: FloatArray, force: FloatArray, stroke: IntArray, edges: FloatArray) -> FrictionCurve:
-    """Return the mean force in intervals of speed or position.
-
-    Parameters
-    ----------
-    abscissa, force : ndarray, shape (m,)
-        Speed [m/s, rad/s] or position [m, rad], and the force [N, N m] there.
-    stroke : ndarray of int, shape (m,)
-        The stroke of each: the residuals of a stroke are correlated, so that strokes are what is independent.
-    edges : ndarray, shape (g + 1,)
-        Increasing edges of the intervals; what is outside is left out.
-
-    Returns
-    -------
-    FrictionCurve
-        The mean of the strokes' means, weighted by the number of equations.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> speed, force, stroke = np.array([0.1, 0.1, 0.1, 0.3]), np.array([1.0, 1.0, 3.0, 5.0]), np.array([0, 0, 1, 1])
-    >>> friction_curve(speed, force, stroke, np.array([0.0, 0.2, 0.4])).mean.round(3).tolist()
-    [1.667, 5.0]
-    """
-    interval = np.searchsorted(edges, abscissa, side="right") - 1
-    interval[abscissa == edges[-1]] = len(edges) - 2
-    is_inside = (interval >= 0) & (interval < len(edges) - 1) & np.isfinite(force)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    rows: list[tuple[float, float, float, int]] = []
-    for number in np.unique(interval[is_inside]):
-        chosen = is_inside & (interval == number)
-        _, which = np.unique(stroke[chosen], return_inverse=True)
-        counts = np.bincount(which)
-        means = np.bincount(which, weights=force[chosen]) / counts
-        weights = counts / float(counts.sum())
-        mean = float(weights @ means)
-        error = math.nan
-        if len(means) > 1:
-            # Cluster-robust standard error of a weighted mean.
-            error = math.sqrt(len(means) / (len(means) - 1) * float(np.sum((weights * (means - mean)) ** 2)))
-        rows.append((float(middle[number]), mean, error, int(counts.sum())))
-    columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
-    return FrictionCurve(columns[0], columns[1], columns[2], columns[3].astype(np.int64))
-
-
-def speed_edges(speed: FloatArray, intervals: int = 20) -> FloatArray:
-    """Return edges (g + 1,) of equal intervals over the signed speeds, with an edge at 0."""
-    low, high = min(float(np.min(speed)), 0.0), max(float(np.max(speed)), 0.0)
-    width = max((high - low) / intervals, 1e-12)
-    return width * np.arange(math.floor(low / width), math.ceil(high / width) + 1, dtype=np.float64)
 
 
 def profile_covariance(
