@@ -157,17 +157,6 @@ def test_github_gets_least_permissions_pinned_actions_a_cache_and_an_end():
     assert f"--name {keep['with']['name']} --dir baseline" in fetch and "--branch main" in fetch
 
 
-def test_gitlab_always_keeps_artifacts_and_compares_after_a_violated_limit():
-    values = parsed("gitlab-ci.yml")
-    for name in ("collision-benchmark", "collision-compare"):
-        assert values[name]["artifacts"]["when"] == "always"
-        assert values[name]["stage"] in values["stages"]
-    assert values["collision-compare"]["rules"] == [
-        {"if": '$CI_PIPELINE_SOURCE == "merge_request_event"', "when": "always"}
-    ]
-    assert values["default"]["timeout"] == "30 minutes"
-
-
 def test_the_page_names_every_quantity_and_its_limits_are_valid():
     section = PAGE.partition("\n## Limits\n")[2].partition("\n## ")[0]
     table = [line for line in section.splitlines() if line.startswith("| `")]

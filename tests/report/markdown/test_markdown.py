@@ -44,11 +44,6 @@ def rows(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in text.splitlines() if line[:1] == "|"]
 
 
-def header(text: str, group: str) -> list[str]:
-    """Return the headings of a group's table."""
-    return rows(text.split(f"## {group}\n")[1])[0]
-
-
 def folded(text: str) -> list[str]:
     return re.findall(r"<summary>(.*) \(", text)
 
