@@ -89,22 +89,6 @@ def force_rig(tmp_path, monkeypatch) -> list[Path]:
     return sorted(Path("edge").iterdir())
 
 
-def test_a_rig_that_has_only_a_force_needs_five_commands_each_named_by_the_one_before(force_rig, tmp_path):
-    first = cdtool("init", *force_rig, "-o", "study")
-    info, draft = commands(first)
-    assert (info[0], draft[:2]) == ("info", ["protocol", "init"])  # no benchmark: there is nothing to score
-    (check,) = commands(cdtool(*draft))
-    incomplete = cdtool(*check)
-    assert (incomplete.status, commands(incomplete)[0][:2]) == (4, ["protocol", "write"])
-    fill_in(tmp_path / "study" / "protocol.toml")
-    (write,) = commands(cdtool(*check))
-    assert write[:2] == ["protocol", "write"]
-    made = cdtool(*write[:-1], "protocol.html")
-    assert made.status == 0 and "protocol: pass" in made.out, made.out + made.err
-    nothing = cdtool("protocol", "write", "study/protocol.toml")
-    assert nothing.status == 2 and "-o protocol.pdf" in nothing.err
-
-
 def test_a_benchmark_without_detectors_takes_those_of_the_option_and_else_names_the_protocol(rig, tmp_path):
     path = rig / "without.toml"
     path.write_text((rig / "benchmark.toml").read_text(encoding="utf-8").replace('["gm"]', "[]"), encoding="utf-8")

@@ -2,8 +2,6 @@
 
 import sys
 import threading
-from collections.abc import Callable
-from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -43,21 +41,6 @@ def gate(tmp_path_factory) -> Path:
     return folder
 
 
-def run(folder: Path, threshold: str, jobs: int = 1) -> bytes:
-    file = folder / f"{threshold}.toml"
-    file.write_text(FILE.format(threshold=threshold), encoding="utf-8")
-    detectors = ["all"] if threshold == "signature" else ["momentum", "friction_ekf"]
-    done = cdtool.benchmark(file, detectors=detectors, jobs=jobs)
-    assert done.traces and done.results.skipped
-    return to_json(done.results).encode() + encode_traces(done.traces)
-
-
-@pytest.fixture(scope="module")
-def by_one(gate) -> Callable[[str], bytes]:
-    """by_one(threshold): what one process computes; each threshold is computed once."""
-    return cache(partial(run, gate))
-
-
 def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
     """Of 60 logs, pieces have up to 3 in two processes."""
     for name in ("free", "holdout", "machine.toml"):
@@ -83,19 +66,6 @@ def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
         made.add(to_json(done.results).encode() + encode_traces(done.traces))
         assert shown == [(number, 65) for number in range(1, 66)]
     assert len(made) == 1
-
-
-@pytest.mark.parametrize(("others", "jobs"), [(0, 3), (1, 2)], ids=["forked", "spawned"])
-def test_results_and_traces_are_the_same_bytes_for_any_number_of_jobs(gate, by_one, others, jobs):
-    alone = by_one("signature")
-    stop = threading.Event()
-    threads = [threading.Thread(target=stop.wait) for _ in range(others)]
-    for thread in threads:
-        thread.start()
-    try:
-        assert run(gate, "signature", jobs) == alone
-    finally:
-        stop.set()
 
 
 @pytest.fixture(scope="module")
