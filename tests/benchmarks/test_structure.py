@@ -59,24 +59,6 @@ def test_an_import_is_found_at_any_position_in_any_form(script, package):
     }
 
 
-def test_cycles_are_groups_of_modules_that_reach_one_another(script, package):
-    root = package(
-        {
-            "a.py": "from pkg import b\n",
-            "b.py": "from pkg import c\n",
-            "c.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from pkg import a\n",
-            "into.py": "from pkg import a, x\n",
-            "x.py": "from pkg import y\n",
-            "y.py": "def f():\n    from pkg import x\n",
-        }
-    )
-    imports = script.imports_of(script.modules_of(root))
-    assert script.cycles(imports) == [["pkg.a", "pkg.b", "pkg.c"]]
-    assert script.cycles(imports, ("module",)) == []
-    every = ("module", "types", "function")
-    assert script.cycles(imports, every) == [["pkg.a", "pkg.b", "pkg.c"], ["pkg.x", "pkg.y"]]
-
-
 CODE = '''"""What it is.
 
 More of it.

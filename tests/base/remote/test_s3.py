@@ -76,17 +76,7 @@ def test_a_benchmark_in_several_processes_has_the_bytes_of_a_local_one(gate, buc
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "a b.csv",
-        "ü/Größe 日本.csv",
-        "log#7.csv",
-        "what?.csv",
-        "50%.csv",
-        "a+b&c=d.csv",
-        "[x].csv",
-        "a::b.csv",
-        "x//y.csv",
-    ],
+    ["a b.csv", "ü/Größe 日本.csv", "log#7.csv", "50%.csv", "[x]?+&=.csv", "x//y.csv"],
 )
 def test_names_have_any_characters(bucket, name):
     url = bucket.put(name, (GATE / "stiff" / "03.csv").read_bytes())

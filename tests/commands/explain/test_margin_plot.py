@@ -11,7 +11,6 @@ import pytest
 
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import judge
-from cdtool.base.errors import UsageError
 from cdtool.commands.explain.margin_plot import plot_explanation
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
@@ -72,12 +71,3 @@ def test_an_alarm_shows_channels_in_order_signal_margin_onset_and_debounce(drawn
         assert expected in shown, expected
     assert "time from contact onset [ms]" in shown
     assert "reference_speed" not in shown  # it neither moved nor does the detector read it
-
-
-def test_the_same_event_gives_the_same_bytes_in_every_format(drawn, tmp_path):
-    for suffix in (".png", ".svg", ".pdf"):
-        for name in ("a", "b"):
-            drawn(1.0, path=f"{name}{suffix}")
-        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes(), suffix
-    with pytest.raises(UsageError, match=r"a\.gif"):
-        drawn(1.0, path="a.gif")

@@ -193,27 +193,6 @@ def test_without_typst_a_pdf_is_refused_before_the_benchmark_runs(rig, tmp_path,
     assert "pip install '.[pdf]'" in made.err and len(made.err.splitlines()) == 1
 
 
-def test_a_pdf_has_every_number_of_the_results_that_the_protocol_shows(rig, tmp_path):
-    pytest.importorskip("typst", reason="needs the extra pdf")
-    pypdf = pytest.importorskip("pypdf")
-    benchmark = rig / "with_force.toml"
-    text = (rig / "benchmark.toml").read_text(encoding="utf-8")
-    benchmark.write_text(text + '[force]\nprofile = "en_12453_reducing_gap"\n', encoding="utf-8")
-    path = rig / "with_force_protocol.toml"
-    written = write_protocol(rig).read_text(encoding="utf-8")
-    path.write_text(written.replace('"benchmark.toml"', '"with_force.toml"'), encoding="utf-8")
-    targets = ("-o", tmp_path / "protocol.pdf", "-o", tmp_path / "results.json")
-    assert cdtool("benchmark", benchmark, "-p", path, *targets).status == 0
-    shown = "".join(page.extract_text() for page in pypdf.PdfReader(tmp_path / "protocol.pdf").pages)
-    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
-    numbers = [step["peak_n"] for row in results["forces"] for step in row["steps"]]
-    numbers += [row["latency_ms"] for row in results["contacts"]]
-    words = re.findall(r"[\d.]+", shown)
-    assert len(numbers) == 12
-    assert [value for value in numbers if f"{value:.4g}" not in words] == []
-    assert all(row["sha256"] in shown for row in results["recordings"])
-
-
 def test_a_protocol_file_names_the_key_of_a_missing_file_and_is_no_benchmark_for_a_table_machine(tmp_path):
     text = '[protocol]\nbenchmark = "b.toml"\nlimits = "yard.toml"\n[machine]\ntype = "gate"\n'
     point = "[[protocol.point]]\nrepetition = 4\nspeed_tolerance_percent = 30\n"

@@ -29,13 +29,6 @@ def growing() -> DriftAudit:
     return audit(obstructed)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_the_same_input_gives_the_same_bytes(growing, tmp_path, suffix):
-    for name in ("a", "b"):
-        plot_drift(growing, tmp_path / f"{name}{suffix}")
-    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
-
-
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_are_drawn_as_plain_text(growing, tmp_path, kind):
     name = HOSTILE[kind]
