@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import cdtool
 from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.containers.hdf5 import Hdf5
@@ -97,19 +96,6 @@ def test_a_packed_clock_is_left_out(saved):
     attributes = {"units": "s", "scale_factor": 0.001}
     source = survey(saved(time=(np.arange(9), attributes), q=(np.arange(9.0), {})))
     assert list(source.columns) == ["q"] and source.columns["q"].time is None
-
-
-def test_info_shows_every_column_on_the_clock_of_its_group(saved):
-    path = saved(
-        drive__t=(np.arange(10.0) * 10.0, {"unit": "ms"}),
-        drive__q=(np.arange(10.0), {}),
-        cell__time=(np.arange(40.0) / 1000.0, {"units": "s"}),
-        cell__force=(np.arange(40.0), {}),
-    )
-    info = cdtool.info(path)
-    rates = {channel.name: round(channel.rate_hz) for channel in info.channels}
-    assert rates == {"drive/t": 100, "drive/q": 100, "cell/time": 1000, "cell/force": 1000}
-    assert not [finding for finding in info.findings if finding.kind == "assumed_clock"]
 
 
 def test_clocks_of_groups_without_a_unit_are_a_warning(saved):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from cdtool.base.errors import RecordingError
-from cdtool.formats.channels.reading import choose_format, read_recording, survey
+from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mat import Mat
 from tests.formats.mat_files import CLASSES, save_v73
@@ -85,21 +85,6 @@ def test_variables_other_than_vectors_and_matrices_of_numbers_are_named_and_left
         "x": "a link",
         "z": "complex",
     }
-
-
-def test_a_recording_is_read_with_the_names_of_version_7(tmp_path):
-    time = np.arange(50) * 0.01
-    q = np.column_stack((time, 2.0 * time))
-    path = save_v73(tmp_path / "run.mat", {"t": time, "q": q, "tau": 0.5 * q}, compression="gzip", shuffle=True)
-    (tmp_path / "machine.toml").write_text(
-        '[machine]\ntype = "rotary_axis"\ncoordinates = "load"\njoints = ["a", "b"]\n[channels]\n'
-        'time = { column = "t", unit = "s" }\nposition = { columns = ["q[0]", "q[1]"], unit = "rad" }\n'
-        'torque = { columns = ["tau[0]", "tau[1]"], unit = "N m" }\n'
-    )
-    assert choose_format(path).name == "mat"
-    recording = read_recording(path, read_machine_file(tmp_path / "machine.toml"))
-    np.testing.assert_array_equal(recording["position"].values, q)
-    np.testing.assert_array_equal(recording["torque"].values, 0.5 * q)
 
 
 def test_a_requested_complex_column_is_an_error(tmp_path):

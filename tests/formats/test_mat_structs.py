@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 from cdtool.base.errors import RecordingError
-from cdtool.formats.channels.reading import read_as_logged, survey
+from cdtool.formats.channels.reading import survey
 from cdtool.formats.mat import Mat
 from cdtool.formats.mat.version_5 import read_variables
 from tests.base.findings.facts import fact_of
@@ -105,17 +105,6 @@ def test_an_array_of_structs_of_single_numbers_is_named_with_what_makes_it_reada
     (found,) = facts(source, "variable_left_out")
     assert found.numbers["what"] == "an array of structs without vectors"
     assert "struct('t', [T.t])" in found.numbers["advice"]
-
-
-def test_a_machine_file_that_names_a_clock_reads_it_as_it_is(tmp_path, machine):
-    log = {"t": 1.7e9 + T, "v": T, "t_cell": 1.7e9 + np.arange(90) / 1000, "F": np.ones(90)}
-    path = save_v7(tmp_path / "log.mat", {"log": log})
-    for clock in ('column = "log.t"', 'column = "time"'):
-        mapped = machine(
-            f'[channels]\ntime = {{ {clock}, unit = "s" }}\nspeed = {{ column = "log.v", unit = "rad/s" }}\n'
-        )
-        recording = read_as_logged(path, mapped).recording
-        assert recording.origin == pytest.approx(1.7e9) and recording["speed"].time[0] == pytest.approx(0.0, abs=1e-6)
 
 
 NOON = 739_385.5  # 2024-05-13 12:00

@@ -47,18 +47,6 @@ def learned(gate, simulated) -> SignatureFile:
     )
 
 
-def test_it_survives_writing_and_reading(tmp_path, learned):
-    path = tmp_path / "s.json"
-    write_signature(path, learned)
-    loaded = read_signature(path)
-    write_signature(tmp_path / "again.json", loaded)
-    assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
-    assert (loaded.rule, loaded.origin, loaded.activation) == (learned.rule, learned.origin, learned.activation)
-    assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
-    values = json.loads(path.read_text())
-    assert values["schema_version"] == 5 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
-
-
 def test_on_another_machine_the_parameters_that_differ_are_named(tmp_path, learned, gate):
     path = tmp_path / "s.json"
     write_signature(path, replace(learned, machine_parameters=machine_parameters(gate)))

@@ -23,18 +23,6 @@ def test_findings_of_one_kind_are_merged_whatever_their_numbers_are():
     assert others == [(item.channel, item.message) for item in findings[4:]]  # two are both shown
 
 
-def test_one_kind_of_finding_about_many_channels_is_one_line_with_a_count():
-    findings = [Finding("jitter", f"ch{i}", {"share": 0.01 * i, "period": 0.01}) for i in range(46)]
-    assert grouped_findings([*findings, Finding("stuck_channel", "ch1", {"joint": ""})]) == [
-        (
-            "ch0",
-            f"{Finding('jitter', '', {'share': 0.0, 'period': 0.01}).sentence}; 45 more like it (ch1, ch2, ch3, ...)",
-        ),
-        ("ch1", Finding("stuck_channel", "", {"joint": ""}).sentence),
-    ]
-    assert grouped_findings(findings[:3]) == [(item.channel, item.message) for item in findings[:3]]
-
-
 def test_findings_of_recordings_are_merged_by_kind_and_channel():
     of = [RecordingFinding.of(f"{i}.csv", gaps(1 + i % 5, "time")) for i in range(6)]
     force = RecordingFinding.of("6.csv", gaps(1, "force"))

@@ -11,7 +11,7 @@ import pytest
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.commands.convert.converting import convert
-from cdtool.formats.channels.reading import read_as_logged, survey
+from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.recordings.recording import Recording
@@ -109,24 +109,6 @@ def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, als
         convert(log, tmp_path / name, machine=machine)
         again = read_machine_file(tmp_path / f"{name}.machine.toml")
         assert read_as_logged(tmp_path / name, again).recording["force"].values.tolist() == found.tolist()
-
-
-def test_an_infinite_value_of_an_axis_of_a_container_with_clocks_names_the_axis(tmp_path):
-    axes = np.random.default_rng(0).normal(size=(200, 3))
-    axes[7, 1] = np.inf
-    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{TOPIC}\n", encoding="utf-8")
-    log = write_log(tmp_path, np.where(np.isinf(axes), 1.0, axes), np.arange(200) * 5e-3)
-    convert(log, tmp_path / "new.parquet", machine=read_machine_file(tmp_path / "machine.toml"))
-    with h5py.File(tmp_path / "new.h5", "w") as file:
-        for name, column in survey(tmp_path / "new.parquet").columns.items():
-            file[name] = column.values
-            file[name].attrs["unit"] = column.unit or "1"
-        file["force y"][7] = np.inf
-    again = read_machine_file(tmp_path / "new.parquet.machine.toml")
-    (found,) = (
-        item for item in read_as_logged(tmp_path / "new.h5", again).recording.findings if item.severity == "loss"
-    )
-    assert (found.kind, found.channel) == ("infinite_values", "force force y")
 
 
 @pytest.mark.parametrize(
