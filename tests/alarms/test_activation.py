@@ -26,37 +26,6 @@ def alarms(values, status=None, debounce=3, rearm=0.5, period=1e-3):
     return Activation(debounce, rearm).alarms(Signal(time, values, codes, "N"), band)[0]
 
 
-def test_the_alarm_has_the_time_of_the_last_sample_that_was_counted():
-    (alarm,) = alarms([0, 0, 2, 2, 3, 2, 0])
-    assert alarm.time == pytest.approx(4e-3)
-    assert (alarm.side, alarm.statistic, alarm.limit, alarm.joint) == ("above", 3.0, 1.0, "0")
-
-
-def test_a_value_inside_interrupts_the_sequence():
-    assert alarms([2, 2, 0, 2, 2, 0, 2, 2]) == ()
-
-
-def test_a_missing_sample_neither_counts_nor_interrupts():
-    (alarm,) = alarms([0, 2, np.nan, 2, np.nan, 2, 0], status=[0, 0, 3, 0, 3, 0, 0])
-    assert alarm.time == pytest.approx(5e-3)
-
-
-def test_a_sample_where_the_method_does_not_apply_interrupts_the_sequence():
-    assert alarms([2, 2, 2, 2, 2], status=[0, 0, 2, 0, 0]) == ()
-    assert alarms([2, 2, 2, 2, 2], status=[1, 1, 1, 0, 0]) == ()
-
-
-def test_below_the_band_is_an_alarm_too():
-    (alarm,) = alarms([0, -2, -2, -2])
-    assert (alarm.side, alarm.limit) == ("below", -1.0)
-
-
-def test_it_is_armed_again_only_after_half_a_second_inside():
-    blink = [2] * 5 + [0] * 400 + [2] * 5
-    assert len(alarms(blink)) == 1
-    assert len(alarms([2] * 5 + [0] * 502 + [2] * 5)) == 2
-
-
 def test_every_debounced_exit_is_a_crossing_and_only_the_armed_ones_are_alarms():
     values = np.array([2.0] * 5 + [0.0] * 10 + [2.0] * 5).reshape(-1, 1)
     signal = Signal(np.arange(20) * 1e-3, values, np.zeros((20, 1), dtype=np.uint8), "N")
@@ -99,20 +68,6 @@ def judged(values, activation):
     return tuple([round(1e3 * alarm.time) for alarm in items] for items in (found.alarms, found.crossings))
 
 
-# Outside the band, then 0.6 s just inside it, outside again, 0.6 s far inside, and outside once more.
-DWELLING = [2.0] * 5 + [0.9] * 600 + [2.0] * 5 + [0.1] * 600 + [2.0] * 5
-
-
-def test_with_hysteresis_a_signal_at_its_limit_is_one_alarm():
-    assert judged(DWELLING, Activation(3)) == ([2, 607, 1212], [2, 607, 1212])
-    assert judged(DWELLING, Activation(3, hysteresis=0.2)) == ([2, 1212], [2, 607, 1212])
-    assert judged(DWELLING, Activation(3, hysteresis=0.95)) == ([2], [2, 607, 1212])
-
-
-def test_a_latched_alarm_is_the_only_one_and_hides_no_crossing():
-    assert judged(DWELLING, Activation(3, latch=True)) == ([2], [2, 607, 1212])
-
-
 @given(
     st.lists(st.sampled_from([0.0, 0.4, 0.9, 2.0, -0.9, -2.0]), max_size=80),
     st.floats(0.0, 0.99),
@@ -153,28 +108,6 @@ def rearmed(values, status=None, debounce=3, rearm=0.5, period=1e-3):
     signal, activation = Signal(np.arange(len(values)) * period, values, codes, "N"), Activation(debounce, rearm)
     raised, _ = activation.alarms(signal, band)
     return raised, activation.rearmed(signal, band, raised)
-
-
-def test_each_alarm_has_the_time_at_which_it_is_armed_again():
-    values = ([0.0] * 10 + [2.0] * 5 + [0.0] * 600) * 5
-    raised, again = rearmed(values)
-    assert len(raised) == 5
-    # Five samples outside, then 0.5 s inside: 2 more samples outside after the alarm.
-    assert again == pytest.approx([alarm.time + 3e-3 + 0.5 for alarm in raised], abs=2e-3)
-
-
-def test_an_alarm_that_never_stays_inside_is_never_rearmed():
-    raised, again = rearmed([0.0] * 10 + [2.0] * 5 + [0.0] * 100)
-    assert len(raised) == 1 and again == (np.inf,)
-    signal = Signal(
-        np.arange(2000) * 1e-3,
-        np.r_[np.full(10, 2.0), np.zeros(1990)].reshape(-1, 1),
-        np.zeros((2000, 1), dtype=np.uint8),
-        "N",
-    )
-    band = Band(np.full((2000, 1), -1.0), np.full((2000, 1), 1.0))
-    latched = Activation(3, latch=True)
-    assert latched.rearmed(signal, band, latched.alarms(signal, band)[0]) == (np.inf,)
 
 
 @given(

@@ -11,7 +11,6 @@ import typer.main
 
 from cdtool.base.exit_status import STATUSES, STATUSES_OF, ExitStatus, Fact, status_of
 from cdtool.commands.app import app
-from tests.command import cdtool, one_line
 
 ROOT = Path(__file__).parents[2]
 ORDER = [2, 1, 3, 4, 0]
@@ -68,16 +67,6 @@ def test_the_docs_list_the_statuses_of_each_command():
     rows = re.findall(r"^\| ([\d, ]+) \| ((?:`[a-z -]+`(?:, )?)+) \|", text, re.MULTILINE)
     documented = {name: numbers for numbers, names in rows for name in re.findall("`([^`]+)`", names)}
     assert documented == {name: ", ".join(str(int(item)) for item in sorted(of)) for name, of in STATUSES_OF.items()}
-
-
-def test_help_shows_the_table_and_every_command_its_statuses():
-    shown = one_line(cdtool("--help").out)
-    for status, meaning in STATUSES.items():
-        assert f"{int(status)} {meaning}" in shown
-    assert "2 before 1 before 3 before 4" in shown
-    for name in commands():
-        numbers = ", ".join(str(int(status)) for status in sorted(STATUSES_OF[name]))
-        assert f"Exit status: {numbers};" in one_line(cdtool(*name.split(), "--help").out), name
 
 
 def test_every_command_has_its_statuses_listed():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cdtool.base.plain_text import counted, plain, shorten
+from cdtool.base.plain_text import counted, plain
 from tests.report.hostile import HOSTILE
 
 
@@ -19,13 +19,6 @@ def test_plain_text_is_one_line_of_printable_characters_of_the_same_length(kind)
 
 def test_ordinary_text_of_any_language_stays():
     assert plain("Tür 7 — 門 α_β.csv") == "Tür 7 — 門 α_β.csv"
-
-
-def test_long_text_keeps_its_beginning_and_end():
-    text = "a_long_name_of_a_recording_0042"
-    assert shorten(text, 12) == "a_long…_0042"
-    assert len(shorten(text, 12)) == 12
-    assert shorten(text, len(text)) == text
 
 
 @pytest.mark.parametrize(

@@ -28,15 +28,3 @@ def test_the_cpu_time_is_that_of_the_child_processes_and_waiting_is_not_in_it(st
     assert {len(each) for each in (*clock.values(), *processor.values())} == {2}
     assert min(processor["work"]) >= 0.3
     assert max(processor["rest"]) < 0.3 <= min(clock["rest"])
-
-
-def test_the_bare_app_has_the_commands_and_options_of_cdtool(start_up):
-    source, commands, options = start_up._bare_app()
-    assert source.count(".command(") == commands > 20
-    assert source.count("Annotated[str, typer.Option(") == options + 2  # the two of the app itself
-
-
-def test_a_failed_command_stops_the_benchmark(start_up, tmp_path):
-    environment = start_up._environment(tmp_path)
-    with pytest.raises(SystemExit, match="status 3"):
-        start_up._run(["-c", "raise SystemExit(3)"], environment)

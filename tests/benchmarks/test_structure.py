@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from textwrap import dedent
@@ -12,8 +10,6 @@ from types import ModuleType
 import pytest
 
 from tests.project.pages import benchmark_script
-
-_numbers = itertools.count()
 
 
 @pytest.fixture(scope="module")
@@ -63,43 +59,6 @@ def test_an_import_is_found_at_any_position_in_any_form(script, package):
     }
 
 
-def test_cycles_are_groups_of_modules_that_reach_one_another(script, package):
-    root = package(
-        {
-            "a.py": "from pkg import b\n",
-            "b.py": "from pkg import c\n",
-            "c.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from pkg import a\n",
-            "into.py": "from pkg import a, x\n",
-            "x.py": "from pkg import y\n",
-            "y.py": "def f():\n    from pkg import x\n",
-        }
-    )
-    imports = script.imports_of(script.modules_of(root))
-    assert script.cycles(imports) == [["pkg.a", "pkg.b", "pkg.c"]]
-    assert script.cycles(imports, ("module",)) == []
-    every = ("module", "types", "function")
-    assert script.cycles(imports, every) == [["pkg.a", "pkg.b", "pkg.c"], ["pkg.x", "pkg.y"]]
-
-
-def test_a_single_caller_is_the_only_one_and_in_the_same_folder(script, package):
-    root = package(
-        {
-            "sub/__init__.py": "from pkg.sub import of_the_package\nTABLE = {'one': 'pkg.sub.registered:One'}\n",
-            "sub/of_the_package.py": "def f():\n    from pkg.sub import private\n",
-            "sub/private.py": "from pkg.sub import shared\n",
-            "sub/registered.py": "from pkg.sub import shared\n",
-            "sub/shared.py": "",
-            "sub/of_others.py": "",
-            "top.py": "from pkg.sub import of_others\nimport pkg.sub\n",
-        }
-    )
-    modules = script.modules_of(root)
-    assert script.single_callers(modules, script.imports_of(modules)) == [
-        ("pkg.sub", "pkg.sub.of_the_package"),
-        ("pkg.sub.of_the_package", "pkg.sub.private"),
-    ]
-
-
 CODE = '''"""What it is.
 
 More of it.
@@ -141,48 +100,3 @@ def test_code_lines_are_neither_docstrings_nor_imports_nor_comments_nor_blank(sc
     modules = script.modules_of(root)
     assert script.code_lines(modules["pkg.sub.thing"]) == 8
     assert script.lines_by_room(modules) == {"(top level)": (2, 2), "sub": (2, 8)}
-
-
-def branches(name: str, count: int, decorator: str = "") -> str:
-    return f"{decorator}def {name}(x):\n" + "".join(f"    if x == {k}:\n        x += 1\n" for k in range(count))
-
-
-def test_functions_above_the_limits_are_listed_and_kernels_are_not(script, package):
-    pytest.importorskip("ruff")
-    eight = ", ".join("abcdefgh")
-    text = (
-        branches("within", 9)
-        + branches("beyond", 12).replace("(x):", "(x):  # noqa: C901")
-        + branches("compiled", 12, "@kernel('f8(f8)')\n")
-        + branches("also", 12, "@numba.njit\n")
-        + f"def seven({eight[:-3]}): ...\ndef eight({eight}): ...\n@njit()\ndef nine({eight}, i): ...\n"
-    )
-    found = script.excesses(package({"a.py": text}))
-    assert [(item.rule, item.size) for item in found] == [("C901", 13), ("PLR0913", 8)]
-    assert found[0].place.startswith("pkg/a.py:")
-
-
-def test_reach_counts_private_functions_and_not_comprehensions(script, package, monkeypatch):
-    name = f"made_for_reach_{next(_numbers)}"
-    nested = {
-        "start.py": """
-            from PKG import inner
-            def read():
-                return [_one(i) for i in range(3)], sum(inner.numbers())
-            def _one(i):
-                return inner.two(i)
-        """,
-        "inner.py": """
-            def two(i):
-                return i
-            def numbers():
-                yield two(1)
-                yield from (two(i) for i in range(2))
-        """,
-    }
-    root = package(nested, name)
-    monkeypatch.syspath_prepend(root.parent)
-    reach = script.reach_of(importlib.import_module(f"{name}.start").read, root)
-    called = [function.removeprefix(f"{name}.") for function in reach.functions]
-    assert called == ["start:read", "start:_one", "inner:two", "inner:numbers"]
-    assert (reach.modules, reach.depth) == (2, 3)

@@ -10,7 +10,6 @@ import pytest
 from scipy.signal import bilinear, butter, lfilter, lfilter_zi
 
 from cdtool.base.arrays import BoolArray, FloatArray
-from cdtool.base.kernels import kernel
 from cdtool.detectors.desired_dynamics import DesiredDynamics
 from cdtool.detectors.detection import Status
 from cdtool.detectors.direct import Direct
@@ -118,14 +117,6 @@ def test_the_rates_are_those_of_the_newest_end_of_savitzky_and_golays_filter():
     assert second[59, 0] == pytest.approx(window.deriv(2)(0.0), rel=1e-8)
 
 
-def test_rates_are_unknown_while_a_missing_sample_is_in_the_window():
-    values = TIME[:100].copy()[:, np.newaxis]
-    values[50] = np.nan
-    first, _ = polynomial_rates(TIME[:100], values, 21)
-    assert np.isnan(first[50:71]).all()
-    assert np.isfinite(first[4:50]).all() and np.isfinite(first[71:]).all()
-
-
 def test_a_reference_that_the_axis_does_not_follow_makes_the_method_not_applicable_there():
     reference = 0.1 * TIME
     position = np.where((TIME > 2.0) & (TIME < 3.0), reference - 0.06, reference - 0.01)
@@ -173,19 +164,6 @@ def test_starts_and_what_has_not_settled_are_the_bits_of_masks_over_arrays(seed)
         np.testing.assert_array_equal(unsettled(time, lost, 0.01)[:, j], time < until - 0.5 * usual)
 
 
-@pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("cutoff", [(5.0, 5.0, 5.0), (5.0, 80.0, 400.0)])
-def test_joints_together_have_the_bits_of_one_joint_at_a_time(seed, cutoff):
-    time, lost = random_clock_and_marks(seed)
-    values = np.random.default_rng(seed).normal(size=lost.shape)
-    together = *low_pass(time, values, lost, np.array(cutoff)), *polynomial_rates(time, values, 21)
-    for j in range(3):
-        own = values[:, j : j + 1]
-        alone = *low_pass(time, own, lost[:, j : j + 1], cutoff[j]), *polynomial_rates(time, own, 21)
-        for found, expected in zip(together, alone, strict=True):
-            np.testing.assert_array_equal(found[:, j], expected[:, 0])
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_the_rates_are_those_of_exact_normal_equations(seed):
     time, _ = random_clock_and_marks(seed + 100)
@@ -208,63 +186,3 @@ def test_the_rates_are_those_of_exact_normal_equations(seed):
     span = time[k] - time[window.start]
     assert first == pytest.approx(linear, rel=1e-9, abs=1e-9 / span)
     assert second == pytest.approx(2.0 * square, rel=1e-9, abs=1e-9 / span**2)
-
-
-@kernel("void(float64[::1], float64[:, ::1], int64, float64[:, ::1], float64[:, ::1], float64[:, ::1])")
-def fill_rates_one_by_one(time, values, samples, powers, first, second):
-    """The cubic of one sample after the other, each over its own window."""
-    for k in range(len(time)):
-        start = k - samples + 1 if k >= samples else 0
-        span = time[k] - time[start]
-        if k - start < 4:
-            continue
-        count = k + 1 - start
-        for i in range(count):
-            x = (time[start + i] - time[k]) / span
-            powers[0, i], powers[1, i], powers[2, i] = x, x * x, x * x * x
-            powers[3, i], powers[4, i] = x * (x * x * x), (x * x) * (x * x * x)
-        s1 = s2 = s3 = s4 = s5 = s22 = s33 = 0.0
-        for i in range(count):
-            s1, s2, s3 = s1 + powers[0, i], s2 + powers[1, i], s3 + powers[2, i]
-            s4, s5 = s4 + powers[3, i], s5 + powers[4, i]
-            s22, s33 = s22 + powers[1, i] * powers[1, i], s33 + powers[2, i] * powers[2, i]
-        f10, f20, f30 = s1 / count, s2 / count, s3 / count
-        m11, m12, m13 = s2 - f10 * s1, s3 - f10 * s2, s4 - f10 * s3
-        m21, m22, m23 = s3 - f20 * s1, s22 - f20 * s2, s5 - f20 * s3
-        m31, m32, m33 = s4 - f30 * s1, s5 - f30 * s2, s33 - f30 * s3
-        f21, f31 = m21 / m11, m31 / m11
-        m22, m23, m32, m33 = m22 - f21 * m12, m23 - f21 * m13, m32 - f31 * m12, m33 - f31 * m13
-        f32 = m32 / m22
-        m33 -= f32 * m23
-        for j in range(values.shape[1]):
-            r0 = r1 = r2 = r3 = 0.0
-            for i in range(count):
-                change = values[start + i, j] - values[k, j]
-                r0, r1 = r0 + change, r1 + powers[0, i] * change
-                r2, r3 = r2 + powers[1, i] * change, r3 + powers[2, i] * change
-            r1, r2, r3 = r1 - f10 * r0, r2 - f20 * r0, r3 - f30 * r0
-            r2, r3 = r2 - f21 * r1, r3 - f31 * r1
-            cubic = (r3 - f32 * r2) / m33
-            square = (r2 - m23 * cubic) / m22
-            first[k, j] = (r1 - m12 * square - m13 * cubic) / m11 / span
-            second[k, j] = 2.0 * square / (span * span)
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_the_rates_of_all_samples_are_those_of_one_after_the_other(seed):
-    rng = np.random.default_rng(seed)
-    count = int(rng.choice([0, 1, 4, 5, 6, 20, 21, 22, 31, 32, 33, 64, 90, 150]))
-    samples, joints = int(rng.choice([3, 4, 5, 8, 21, 40])), int(rng.integers(1, 8))
-    time = np.cumsum(np.where(rng.random(count) < 0.05, 0.05, 1e-3 + 1e-4 * rng.random(count)))
-    values = rng.normal(size=(count, joints))
-    values[rng.random(values.shape) < 0.01] = np.nan
-    values[rng.random(values.shape) < 0.005] = np.inf
-    found = polynomial_rates(time, values, samples)
-    expected = np.full((2, count, joints), np.nan)
-    fill_rates_one_by_one(time, values, samples, np.empty((5, samples)), *expected)
-    expected[~np.isfinite(expected)] = np.nan
-    for rates, own in zip(found, expected, strict=True):
-        largest = np.max(np.abs(own), initial=0.0, where=np.isfinite(own))
-        np.testing.assert_allclose(np.where(np.isfinite(rates), rates, np.nan), own, rtol=1e-6, atol=1e-9 * largest)
-    for rates, head in zip(found, polynomial_rates(time[:50], values[:50], samples), strict=True):
-        np.testing.assert_array_equal(head, rates[:50])

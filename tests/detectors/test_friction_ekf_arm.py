@@ -96,21 +96,6 @@ def test_an_update_is_josephs_form_for_any_gain_and_without_a_gain_the_frictions
     assert found[0] == p[0, 0]
 
 
-def test_the_covariance_stays_positive_definite_over_a_long_alternating_motion():
-    p, smallest = START, np.inf
-    for k in range(30_000):
-        v = 0.5 * np.sin(k / 1000.0)
-        observable = abs(v) >= EKF.minimum_speed
-        drift = PROCESS[0] if observable else 0.0
-        p = measured(
-            predict_covariance(p, -v / 0.235, -8.0, 30.0 * np.sin(k / 700.0), PERIOD, drift, *PROCESS[1:]), observable
-        )
-        if k % 50 == 0:
-            unit = np.sqrt(np.diag(square(p)))
-            smallest = min(smallest, float(np.linalg.eigvalsh(square(p) / np.outer(unit, unit))[0]))
-    assert smallest > 1e-3
-
-
 def joint_of(arm: PlanarArm, log: Recording, joint: int) -> tuple[JointMeasurements, JointEquation, JointEquation]:
     """One joint's motion; its equation with its angle as a state, and with everything that is known as an input."""
     drive = drive_on_speed_clock(log, arm)

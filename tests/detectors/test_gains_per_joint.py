@@ -10,7 +10,6 @@ import pytest
 from cdtool.alarms.activation import Activation
 from cdtool.base.errors import ConfigurationError, FieldsError, SignatureError
 from cdtool.detectors import DETECTORS
-from cdtool.detectors.base import of_joint, single
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
 from cdtool.formats.machine_file import fingerprint, read_machine_file
@@ -43,15 +42,6 @@ def test_each_joint_has_its_own_gains(name, axes):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_same_number_for_every_joint_is_that_number(name, arm):
-    recording = moving_recording(arm, seconds=3.0, noise=1e-3, contact=[2.0, 1.0], contact_at=2.0)
-    detector = DETECTORS.load(name)
-    columns = 1 if name == "energy" else 2
-    equal = detector(**{item.name: (item.default,) * columns for item in fields(detector)})
-    np.testing.assert_array_equal(equal.signal(recording, arm).values, detector().signal(recording, arm).values)
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_a_wrong_number_of_values_and_a_wrong_value_are_refused(name, arm):
     recording = moving_recording(arm, seconds=1.0)
     detector = DETECTORS.load(name)
@@ -67,13 +57,6 @@ def test_a_wrong_number_of_values_and_a_wrong_value_are_refused(name, arm):
 def test_a_whole_machines_energy_has_one_gain(arm):
     with pytest.raises(ConfigurationError, match="2 values for the whole machine"):
         Energy(bandwidth=(10.0, 20.0)).signal(moving_recording(arm, seconds=1.0), arm)
-
-
-def test_one_joints_gains_are_numbers():
-    detector = of_joint(Momentum(bandwidth=(10.0, 20.0)), 1, 2)
-    assert detector == Momentum(bandwidth=20.0) and single(detector.bandwidth) == 20.0
-    with pytest.raises(ConfigurationError, match="2 values"):
-        single((1.0, 2.0))
 
 
 def test_the_machine_file_accepts_one_number_or_one_per_joint(tmp_path):

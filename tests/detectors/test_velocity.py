@@ -127,11 +127,3 @@ def test_residual_and_status_are_those_of_the_modes_of_every_step(joints, seed):
         )
         np.testing.assert_array_equal(head, found[:part])
         np.testing.assert_array_equal(head_status, status[:part])
-
-
-def test_without_any_motion_every_sample_is_a_gap():
-    nothing, lost = np.zeros((4, 2)), np.ones(4, dtype=bool)
-    residual, status = observe_velocity(
-        np.arange(4.0), nothing, nothing, lambda _: np.empty((0, 2, 2)), lost, lost, np.ones(2)
-    )
-    assert not residual.any() and (status == Status.GAP).all()

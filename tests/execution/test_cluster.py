@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import faulthandler
 import json
-import logging
 import os
 import pickle
 import signal
@@ -13,11 +12,9 @@ import subprocess
 import sys
 import threading
 import time
-import warnings
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from cdtool.base.errors import RecordingError, UsageError, WorkerError
@@ -95,23 +92,6 @@ def test_items_that_end_their_workers_are_lost_with_the_reason_and_no_other(addr
     assert made == [(number, REASONS[number]) if number in REASONS else number for number in range(40)]
 
 
-def hungry(number):
-    if number == 8:
-        np.ones(250_000_000)
-    return number
-
-
-@needs_dask
-def test_an_item_is_tried_again_as_often_as_asked_and_dask_prints_nothing(address, capfd):
-    logger = logging.getLogger("distributed")
-    before = list(logger.handlers), logger.propagate, list(warnings.filters)
-    made = list(in_order(hungry, range(12), 12, Workers(cluster=address), of_lost=lost))
-    reason = "its worker process was ended: the memory was not enough, in each of 2 attempts"
-    assert made == [(number, reason) if number == 8 else number for number in range(12)]
-    assert (list(logger.handlers), logger.propagate, list(warnings.filters)) == before
-    assert capfd.readouterr() == ("", "")
-
-
 def refused(number):
     if number == 5:
         raise RecordingError("05.csv: no row", "check the file", channel="torque")
@@ -164,13 +144,6 @@ def test_without_the_package_one_line_names_the_extra(monkeypatch):
     done = cdtool("benchmark", ROOT / "sample_logs/gate/benchmark.toml", "--cluster", "local")
     assert done.status == 2
     assert done.err == "error: --cluster needs the package distributed (pip install '.[cluster]')\n"
-
-
-@needs_dask
-def test_a_cluster_without_a_worker_is_one_line(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster_session, "_JOINED_WITHIN", 0.5)
-    with dask_cluster.cluster(tmp_path, workers=0) as running, pytest.raises(WorkerError, match="no worker"):
-        list(in_order(abs, range(5), 5, Workers(cluster=running.address)))
 
 
 def test_everything_that_is_here_must_be_the_same_there():

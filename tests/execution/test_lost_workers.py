@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.base.errors import UsageError, WorkerError
+from cdtool.base.errors import WorkerError
 from cdtool.execution import in_worker, processes
 from cdtool.execution.in_worker import Done, Failed, NotBegun, Raised
 from cdtool.execution.workers import Workers, _Ordered, in_order
@@ -71,23 +71,6 @@ def cut_off(folder, number, how=signal.SIGKILL):
             os.kill(os.getpid(), how)
 
         in_worker._send = send
-    return number
-
-
-class OddError(Exception):
-    """It cannot be copied to another process."""
-
-    def __init__(self, file, number):
-        super().__init__(f"{file} is strange")
-        self.number = number
-
-
-def odd(number):
-    if number == 5:
-        raise OddError("05.csv", number)
-    if number > 5:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        time.sleep(60.0)
     return number
 
 
@@ -178,25 +161,12 @@ def test_items_that_leave_their_workers_in_any_way_are_lost_and_no_other(beside,
     assert capfd.readouterr() == ("", "")
 
 
-def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_ignore_sigterm_end(capfd):
-    before = set(multiprocessing.active_children())
-    with pytest.raises(Exception, match=r"05\.csv is strange"):  # Dask, once imported, makes it possible to copy it
-        run(odd, 8, Workers(2))
-    assert set(multiprocessing.active_children()) == before
-    assert capfd.readouterr() == ("", "")
-
-
 @pytest.mark.parametrize("retries", [0, 1])
 def test_a_worker_that_is_killed_while_it_sends_a_result_is_replaced(tmp_path, retries):
     made = run(partial(cut_off, tmp_path), 12, Workers(2, retries=retries))
     reason = "its worker process was killed (SIGKILL): mostly because the memory was not enough"
     assert made == [(number, reason) if number == 3 and not retries else number for number in range(12)]
     assert (tmp_path / "3.txt").stat().st_size == 1 + retries
-
-
-def test_a_worker_that_is_stopped_while_it_sends_a_result_is_ended_by_the_time_limit(tmp_path):
-    made = run(partial(cut_off, tmp_path, how=signal.SIGSTOP), 12, Workers(2, timeout=1.0))
-    assert made == list(range(12))
 
 
 def keeps(folder, number):
@@ -210,25 +180,6 @@ def test_temporary_files_of_workers_are_removed_also_of_killed_ones(tmp_path):
     assert len(run(partial(keeps, tmp_path), 8, Workers(2, retries=0))) == 8
     made = [Path(file.read_text(encoding="utf-8")) for file in tmp_path.iterdir()]
     assert len(made) == 8 and not any(path.exists() for path in made)
-
-
-def nap(number):
-    time.sleep(0.05)
-    return number
-
-
-def test_two_pools_of_one_program_leave_each_other_alone():
-    made = {}
-
-    def work(count):
-        made[count] = run(nap, count, Workers(2, retries=0))
-
-    threads = [threading.Thread(target=work, args=(count,)) for count in (4, 60)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60.0)
-    assert made == {count: list(range(count)) for count in (4, 60)}
 
 
 def test_work_that_is_given_up_after_a_result_was_cut_off_leaves_nothing(tmp_path):
@@ -260,10 +211,6 @@ def test_an_item_that_takes_too_long_is_ended(work, jobs):
     assert time.monotonic() - begin < 30.0
 
 
-def test_a_time_limit_ends_no_item_that_keeps_it():
-    assert run(abs, 200, Workers(2, timeout=5.0)) == list(range(200))
-
-
 def test_an_item_that_ends_its_worker_once_is_repeated_and_done(tmp_path):
     assert run(partial(once, tmp_path), 40, Workers(2)) == list(range(40))
     attempts = [(tmp_path / f"{number}.txt").stat().st_size for number in range(0, 40, 5)]
@@ -274,38 +221,6 @@ def test_a_lost_item_is_an_error_where_nothing_stands_for_it():
     with pytest.raises(WorkerError) as raised:
         list(in_order(killed, range(8), 8, Workers(2)))
     assert "5: its worker process was killed" in raised.value.message and "--jobs" in raised.value.hint
-
-
-def test_results_used_slowly_do_not_hide_a_lost_item():
-    made = []
-    for result in in_order(killed, range(20), 20, Workers(2), of_lost=lost):
-        time.sleep(0.02)
-        made.append(result)
-    assert [item for item in made if not isinstance(item, tuple)] == [number for number in range(20) if number != 5]
-
-
-def idle(folder, number):
-    """Kill the other worker, which waits for work, once."""
-    own = folder / f"{os.getpid()}.pid"
-    own.touch()
-    # Long enough for the other worker to have returned the item before.
-    time.sleep(0.3 if number == 7 else 0.05)
-    others = [int(file.stem) for file in folder.glob("*.pid") if file != own]
-    if number == 7 and others and not (folder / "done").exists():
-        (folder / "done").touch()
-        os.kill(others[0], signal.SIGKILL)
-        time.sleep(0.3)
-    return number
-
-
-def test_a_worker_that_is_killed_between_two_items_costs_none(tmp_path):
-    assert run(partial(idle, tmp_path), 8, Workers(2, retries=0)) == list(range(8))
-
-
-@pytest.mark.parametrize("wrong", [{"jobs": 0}, {"timeout": 0.0}, {"timeout": -1.0}, {"retries": -1}])
-def test_workers_that_cannot_be_are_refused(wrong):
-    with pytest.raises(UsageError):
-        Workers(**wrong)
 
 
 def test_processes_that_never_begin_are_one_error(monkeypatch):

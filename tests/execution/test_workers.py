@@ -1,6 +1,5 @@
 """Work in several processes: the same results in the same order, errors as in this process, and no process left."""
 
-import gc
 import os
 import pickle
 import signal
@@ -19,7 +18,6 @@ from hypothesis import strategies as st
 
 from cdtool.base import errors
 from cdtool.base.errors import CdtoolError, RecordingError
-from cdtool.execution.starting import shares_memory
 from cdtool.execution.workers import Workers, in_order
 from cdtool.recordings.recording import Recording, Series
 
@@ -65,35 +63,6 @@ def test_work_is_done_in_other_processes_with_and_without_threads_in_this_one(be
     finally:
         stop.set()
     assert os.getpid() not in made and 1 <= len(set(made)) <= 2
-
-
-def frozen_objects(_):
-    return gc.get_freeze_count()
-
-
-@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.skipif(sys.platform != "linux", reason="fork"))])
-def test_objects_made_before_the_work_are_not_searched_for_garbage_during_it(jobs):
-    if jobs > 1 and not shares_memory():
-        pytest.skip("an earlier test has left a thread: workers are not forked from this process")
-    before = gc.get_freeze_count()
-    assert before < 1000  # some hundred: those of Python 3.12 itself
-    assert all(count > 10_000 for count in in_order(frozen_objects, range(6), 6, Workers(jobs)))
-    assert gc.get_freeze_count() <= before
-    results = in_order(frozen_objects, range(6), 6)
-    next(results)
-    results.close()
-    assert gc.get_freeze_count() <= before
-
-
-def test_objects_that_the_caller_has_left_out_of_garbage_collection_stay_left_out():
-    gc.freeze()
-    try:
-        before = gc.get_freeze_count()
-        assert list(in_order(doubled, range(3), 3)) == [0, 2, 4]
-        # A few of them may have ended meanwhile: those that earlier tests still held.
-        assert 0.99 * before < gc.get_freeze_count() <= before
-    finally:
-        gc.unfreeze()
 
 
 def test_items_are_taken_when_their_work_begins_not_all_at_once():

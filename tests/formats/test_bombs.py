@@ -92,24 +92,6 @@ def test_plain_files_pass_every_check(tmp_path):
 # --- HDF5
 
 
-def chunked(path: Path, **options) -> Path:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(path, "w") as file:
-        file.create_dataset("a", data=np.arange(1000.0), **options)
-    return path
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{}, {"chunks": (100,)}, {"compression": "gzip", "shuffle": True, "fletcher32": True}, {"compression": "lzf"}],
-    ids=["contiguous", "chunked", "gzip, shuffled, with a checksum", "lzf"],
-)
-def test_a_dataset_that_is_compressed_once_passes(tmp_path, options):
-    path = chunked(tmp_path / "a.h5", **options)
-    with pytest.importorskip("h5py").File(path) as file:
-        check_chunks(path, "a", file["a"])
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import cdtool
 from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.containers.hdf5 import Hdf5
-from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.pieces import join_pieces
 from tests.base.findings.facts import fact_of
@@ -100,39 +98,11 @@ def test_a_packed_clock_is_left_out(saved):
     assert list(source.columns) == ["q"] and source.columns["q"].time is None
 
 
-def test_attributes_that_convert_nothing_are_no_packing(saved):
-    attributes = {"scale_factor": 1.0, "add_offset": np.array([0.0]), "_FillValue": np.nan, "missing_value": np.nan}
-    assert survey(saved(x=(np.arange(5.0), attributes))).columns["x"].values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-
-
-def test_info_shows_every_column_on_the_clock_of_its_group(saved):
-    path = saved(
-        drive__t=(np.arange(10.0) * 10.0, {"unit": "ms"}),
-        drive__q=(np.arange(10.0), {}),
-        cell__time=(np.arange(40.0) / 1000.0, {"units": "s"}),
-        cell__force=(np.arange(40.0), {}),
-    )
-    info = cdtool.info(path)
-    rates = {channel.name: round(channel.rate_hz) for channel in info.channels}
-    assert rates == {"drive/t": 100, "drive/q": 100, "cell/time": 1000, "cell/force": 1000}
-    assert not [finding for finding in info.findings if finding.kind == "assumed_clock"]
-
-
 def test_clocks_of_groups_without_a_unit_are_a_warning(saved):
     clocks = {"drive__t": (np.arange(9.0), {}), "cell__time": (np.arange(9.0), {})}
     assert ("", ("clocks_without_unit", {"datasets": ("cell/time", "drive/t")})) in facts(survey(saved(**clocks)))
     alone = facts(survey(saved(t=clocks["drive__t"], q=clocks["drive__t"])))
     assert not [fact for _, fact in alone if fact.kind == "clocks_without_unit"]
-
-
-def test_the_epoch_that_is_subtracted_is_the_earliest():
-    clocks = [
-        EpochClock(lambda a, b, x=x: np.array([x, x + 1])[a:b], 1e-3) for x in (1_700_000_000_250, 1_700_000_000_000)
-    ]
-    findings = []
-    origin = common_origin({"a": clocks[0], "b": clocks[1]}, findings)
-    assert origin == 1_700_000_000 and not findings
-    assert [clock.times(0, 2, origin).tolist() for clock in clocks] == [[0.25, 0.251], [0.0, 0.001]]
 
 
 def test_a_clock_without_an_epoch_keeps_its_times_and_is_reported(saved):

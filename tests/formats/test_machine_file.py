@@ -102,29 +102,6 @@ def test_missing_and_broken_files_are_one_line(tmp_path):
         read(tmp_path, "[machine]\nname = = 3\n")
 
 
-def test_load_coordinates_accept_only_masses(tmp_path):
-    text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 95.1\nviscous_friction = 204.3\n'
-    file = read(tmp_path, text)
-    assert file.machine.nominal_inertia[0] == 95.1 and file.machine.viscous_friction == (204.3,)
-    with pytest.raises(ConfigurationError, match=r"machine\.motor_inertia.*no meaning"):
-        read(tmp_path, text + "motor_inertia = 1e-3\n")
-
-
-def test_many_joints_accept_one_value_or_one_each(tmp_path):
-    text = MACHINE.replace('name = "gate"', 'name = "portal"\njoints = ["x", "y"]').replace("620.0", "[620.0, 30.0]")
-    file = read(tmp_path, text + '[channels]\ntime = { rate_hz = 1000 }\nspeed = { columns = [1, 2], unit = "rpm" }\n')
-    assert file.machine.nominal_inertia == pytest.approx([1154.4, 564.4], abs=0.2)
-    assert file.columns.time.rate == 1000.0
-    with pytest.raises(ConfigurationError, match="one per joint"):
-        read(tmp_path, text.replace("[620.0, 30.0]", "[620.0, 30.0, 1.0]"))
-
-
-def test_a_load_side_speed_is_accepted_with_motor_channels(tmp_path):
-    text = MACHINE + CHANNELS.replace('{ column = "n_motor", unit = "rpm" }', '{ column = "v", unit = "mm/s" }')
-    source = next(item for item in read(tmp_path, text).columns.sources if item.channel == "speed")
-    assert (source.unit, source.factor) == ("m/s", (1e-3,))
-
-
 def test_the_fingerprint_changes_with_every_parameter(tmp_path):
     one = fingerprint(read(tmp_path, MACHINE).machine)
     assert one == fingerprint(read(tmp_path, MACHINE).machine)
@@ -152,11 +129,6 @@ def test_gains_of_one_detector_under_both_its_names_are_refused(tmp_path):
         read(tmp_path, text)
 
 
-def test_a_unit_of_a_label_is_refused(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"channels\.label\.unit"):
-        read(tmp_path, MACHINE + CHANNELS.replace("force =", 'label = { column = "hit", unit = "N" }\nforce ='))
-
-
 LABEL = '[channels]\ntime = { column = "t", unit = "s" }\nlabel = { column = "class", kinds = KINDS }\n'
 
 
@@ -181,12 +153,6 @@ def test_the_values_of_a_label_have_kinds(tmp_path):
 def test_wrong_kinds_of_a_label_name_their_key(tmp_path, kinds, said):
     with pytest.raises(ConfigurationError, match=said):
         read(tmp_path, MACHINE + LABEL.replace("KINDS", kinds))
-
-
-def test_only_a_label_has_kinds(tmp_path):
-    channels = LABEL.replace("label", "event").replace("KINDS", '{ 1 = "hard" }')
-    with pytest.raises(ConfigurationError, match=r"event\.kinds: unknown key"):
-        read(tmp_path, MACHINE + channels)
 
 
 def test_a_misspelt_type_or_a_wrong_value_of_the_machine_hides_no_mistake_of_its_channels(tmp_path):

@@ -9,11 +9,10 @@ import pytest
 import scipy.io.matlab
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.io import loadmat, savemat
-from scipy.sparse import csc_array
+from scipy.io import loadmat
 
 from cdtool.base.errors import RecordingError
-from cdtool.formats.channels.reading import read_as_logged, survey
+from cdtool.formats.channels.reading import survey
 from cdtool.formats.mat import Mat
 from cdtool.formats.mat.version_5 import read_variables
 from tests.base.findings.facts import fact_of
@@ -72,12 +71,6 @@ def test_groups_of_one_struct_have_the_clock_that_is_as_long_and_the_rest_is_nam
     assert "log.gains" in source.names  # a machine file may name it
 
 
-def test_structs_with_clocks_of_their_own_keep_them(source_of):
-    source = source_of({"drive": {"t": T, "tau": T}, "cell": {"t": 0.5 + np.arange(60) / 500, "f": np.ones(60)}})
-    assert source.columns["cell.f"].time[0] == 0.5 and len(source.columns["cell.f"].time) == 60
-    assert len(source.columns["drive.tau"].time) == 40
-
-
 @pytest.mark.parametrize(("unit", "since"), [("s", 1.7e9), ("ms", 1.7e12)])
 def test_clocks_that_count_from_1970_start_together(source_of, unit, since):
     step = {"s": 0.01, "ms": 10.0}[unit]
@@ -106,42 +99,12 @@ def test_the_elements_of_an_array_of_structs_have_their_own_clocks(source_of):
     assert source.details["trial(2).tool"] == "tool 40" and source.details["trial(2).load"] == "40"
 
 
-def test_one_run_can_be_mapped_by_its_own_name(tmp_path, machine):
-    path = save_v7(tmp_path / "log.mat", {"trial": trials()})
-    channels = 'time = { column = "trial(2).t", unit = "s" }\nspeed = { column = "trial(2).q[0]", unit = "rad/s" }\n'
-    recording = read_as_logged(path, machine(f"[channels]\n{channels}")).recording
-    np.testing.assert_array_equal(recording["speed"].values[:, 0], trials()[1]["q"][:, 0])
-
-
 def test_an_array_of_structs_of_single_numbers_is_named_with_what_makes_it_readable(source_of):
     """table2struct(T) makes one struct per row."""
     source = source_of({"v": T, "T": [{"t": 0.1 * i, "tau": 2.0 * i, "note": "x"} for i in range(6)]})
     (found,) = facts(source, "variable_left_out")
     assert found.numbers["what"] == "an array of structs without vectors"
     assert "struct('t', [T.t])" in found.numbers["advice"]
-
-
-def test_simulink_logs_use_the_clock_of_the_outer_struct(source_of):
-    signals = [{"values": np.column_stack((T, 2 * T)), "label": "q"}, {"values": -T, "label": "tau"}]
-    source = source_of({"out": {"time": T, "signals": signals}, "other": {"time": np.arange(9.0), "x": np.ones(9)}})
-    assert len(source.columns["out.signals(1).values[1]"].time) == 40
-    assert source.details["out.signals(2).label"] == "tau"
-
-
-def test_of_many_single_numbers_the_first_are_shown_and_the_rest_counted(source_of):
-    source = source_of({"t": T, "par": {f"p{i:03d}": float(i) for i in range(100)}})
-    assert source.details["par.p007"] == "7" and source.details["more numbers and texts"] == "40"
-
-
-def test_a_machine_file_that_names_a_clock_reads_it_as_it_is(tmp_path, machine):
-    log = {"t": 1.7e9 + T, "v": T, "t_cell": 1.7e9 + np.arange(90) / 1000, "F": np.ones(90)}
-    path = save_v7(tmp_path / "log.mat", {"log": log})
-    for clock in ('column = "log.t"', 'column = "time"'):
-        mapped = machine(
-            f'[channels]\ntime = {{ {clock}, unit = "s" }}\nspeed = {{ column = "log.v", unit = "rad/s" }}\n'
-        )
-        recording = read_as_logged(path, mapped).recording
-        assert recording.origin == pytest.approx(1.7e9) and recording["speed"].time[0] == pytest.approx(0.0, abs=1e-6)
 
 
 NOON = 739_385.5  # 2024-05-13 12:00
@@ -154,23 +117,11 @@ def test_days_of_datenum_are_seconds_since_the_first(source_of):
     assert [fact.numbers["start"] for fact in facts(source, "days_of_matlab")] == ["2024-05-13T12:00:00.000"]
 
 
-def test_a_machine_file_reads_a_clock_in_days_in_seconds(tmp_path, machine):
-    path = save_v7(tmp_path / "log.mat", {"t": NOON + T / 86400, "v": T})
-    mapped = machine('[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "v", unit = "rad/s" }\n')
-    recording = read_as_logged(path, mapped).recording
-    np.testing.assert_allclose(recording["speed"].time, T, rtol=0.0, atol=1.1e-5)
-    assert recording.origin == 1_715_601_600.0
-
-
 def test_several_clocks_in_days_start_together(source_of):
     later = NOON + (5.0 + T) / 86400
     source = source_of({"a": {"t": NOON + T / 86400, "x": T}, "b": {"t": later, "y": T}})
     np.testing.assert_allclose(source.columns["b.y"].time, 5.0 + T, rtol=0.0, atol=1.1e-5)
     assert source.columns["a.x"].time[0] == 0.0 and source.origin == 1_715_601_600.0
-
-
-def test_a_column_without_the_name_of_a_clock_is_not_read_as_days(source_of):
-    assert source_of({"log": {"n": NOON + T / 86400, "t": T}}).columns["log.n"].values[0] == NOON
 
 
 def test_an_image_in_a_struct_is_left_out_by_name(source_of):
@@ -184,12 +135,6 @@ def test_an_image_in_a_struct_is_left_out_by_name(source_of):
 def test_large_integers_are_counted(source_of):
     source = source_of({"log": {"n": np.array([1, 2**60 + 1], dtype=np.int64)}})
     assert [str(finding) for finding in source.findings if finding.channel == "log.n"] != []
-
-
-def test_sparse_matrices_are_named_with_what_makes_them_readable(tmp_path):
-    savemat(tmp_path / "log.mat", {"t": T, "s": {"p": csc_array(np.eye(3))}})
-    (finding,) = Mat().columns(tmp_path / "log.mat").findings
-    assert finding.sentence == ("variable 's.p' is a sparse matrix: left out; save it as a plain matrix: full(s.p)")
 
 
 @pytest.mark.parametrize(
@@ -344,14 +289,4 @@ def test_a_bomb_inside_of_a_struct_is_refused(tmp_path, make, message):
         file.create_group("s").attrs["MATLAB_class"] = np.bytes_("struct")
         file.move("a", "s/a")
     with pytest.raises(RecordingError, match=message):
-        Mat().columns(path)
-
-
-def test_references_without_number_are_refused(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    path = save_v73(tmp_path / "a.mat", {"t": T})
-    with h5py.File(path, "a") as file:
-        cell = file.create_dataset("c", (10**6, 1), dtype=h5py.ref_dtype, chunks=(100, 1))
-        cell.attrs["MATLAB_class"] = np.bytes_("cell")
-    with pytest.raises(RecordingError, match="more than 200000 values or 32 levels of structs and cells: refused"):
         Mat().columns(path)

@@ -19,7 +19,7 @@ from cdtool.formats.channels.log_statistics import LogStatistics
 from cdtool.formats.channels.reading import choose_format
 from cdtool.formats.columns import Column, Piece
 from cdtool.formats.csv import text
-from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces, split_by_clock
+from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from tests.commands.convert.kinds import needs
@@ -166,28 +166,3 @@ def test_the_memory_for_the_statistics_of_a_log_does_not_grow_with_its_length():
         assert figures.rows("/a data") == 20_000 * count
         assert figures.clocks["/a"].rate == pytest.approx(1000.0)
     assert peaks[200] < 1.2 * peaks[20]
-
-
-def test_columns_in_memory_are_one_piece_per_clock():
-    time = np.arange(3.0)
-    columns = [Column("a", time, time), Column("b", time, time), Column("c", np.arange(4.0))]
-    source = Source(Path("a"), "mat", {column.name: column for column in columns})
-    run = PieceRun(split_by_clock(source))
-    assert [sorted(piece.values) for piece in run] == [["a", "b"], ["c"]]
-    assert same(source, join_pieces(split_by_clock(source), sort=False))
-    assert all(len(column.values) == 0 for column in run.source.columns.values())
-
-
-def test_a_piece_whose_values_are_its_time_keeps_both():
-    """The column grows in an array of its own: a piece's array may be seen elsewhere."""
-
-    def pieces():
-        for first in range(0, 300_000, 100_000):
-            time = np.arange(first, first + 100_000, dtype=np.float64)
-            yield Piece("0", time, {"t": time}, len(time))
-        return Source(Path("a"), "csv", {"t": Column("t", np.empty(0), np.empty(0), "s")})
-
-    column = join_pieces(pieces(), sort=False).columns["t"]
-    assert column.time is not None
-    np.testing.assert_array_equal(column.values, np.arange(300_000.0))
-    np.testing.assert_array_equal(column.time, np.arange(300_000.0))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from tests.command import Outcome
 from tests.fuzz.hostile_commands import attempts, complaint, make_bench, run
 
 COUNT, SEED = 60, 14
@@ -23,11 +22,3 @@ def test_no_hostile_file_or_option_makes_a_traceback_or_more_than_a_line(bench):
         if said := complaint(run(attempt, bench)):
             complaints.append(f"{attempt.shown}: {said}")
     assert not complaints, "\n".join(complaints)
-
-
-def test_the_check_sees_a_traceback_a_wrong_status_and_a_long_line():
-    assert "traceback" in complaint(Outcome(2, "", "Traceback (most recent call last):\nValueError: x\n"))
-    assert "status 120" in complaint(Outcome(120, "", ""))
-    assert "301 characters" in complaint(Outcome(2, "", f"error: {'x' * 294}\n"))
-    assert "no error line" in complaint(Outcome(2, "Usage: cdtool", ""))
-    assert not complaint(Outcome(3, "table\n", "left out: a.csv: is empty\n"))

@@ -58,10 +58,6 @@ def test_the_share_of_vibration_is_that_of_a_simulated_mode_at_its_worst(ratio):
     assert max(exact) >= 0.6 * shares[0]
 
 
-def test_below_one_period_there_is_no_share_to_tell():
-    assert math.isnan(vibration_share(0.9))
-
-
 def test_durations_and_frequencies_without_meaning_are_refused():
     with pytest.raises(UsageError, match="duration"):
         check_waves(0.0, 100.0)

@@ -60,11 +60,6 @@ def test_a_name_is_searched_where_it_is_defined_only():
     assert lines_of(text) == [1, 5]
 
 
-def test_the_field_of_an_f_string_is_not_searched():
-    assert lines_of("""f"a gap {'is told'} twice" """) == []  # language: an example
-    assert lines_of("""f"every {n}th run" """) == [1]  # language: an example
-
-
 def test_markdown_is_searched_without_code_and_addresses():
     page = "# Gaps\n\nA gap is\ntold. `is told`\n\n```text\nis told\n```\n"  # language: an example
     page += "\n[a page](is-told.md) is told\n"  # language: an example
@@ -82,11 +77,6 @@ def test_markdown_is_searched_without_code_and_addresses():
 )
 def test_a_line_is_exempt_with_its_reason(text, suffix):
     assert lines_of(text, suffix) == []
-
-
-def test_an_exemption_without_a_reason_exempts_nothing():
-    assert lines_of('x = "a gap is told"  # language:\n') == [1]  # language: an example
-    assert lines_of("A gap is told. <!-- language: -->\n", ".md") == [1]  # language: an example
 
 
 def test_the_command_prints_file_line_words_and_replacement(tmp_path, capsys):
@@ -118,15 +108,3 @@ def test_strings_and_comments_are_those_of_the_tokenizer(file):
             texts.append((begin, source[begin:end]))
     assert len(texts) > 20
     assert [(found.start(), found[0]) for found in strings_and_comments(source)] == texts
-
-
-def test_a_folder_is_checked_with_all_its_files_and_an_unknown_path_is_one_line(tmp_path, capsys):
-    (tmp_path / "room" / "inner").mkdir(parents=True)
-    (tmp_path / "room" / "plain.md").write_text("The log is short.\n", encoding="utf-8")
-    phrase = next(iter(PHRASES.values()))
-    assert main([str(tmp_path / "room")], tmp_path) == 0
-    (tmp_path / "room" / "inner" / "odd.md").write_text(phrase.hit + "\n", encoding="utf-8")
-    assert main([str(tmp_path / "room")], tmp_path) == 1
-    assert "room/inner/odd.md:1" in capsys.readouterr().out
-    assert main([str(tmp_path / "no_such_room")], tmp_path) == 2
-    assert capsys.readouterr().err.count("\n") == 1

@@ -118,21 +118,6 @@ def test_momentum_velocity_force_and_gravity_are_those_of_pinocchio(seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_energies_and_torques_of_a_motion_are_those_of_pinocchio(seed):
-    tree = random_tree(seed)
-    reference, (position, speed) = Reference(tree), states(tree, 40, seed)
-    pin, model, data = reference.pin, reference.model, reference.data
-    acceleration = states(tree, 40, seed + 1)[1]
-    kinetic, potential = tree.energies(position, speed)
-    for k in range(40):
-        q, v = (np.ascontiguousarray(table[k, reference.column]) for table in (position, speed))
-        assert kinetic[k] == pytest.approx(pin.computeKineticEnergy(model, data, q, v), rel=1e-12)
-        assert potential[k] == pytest.approx(pin.computePotentialEnergy(model, data, q), rel=1e-11, abs=1e-11)
-    expected = reference.each(lambda q, v, a: pin.rnea(model, data, q, v, a), position, speed, acceleration)
-    assert worst(tree.inverse_dynamics(position, speed, acceleration), expected) < 1e-12
-
-
-@pytest.mark.parametrize("seed", SEEDS)
 def test_inertia_matrix_and_jacobian_are_those_of_pinocchio(seed):
     tree = random_tree(seed)
     reference, (position, _) = Reference(tree), states(tree, 10, seed)
@@ -199,21 +184,6 @@ def test_another_order_of_the_columns_permutes_them_and_changes_no_bit():
     assert np.array_equal(
         other.contact_jacobian(position[:, turned], tree.links[-1].name, (0.0, 0.0, 0.0)), jacobian[:, :, turned]
     )
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_what_a_sample_gives_does_not_depend_on_the_samples_around_it(seed):
-    tree = random_tree(seed)
-    position, speed = states(tree, 75)
-    whole = (*tree.momentum_terms(position, speed), *tree.energies(position, speed))
-    torque, matrix = tree.inverse_dynamics(position, speed, speed), tree.inertia_matrix(position)
-    for k in (0, 1, 31, 32, 63, 64, 74):
-        one = slice(k, k + 1)
-        alone = (*tree.momentum_terms(position[one], speed[one]), *tree.energies(position[one], speed[one]))
-        for found, expected in zip(alone, whole, strict=True):
-            assert np.array_equal(found, expected[one])
-        assert np.array_equal(tree.inverse_dynamics(position[one], speed[one], speed[one]), torque[one])
-        assert np.array_equal(tree.inertia_matrix(position[one]), matrix[one])
 
 
 @pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])

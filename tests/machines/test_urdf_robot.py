@@ -39,12 +39,6 @@ def test_joint_map_gives_the_urdfs_names_of_the_logs_joints(tmp_path):
     np.testing.assert_array_equal(robot.gravity(POSE), plain.gravity(POSE))
 
 
-def test_joint_map_must_lead_to_a_joint_of_the_urdf(tmp_path):
-    fault = refused(tmp_path, joint_map={"pan": "pam"})
-    assert "no moving joint 'pam'" in fault.message
-    assert "did you mean pan?" in fault.hint
-
-
 def test_a_locked_joint_is_gone_and_stands_where_it_is_locked(tmp_path):
     whole = six_joint_robot(tmp_path)
     left = [name for name in JOINTS if name != "elbow"]
@@ -53,12 +47,6 @@ def test_a_locked_joint_is_gone_and_stands_where_it_is_locked(tmp_path):
     np.testing.assert_allclose(robot.gravity(POSE[:1, kept]), whole.gravity(POSE[:1])[:, kept], atol=1e-12)
     matrix = whole.inertia_matrix(POSE[:1])[:, kept][:, :, kept]
     np.testing.assert_allclose(robot.inertia_matrix(POSE[:1, kept]), matrix, rtol=1e-12)
-
-
-def test_a_joint_that_is_neither_logged_nor_locked_is_named_with_the_line_to_write(tmp_path):
-    fault = refused(tmp_path, joints=list(JOINTS[:-1]))
-    assert "neither logged nor locked: tool" in fault.message
-    assert fault.hint == "locked = { tool = 0.0 }"
 
 
 @pytest.mark.parametrize(
@@ -194,21 +182,5 @@ def test_a_force_at_a_known_point_of_the_last_link_is_recovered_from_the_residua
     np.testing.assert_allclose(robot.contact_force(POSE, residual, "link6", (0.05, 0.0, 0.1)), force[:, :3], atol=1e-9)
 
 
-def test_a_joint_map_must_be_a_table_of_names(tmp_path):
-    assert "machine.joint_map: is ['pan']" in refused(tmp_path, joint_map=["pan"]).message
-    assert "machine.joint_map.pan: is 3" in refused(tmp_path, joint_map={"pan": 3}).message
-
-
 def test_joints_have_to_be_named(tmp_path):
     assert "machine.joints: is missing" in refused(tmp_path, joints=None).message
-
-
-def test_an_unknown_key_of_the_machine_is_refused(tmp_path):
-    fault = refused(tmp_path, drive_inertias=0.3)
-    assert "machine.drive_inertias: unknown key" in fault.message
-    assert "drive_inertia" in fault.hint
-
-
-def test_a_negative_mass_of_the_urdf_is_reported_with_its_link(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"link 'link2': mass -6\.0 kg is negative"):
-        urdf_robot(tmp_path, six_joint_urdf().replace('value="6.0"', 'value="-6.0"'), {"joints": list(JOINTS)})

@@ -140,14 +140,6 @@ def test_a_second_run_replaces_the_comment_and_other_comments_stay(runner):
     assert (runner.folder / "step_summary.md").read_text() == "first | 20 ms\nsecond | 25 ms\n"
 
 
-def test_each_benchmark_file_has_its_own_comment(runner):
-    runner.environment["SUMMARY"] = "table\n"
-    for name in ("gate.toml", "door.toml", "gate.toml"):
-        runner.inputs["BENCHMARK"] = name
-        assert runner.all_steps() == 0
-    assert len(runner.comments()) == 2
-
-
 def test_a_violated_limit_is_commented_on_and_fails_the_last_step(runner):
     runner.environment |= {"SUMMARY": "limit violated\n", "STATUS_TO_RETURN": "1"}
     assert runner.all_steps() == 1
@@ -160,13 +152,6 @@ def test_without_a_summary_the_comment_states_the_exit_status(runner):
     assert "wrote no summary (exit status 2)" in runner.comments()[0]["body"]
 
 
-def test_a_long_summary_is_shortened_to_what_a_comment_may_have(runner):
-    runner.environment["SUMMARY"] = "| row |\n" * 10_000
-    assert runner.all_steps() == 0
-    body = runner.comments()[0]["body"]
-    assert len(body) < 65_536 and body.endswith("Shortened: the whole summary is on the page of the job.\n")
-
-
 @pytest.mark.parametrize(
     ("fails", "why"), [("read", "cannot be read"), ("write", "a fork, or no pull-requests: write")]
 )
@@ -176,12 +161,6 @@ def test_a_fork_whose_token_may_not_write_gets_a_notice_and_no_failure(runner, f
     (line,) = runner.run("Comment on the pull request").stdout.splitlines()
     assert line.startswith("::notice::") and why in line and "page of the job" in line
     assert not runner.comments() and (runner.folder / "step_summary.md").read_text() == "table\n"
-
-
-def test_without_a_pull_request_there_is_no_comment_and_every_other_step_runs():
-    (commenting,) = [item for item in STEPS if "gh api" in item.get("run", "")]
-    assert commenting["if"] == "inputs.comment == 'true' && github.event_name == 'pull_request'"
-    assert [item["name"] for item in STEPS if "if" not in item] == ["Install cdtool", "Benchmark", "Summary", "Status"]
 
 
 def test_every_input_reaches_a_step():

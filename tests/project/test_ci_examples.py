@@ -120,24 +120,6 @@ def test_a_benchmark_that_cannot_run_fails_the_job_and_later_steps_continue(shel
     assert shell(github_step("cdtool compare")).returncode == shell(github_step("GITHUB_STEP_SUMMARY")).returncode == 0
 
 
-def test_the_scripts_of_gitlab_run_the_same_benchmark_and_compare_if_possible(shell):
-    values = parsed("gitlab-ci.yml")
-    benchmark, compare = values["collision-benchmark"], values["collision-compare"]
-    assert values["variables"]["BENCHMARK"] == shell.environment["BENCHMARK"]
-    assert "\n".join(benchmark["script"]) == github_step("cdtool benchmark").strip()
-    assert benchmark["artifacts"]["reports"]["junit"] == "out/junit.xml" and benchmark["artifacts"]["paths"] == ["out/"]
-    (fetch,) = [line for line in compare["script"] if line.startswith("curl ")]
-    assert "--output baseline/results.json" in fetch and "|| rm -f baseline/results.json" in fetch
-    others = "\n".join(line for line in compare["script"] if line != fetch)
-    done = shell(others)
-    assert done.returncode == 0 and "nothing to compare with" in done.stdout
-    made = shell('cdtool benchmark "$BENCHMARK" --detectors pi -o out/results.json -o baseline/results.json')
-    assert made.returncode == 0, made.stderr
-    done = shell(others)
-    assert done.returncode == 0 and "no change shown" in done.stdout, done.stderr
-    assert compare["artifacts"]["paths"] == ["out/compare.md"] and (shell.folder / "out" / "compare.md").is_file()
-
-
 def test_github_gets_least_permissions_pinned_actions_a_cache_and_an_end():
     values, job = parsed("github-actions.yml"), github_job()
     assert values["permissions"] == {} and job["permissions"] == {"contents": "read", "actions": "read"}
@@ -155,17 +137,6 @@ def test_github_gets_least_permissions_pinned_actions_a_cache_and_an_end():
     assert keep["if"] == "always()" and keep["with"]["path"] == "out/"
     fetch = github_step("gh run download")
     assert f"--name {keep['with']['name']} --dir baseline" in fetch and "--branch main" in fetch
-
-
-def test_gitlab_always_keeps_artifacts_and_compares_after_a_violated_limit():
-    values = parsed("gitlab-ci.yml")
-    for name in ("collision-benchmark", "collision-compare"):
-        assert values[name]["artifacts"]["when"] == "always"
-        assert values[name]["stage"] in values["stages"]
-    assert values["collision-compare"]["rules"] == [
-        {"if": '$CI_PIPELINE_SOURCE == "merge_request_event"', "when": "always"}
-    ]
-    assert values["default"]["timeout"] == "30 minutes"
 
 
 def test_the_page_names_every_quantity_and_its_limits_are_valid():

@@ -234,31 +234,6 @@ def test_a_detector_or_threshold_describes_its_settings_with_units_its_equation_
     assert not faults_of_class(rules()[name])
 
 
-def test_a_missing_section_is_found():
-    def total(values: list[float], factor: float) -> float:
-        """Return a weighted sum.
-
-        Parameters
-        ----------
-        values : list of float
-            The values.
-
-        Examples
-        --------
-        >>> 1 + 1
-        2
-        """
-        if not values:
-            raise ValueError(factor)
-        return factor * sum(values)
-
-    assert faults_of_function(total) == [
-        "does not describe the parameter factor",
-        "has no section Returns",
-        "has no section Raises",
-    ]
-
-
 def examples_of(name: str, item: Any, names: Mapping[str, Any]) -> doctest.DocTest:
     """The examples in a docstring, which may use `names`."""
     return doctest.DocTestParser().get_doctest(inspect.getdoc(item) or "", dict(names), name, name, 0)

@@ -27,22 +27,3 @@ def test_the_picture_of_the_docs_is_that_of_the_imports(script, layers):
     assert text == script.svg(layers), "run python docs/make_layers.py"
     root = ElementTree.fromstring(text)
     assert root.findtext(f"{SVG}title") and "alarms imports" in (root.findtext(f"{SVG}desc") or "")
-
-
-def test_a_room_imports_only_what_lies_below_its_layer(layers):
-    depth = {room: number for number, layer in enumerate(layers.layers) for room in layer}
-    assert layers.imports["commands"] and not layers.imports["base"]
-    for room, imported in layers.imports.items():
-        assert all(depth[other] > depth[room] for other in imported), room
-
-
-def test_another_import_is_another_picture(script, layers):
-    fewer = dict(layers.imports, alarms=layers.imports["alarms"] - {"detectors"})
-    assert script.svg(script.Layers(layers.layers, fewer)) != script.svg(layers)
-
-
-def test_a_module_without_a_layer_is_an_error(script, tmp_path, monkeypatch):
-    (tmp_path / "stray.py").write_text("import cdtool.recordings.units\n", encoding="utf-8")
-    monkeypatch.setattr(script, "PACKAGE", tmp_path)
-    with pytest.raises(ValueError, match="cdtool/stray is in no layer"):
-        script.read_layers()

@@ -9,8 +9,6 @@ import pytest
 
 from tests.markers import ROOT, markers_of, slow_tests
 from tests.project import marker_samples
-from tests.project import slow_tests as slow_tests_script
-from tests.project.covered_lines import shares
 from tests.project.slow_tests import corrected, durations
 
 REPORT = """<testsuites><testsuite name="pytest">
@@ -75,18 +73,3 @@ def test_the_list_adds_tests_above_the_bound_and_drops_those_below_half(tmp_path
     stay = [names["test_absent"], names["test_between"]]
     assert corrected(listed, took, bound=0.5) == sorted([*stay, names["test_cases"]])
     assert corrected([], took, bound=0.5) == [names["test_cases"]]
-
-
-def test_the_covered_share_counts_only_lines_that_the_full_suite_runs():
-    full = {"cli/a.py": {1, 2, 3, 4}, "b.py": {1, 2}}
-    assert shares({"cli/a.py": {1, 2, 3, 9}}, full) == {"cli": (3, 4), ".": (0, 2)}
-
-
-def test_the_slow_tests_of_a_run_of_the_quick_ones_are_added_and_no_other_line_changes(tmp_path, monkeypatch, capsys):
-    report, listed = tmp_path / "quick.xml", tmp_path / "slow_tests.txt"
-    report.write_text(REPORT, encoding="utf-8")
-    listed.write_text("# a comment\ntests/z/test_y.py::test_not_in_this_run\n", encoding="utf-8")
-    monkeypatch.setattr(slow_tests_script, "SLOW_TESTS", listed)
-    assert slow_tests_script.main([str(report), "--add"]) == 0
-    assert slow_tests(listed) == ["tests/a/test_b.py::test_cases", "tests/z/test_y.py::test_not_in_this_run"]
-    assert "not listed: tests/a/test_b.py::test_cases took 0.70 s" in capsys.readouterr().out

@@ -9,7 +9,6 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
 import typer
 
 from cdtool.base.errors import installing
@@ -113,18 +112,6 @@ def test_every_option_that_a_message_names_is_one_of_the_command_it_is_for():
         for option in unresolved(text, shown_by(path))
     ]
     assert not wrong, "\n".join(wrong)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "estimate the force: --contact-at",
-        "state the threshold: --signature FILE",
-        "use --no-such-option of cdtool detect",
-    ],
-)
-def test_an_option_without_its_command_is_found(text):
-    assert len(unresolved(text, set())) == 1
 
 
 def test_every_section_and_key_that_a_message_names_is_documented():

@@ -6,8 +6,6 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 # The blocks in which a temporary file or folder is written, which `files` flushes and renames.
 BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
@@ -61,22 +59,6 @@ def texts_without_line_ends(tree: ast.AST) -> Iterator[int]:
             yield node.lineno
 
 
-@pytest.mark.parametrize(
-    ("code", "count"),
-    [
-        ('path.open("wb")', 1),
-        ('open(path, mode="a")', 1),
-        ('path.write_text("x")', 1),
-        ('with path.open("r+") as file:\n    pass', 1),
-        ('path.open("rb")', 0),
-        ("write_text(path, text)", 0),
-        ('with replaced(path) as (part,), part.open("wb") as file:\n    part.write_bytes(b"")', 0),
-    ],
-)
-def test_a_write_is_recognised(code, count):
-    assert len(list(writes(ast.parse(code)))) == count
-
-
 def test_files_are_written_only_by_the_module_for_it():
     """The writers of formats write to the name passed to them: the temporary file of a `replaced` block."""
     found = set()
@@ -85,23 +67,6 @@ def test_files_are_written_only_by_the_module_for_it():
         if name != "cdtool/base/files/writing.py" and not name.startswith("cdtool/formats/"):
             found |= {name for _ in writes(ast.parse(path.read_text(encoding="utf-8")))}
     assert found == set(ELSEWHERE)
-
-
-@pytest.mark.parametrize(
-    ("code", "count"),
-    [
-        ('path.write_text(text, encoding="utf-8")', 1),
-        ('path.open("a", encoding="utf-8")', 1),
-        ('path.write_text(text, encoding="utf-8", newline="\\n")', 0),
-        ('path.open("w", newline="")', 0),
-        ('path.open("wb")', 0),
-        ('path.open(encoding="utf-8")', 0),
-        ("write_text(path, text)", 0),
-        ('Path(os.devnull).open("w")', 0),
-    ],
-)
-def test_text_without_its_line_ends_is_recognised(code, count):
-    assert len(list(texts_without_line_ends(ast.parse(code)))) == count
 
 
 def test_a_text_file_has_the_same_bytes_on_every_system():

@@ -33,10 +33,6 @@ def asked(results: Results, number: int, folder: Path, monkeypatch: pytest.Monke
         return [dict(zip(names, row, strict=True)) for row in found.fetchall()]
 
 
-def test_the_page_has_these_queries():
-    assert len(QUERIES) == 5
-
-
 @pytest.mark.parametrize("number", range(5))
 def test_it_runs_on_results_of_the_sample_logs(number, tmp_path, monkeypatch):
     done = score(ROOT / "docs" / "examples" / "triggers.csv", ROOT / "sample_logs" / "gate" / "benchmark.toml")

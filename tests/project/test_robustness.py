@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -53,13 +52,6 @@ def test_one_cell_is_computed():
     assert 40.0 < learned.mean("stiff") < 80.0 < learned.mean("soft") < 200.0
 
 
-def test_results_survive_in_the_file(tmp_path):
-    cells = {"momentum": {"signature": FINE, "cusum": {"as learned": cell(3), "speed +20 %": cell(missed=10)}}}
-    machines = {"gate": script.Simulated(cells, 2, 20, 5), "arm": script.Simulated(cells, 2, 20, 5)}
-    script.write_results(tmp_path / script.RESULTS, machines)
-    assert script.read_results(tmp_path / script.RESULTS) == machines
-
-
 def test_the_files_select_the_thresholds():
     gate = 'machine = "machine.toml"\n\n[learn]\nlogs = ["free/*.csv"]\n'
     arm = f'{gate}\n[signature]\nsides = "one"\n'
@@ -94,41 +86,3 @@ def test_what_is_tolerated(changed, tolerated):
 def test_nothing_is_tolerated_by_what_alarms_as_learned():
     states = {**FINE, script.UNCHANGED: cell(20)}
     assert not any(script.tolerates(states, state) for state in script.STATES)
-
-
-def replace_all(states, stiff: float):
-    """Return cells with another latency."""
-    return {
-        state: replace(item, latency_sum={**item.latency_sum, "stiff": 10.0 * stiff}) for state, item in states.items()
-    }
-
-
-def test_the_conclusions_follow_from_the_cells():
-    cold = {**FINE, "friction +20 %": cell(40)}
-    blind = {**FINE, "speed +20 %": cell(assessable=0)}
-    cells = {
-        "momentum": {"signature": cold, script.FOLLOWING: replace_all(FINE, 22.0), script.RANGE: FINE},
-        "energy": {"signature": blind},
-    }
-    assert list(script.conclusions(cells)) == [
-        "Every change is tolerated by `momentum` with `signature, speed_range` (20/80 ms), "
-        "`momentum` with `signature, adaptive_level` (22/80 ms), the fastest first.",
-        "Every change but that of the speed is tolerated by 3 combinations; the fastest is `momentum` with "
-        "`signature, speed_range` (20/80 ms).",
-        "friction ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`, "
-        "by 1 of 1 with its `speed_range`.",
-        "speed ±10 %: tolerated by 2 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`, "
-        "by 1 of 1 with its `speed_range`.",
-        "speed ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`, "
-        "by 1 of 1 with its `speed_range`.",
-        "`adaptive_level` costs at most 10 % latency as learned (`momentum`, stiff).",
-        "`speed_range` costs at most 0 % latency as learned (`momentum`, stiff).",
-    ]
-
-
-def test_the_picture_says_what_is_tolerated():
-    blind = {**FINE, "speed +20 %": cell(4, assessable=20, not_assessable=20), "speed -20 %": cell(missed=4)}
-    kinds = [script._kind(blind, state) for state in ("as learned", "speed +20 %", "speed -20 %")]
-    assert kinds == [0, 2, 1]
-    assert script._in_words(blind, "speed +20 %") == ("20*", "n.a.")
-    assert script._in_words(blind, "speed -20 %") == ("0", "20/80 (4)")

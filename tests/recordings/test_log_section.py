@@ -57,13 +57,6 @@ def test_a_distance_is_reached_where_the_axis_first_has_travelled_it(unit, posit
     assert Mark(2.5, unit).time_in(recording) == np.inf
 
 
-def test_noise_of_the_position_adds_no_distance():
-    recording = stroke()
-    noisy = recording["position"].values + 1e-3 * np.random.default_rng(1).standard_normal((1001, 1))
-    channels = {"position": Series(recording["speed"].time, noisy, "m")}
-    assert Mark(1.0, "m").time_in(Recording("n", "", ("axis",), channels)) == pytest.approx(2.0, abs=0.04)
-
-
 def test_single_wrong_values_and_an_encoder_that_starts_again_are_no_distance():
     time = np.linspace(0.0, 6.0, 601)
     angle = 1.2 * time

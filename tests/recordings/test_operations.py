@@ -74,8 +74,3 @@ def test_the_leading_joint_is_the_one_that_moves_most():
 def test_an_unknown_way_to_cut_names_the_known_ones():
     with pytest.raises(UsageError, match="motion"):
         operations_of(recording(np.zeros(len(TIME))), "motions")
-
-
-def test_a_missing_trigger_channel_is_named():
-    with pytest.raises(RecordingError, match="trigger"):
-        operations_of(recording(np.zeros(len(TIME))), "trigger")

@@ -264,19 +264,6 @@ def test_min_and_max_of_the_machine_file_mask_and_are_a_loss(gate):
     assert [str(item) for item in losses] == ["torque: 2 values are outside the possible range, masked"]
 
 
-@pytest.mark.parametrize(
-    ("keys", "told"),
-    [("min = 5, max = 5", "channels.torque.min: is 5, max is 5"), ('max = "4"', "channels.torque.max: is '4'")],
-)
-def test_an_empty_range_is_refused(gate, keys, told):
-    machine = gate / "machine.toml"
-    machine.write_text(
-        machine.read_text().replace('unit = "A", scale = 0.56 }  #', f'unit = "A", scale = 0.56, {keys} }}  #')
-    )
-    done = cdtool("info", gate / "free" / "03.csv", "-m", machine)
-    assert done.status == 2 and told in done.err
-
-
 def test_a_fifth_of_the_runs_may_be_wrong_without_moving_the_range(runs):
     free, ranges = runs
     broken = [with_values(item, "torque", slice(None), 1e7) if i < 2 else item for i, item in enumerate(free)]

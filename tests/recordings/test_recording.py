@@ -18,7 +18,3 @@ def test_the_first_sample_of_any_channel_counts(origin, first, began):
         "torque": Series(np.array([first, first + 2.0]), np.zeros((2, 1)), "N"),
     }
     assert Recording("a.csv", "a.csv", ("gate",), channels, origin).began == began
-
-
-def test_a_recording_without_samples_began_at_no_time():
-    assert Recording("a.csv", "a.csv", ("gate",), {}).began is None

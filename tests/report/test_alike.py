@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cdtool.base.findings import Finding, remark
+from cdtool.base.findings import Finding
 from cdtool.report.alike import RecordingReason, alike, grouped_findings
 from cdtool.results.results import RecordingFinding, Skipped
 
@@ -21,32 +21,6 @@ def test_findings_of_one_kind_are_merged_whatever_their_numbers_are():
     (name, text), *others = grouped_findings(findings)
     assert name == "a" and text == f"{gaps(1, 'a').sentence}; 3 more like it (b, c, d)"
     assert others == [(item.channel, item.message) for item in findings[4:]]  # two are both shown
-
-
-def test_one_kind_of_finding_about_many_channels_is_one_line_with_a_count():
-    findings = [Finding("jitter", f"ch{i}", {"share": 0.01 * i, "period": 0.01}) for i in range(46)]
-    assert grouped_findings([*findings, Finding("stuck_channel", "ch1", {"joint": ""})]) == [
-        (
-            "ch0",
-            f"{Finding('jitter', '', {'share': 0.0, 'period': 0.01}).sentence}; 45 more like it (ch1, ch2, ch3, ...)",
-        ),
-        ("ch1", Finding("stuck_channel", "", {"joint": ""}).sentence),
-    ]
-    assert grouped_findings(findings[:3]) == [(item.channel, item.message) for item in findings[:3]]
-
-
-def test_columns_left_out_for_one_reason_are_listed_by_their_own_names():
-    texts = [Finding("column_left_out", "", {"column": name, "what": "of texts"}) for name in "abcde"]
-    empty = Finding("column_left_out", "", {"column": "f", "what": "empty"})
-    assert grouped_findings([*texts, empty]) == [
-        ("", "column 'a' is of texts: left out; 4 more like it (b, c, d, ...)"),
-        ("", empty.message),
-    ]
-
-
-def test_remarks_are_merged_only_where_they_say_the_same():
-    findings = [remark(text, "a") for text in ("one", "two", "three", "four")]
-    assert grouped_findings(findings) == [("a", item.message) for item in findings]
 
 
 def test_findings_of_recordings_are_merged_by_kind_and_channel():

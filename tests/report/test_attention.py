@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from cdtool.report.tables.attention import attention_table, failed_recordings, failed_traces
+from cdtool.report.tables.attention import attention_table, failed_recordings
 from cdtool.results.evaluated import evaluate
 from cdtool.results.limits import LimitRule
 from cdtool.results.results import FalseAlarmResult, ForceResult
@@ -52,14 +52,6 @@ def test_a_slow_contact_is_listed_only_if_it_violates_a_limit(results):
     assert table.rows[0][2].text == "momentum: contact 1 is detected after 90 ms (gm.stiff.p95_ms: at most 50)"
 
 
-def test_of_recordings_that_are_only_slow_the_slowest_is_the_worst(results):
-    late = {"a": 60.0, "b": 70.0, "c": 90.0, "d": 65.0}
-    rows = tuple(contact("momentum", "stiff", latency, name=name) for name, latency in late.items())
-    slow = replace(results, contacts=rows, false_alarms=(), recordings=())
-    limit = LimitRule("gm.stiff.max_ms", "momentum", "stiff", "max_ms", largest=50.0)
-    assert names_of(evaluate(slow, [limit]).results) == ["c", "b", "d", "a"]
-
-
 def test_detectors_have_short_names_and_a_miss_by_all_is_one_word(results):
     rows = [contact(name, "stiff", None, "missed", "a") for name in results.detectors]
     rows.append(contact("friction_ekf", "stiff", None, "missed", "b"))
@@ -71,14 +63,3 @@ def test_detectors_have_short_names_and_a_miss_by_all_is_one_word(results):
 def test_changed_conditions_need_no_attention_by_themselves(results):
     rows = (contact("momentum", "winter/stiff", None, "missed", "a"),)
     assert names_of(replace(results, contacts=rows, false_alarms=(), recordings=())) == []
-
-
-def test_only_the_operations_that_failed_of_a_log_are_shown(results):
-    from tests.report.html.html_case import free_trace
-
-    bad = free_trace(str, "holdout")
-    good = replace(bad, panels=tuple(replace(panel, false_alarms=()) for panel in bad.panels))
-    numbers = {("holdout", "free.csv"): [0, 1]}
-    assert failed_traces([("holdout", "free.csv")], [good, bad], numbers) == [1]
-    assert failed_traces([("holdout", "free.csv")], [good, good], numbers) == [0, 1], "its force, for example"
-    assert failed_traces([("holdout", "other.csv")], [good, bad], numbers) == []

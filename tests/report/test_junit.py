@@ -13,7 +13,6 @@ from cdtool.report.writers.junit import to_junit
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.limits import LimitRule, not_met
 from cdtool.results.results import LimitResult, RecordingFinding, Results, Skipped
-from tests.report.bench import contact, contacts_of
 from tests.report.hostile import HOSTILE
 from tests.report.named_results import named
 
@@ -93,11 +92,6 @@ def test_what_could_not_be_assessed_is_skipped_with_the_reason(evaluated):
     assert silent is not None and silent.get("message") == "not assessable: the detector gave no result"
 
 
-def test_a_recording_that_was_left_out_is_an_error(evaluated):
-    error = case(read(evaluated), "left out", "broken.csv").find("error")
-    assert error is not None and error.get("message") == "broken.csv: empty file"
-
-
 def test_a_limit_is_a_case_and_what_violates_it_fails_with_it(results):
     root = read(evaluate(results, [rule("missed", 0), rule("mean_ms", 80), rule("false_alarms", 0, group="holdout")]))
     suite = root[1]
@@ -154,17 +148,6 @@ def test_what_is_lost_of_a_recording_is_an_error_and_a_warning_is_none(results):
     assert not [item for item in root.iter("testcase") if item.get("name") == "b.csv"]
 
 
-def test_several_contacts_of_a_recording_are_one_case(results):
-    second = replace(contact("momentum", "stiff", None, "not_assessable", "stiff/01.csv"), contact=2, reason="a gap")
-    contacts = (*contacts_of("momentum", "stiff", [30.0]), second)
-    words = case(read(evaluate(replace(results, contacts=contacts))), "momentum.stiff", "stiff/01.csv")
-    assert words.find("skipped") is None
-    assert (words.findtext("system-out") or "").splitlines() == [
-        "contact 1 at 5.000 s: detected after 30.0 ms, peak 3600 N",
-        "contact 2 at 5.000 s: not assessable, peak 3600 N (a gap)",
-    ]
-
-
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_are_text_in_a_file_that_parses(results, kind):
     name = HOSTILE[kind]
@@ -182,7 +165,3 @@ def test_no_name_is_an_attachment(results):
     shown = [item.text or "" for item in ElementTree.fromstring(text).iter() if item.tag != "testsuites"]
     assert any("ATTACHMENT" in item for item in shown)
     assert not any("[[" in item for item in shown)
-
-
-def test_the_same_results_give_the_same_text(results):
-    assert to_junit(Report(evaluate(results))) == to_junit(Report(evaluate(replace(results))))

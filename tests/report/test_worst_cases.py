@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,11 +11,9 @@ import pytest
 
 from cdtool.report import cases, many
 from cdtool.report.cases import suites_of
-from cdtool.report.html import plots
 from cdtool.report.html.page import to_html
 from cdtool.report.html.plots import CLASSES, MOST_STEPS, plot_data
 from cdtool.report.many import is_many
-from cdtool.report.markdown.report import to_markdown
 from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
 from cdtool.results.evaluated import evaluate
@@ -88,31 +84,6 @@ def test_the_slowest_of_each_detector_and_group_are_listed_slowest_first(report,
     assert [float(row["latency [ms]"]) for row in slowest] == pytest.approx(sorted(latencies)[:-101:-1], rel=0.01)
 
 
-def test_those_with_a_trace_come_first_and_the_others_by_force(report, rows):
-    missed = [row for row in listed(rows, "missed") if (row["group"], row["detector"]) == ("stiff", "momentum")]
-    traced = {trace.recording for trace in report.traces}
-    has_trace = [row["recording"] in traced for row in missed]
-    assert True in has_trace and has_trace == sorted(has_trace, reverse=True)
-    peaks = [float(row["peak force [N]"]) for row, is_traced in zip(missed, has_trace, strict=True) if not is_traced]
-    assert peaks == sorted(peaks, reverse=True)
-
-
-def test_the_note_counts_all_of_each_kind(report):
-    results = report.evaluated.results
-    missed = sum(item.outcome == "missed" for item in results.contacts)
-    note = report.model.notes["cases"]
-    assert re.search(rf"\d+ of {missed} missed", note) and f"of {len(results.false_alarms)} false alarms" in note
-
-
-def test_a_recording_with_a_trace_but_without_a_case_is_an_example(report):
-    names = [item for item in report.evaluated.results.recordings if item.group == "holdout"]
-    quiet = next(item.recording for item in reversed(names) if item.recording not in {
-        alarm.recording for alarm in report.evaluated.results.false_alarms})  # fmt: skip
-    trace = replace(report.traces[0], recording=quiet, group="holdout")
-    table = replace(report, traces=(*report.traces, trace)).model.tables["cases"]
-    assert [cell.text for cell in table.rows[-1]][:4] == [quiet, "holdout", "–", "no contact, no alarm"]
-
-
 def test_the_page_is_small_and_has_histograms_instead_of_marks(report):
     text = to_html(report)
     assert len(text.encode()) < 4e6 and 'data-table="cases-table"' in text
@@ -128,39 +99,6 @@ def test_the_page_is_small_and_has_histograms_instead_of_marks(report):
             assert sum(row["numbers"]) == item.detected > 200
     for panel in data["survival"]:
         assert all(len(row["times"]) <= MOST_STEPS for row in panel["rows"])
-
-
-def test_a_curve_of_many_steps_has_fewer_with_the_same_ends(report, monkeypatch):
-    whole = plot_data(report)["survival"][0]["rows"][0]
-    monkeypatch.setattr(plots, "MOST_STEPS", 20)
-    fewer = plot_data(report)["survival"][0]["rows"][0]
-    assert len(whole["times"]) > 200 and len(fewer["times"]) == 20
-    for key in ("times", "share", "low", "high"):
-        assert (fewer[key][0], fewer[key][-1]) == (whole[key][0], whole[key][-1])
-    assert set(zip(fewer["times"], fewer["share"], strict=True)) <= set(
-        zip(whole["times"], whole["share"], strict=True)
-    )
-
-
-def test_of_many_groups_those_that_miss_the_most_are_plotted(report, monkeypatch):
-    monkeypatch.setattr(many, "MOST_GROUPS", 1)
-    shares = {group: max(item.missed_share.value for item in report.evaluated.summaries if item.group == group)
-              for group in ("stiff", "soft")}  # fmt: skip
-    worst = max(shares, key=lambda group: shares[group])
-    data = plot_data(report)
-    for kind in ("latency", "survival", "amoc"):
-        assert [panel["group"] for panel in data[kind]] == [worst]
-    text = to_html(Report(report.evaluated, report.traces))
-    assert "Plotted are the 1 of 2 groups with the largest share of missed contacts." in text
-    assert all(group in [cell.text for cell in report.model.tables["results"].cells("group")] for group in shares)
-
-
-def test_a_pull_request_states_how_many_rows_there_are(report):
-    text = to_markdown(report)
-    missed = sum(item.outcome == "missed" for item in report.evaluated.results.contacts)
-    assert len(text) <= 60_000
-    assert f"Contacts missed ({missed})" in text and f"Recordings scored ({COUNT})" in text
-    assert re.search(rf"Cut here: \d+ of {COUNT} rows; all of them are in results.json", text)
 
 
 def test_a_suite_of_many_recordings_lists_what_failed_and_counts_the_others():
@@ -186,12 +124,3 @@ def test_more_failures_than_are_listed_are_one_failure(report):
     (suite,) = [suite for suite in suites_of(made) if suite.name == "momentum.stiff"]
     assert {item.kind for item in suite.cases} == {"failure"} and len(suite.cases) == cases.MOST_OF_KIND + 1
     assert suite.cases[-1].name == f"{COUNT // 3 - cases.MOST_OF_KIND} more that fail"
-
-
-def test_names_in_the_data_of_the_page_are_texts(report):
-    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', to_html(report), re.DOTALL)
-    assert data is not None
-    tables = {table["name"]: table for table in json.loads(data[1])["tables"]}
-    columns = {column["heading"]: column for column in tables["cases-table"]["columns"]}
-    assert {"group", "detector", "outcome"} == {name for name, column in columns.items() if column["choice"]}
-    assert tables["cases-table"]["opens"] and "missed by every detector" in tables["cases-table"]["marks"]

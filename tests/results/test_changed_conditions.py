@@ -9,7 +9,6 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.settings import Place
-from cdtool.commands.compare.comparison import compare_builds
 from cdtool.report.markdown.report import to_markdown
 from cdtool.report.model import report_model
 from cdtool.report.writers.base import Report
@@ -139,13 +138,6 @@ def test_every_report_has_them():
     suite = to_junit(Report(done)).partition('<testsuite name="changed conditions" tests="4" failures="0"')[2]
     assert "stiff [ms]: 25.5 (" in suite and "missed: 2 of 2, unchanged 1 of 3" in suite
     assert "conditions" not in report_model(evaluate(UNCHANGED)).tables
-
-
-def test_builds_are_compared_under_conditions_too():
-    slower = replace(BOTH, contacts=[row for row in BOTH.contacts if row.group != "winter/stiff"])
-    found = compare_builds(BOTH, BOTH)
-    assert ("momentum", "winter/stiff") in {(row.detector, row.group) for row in found.rows}
-    assert "group worn/holdout" in compare_builds(BOTH, replace(slower, conditions=WINTER[:2])).only_old
 
 
 def test_results_files_carry_them_and_those_without_are_read(tmp_path):

@@ -10,9 +10,6 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.settings import Place
-from cdtool.report.markdown.report import to_markdown
-from cdtool.report.writers.base import Report
-from cdtool.report.writers.junit import to_junit
 from cdtool.results.evaluated import evaluate
 from cdtool.results.files.results_file import read_results, to_json
 from cdtool.results.limits import Bounds, limit_rules
@@ -55,12 +52,6 @@ def limits(text: str, known: tuple[str, ...] = KINDS):
     return found
 
 
-def test_a_limit_may_name_a_kind_and_a_star_does_not():
-    rules = limits('"gm.stiff/hard.max_ms" = { max = 30 }\n"gm.*.max_ms" = { max = 50 }\n')
-    found = evaluate(THREE, rules).results.limits
-    assert [(item.group, item.outcome) for item in found] == [("stiff/hard", "violated"), ("stiff", "met")]
-
-
 def test_a_limit_on_a_kind_without_a_scored_contact_does_not_pass(tmp_path):
     known = (*KINDS, "stiff/head")
     done = evaluate(THREE, limits('"*.stiff/head.missed" = { max = 0 }\n', known)).results
@@ -81,13 +72,3 @@ def test_a_limit_on_a_kind_without_a_scored_contact_does_not_pass(tmp_path):
 def test_a_wrong_limit_on_a_kind_names_its_key(text, said):
     with pytest.raises(ConfigurationError, match=said):
         limits(text)
-
-
-def test_every_report_shows_each_kind():
-    report = Report(evaluate(THREE), ())
-    markdown, junit = to_markdown(report), to_junit(report)
-    for group in KINDS:
-        assert group.replace("(", r"\(").replace(")", r"\)") in markdown or group in markdown
-        assert f'name="momentum.{group}"' in junit
-    assert "contact 1 (hard) at" in junit
-    assert [row[1].text for row in report.model.tables["kinds"].rows][::2] == list(KINDS)

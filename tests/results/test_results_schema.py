@@ -116,14 +116,3 @@ def test_a_wrong_value_does_not_follow_it(wrong, value):
     values = copy.deepcopy(values_of(FULL))
     change(wrong, value)(values)
     assert faults(values)
-
-
-@pytest.mark.parametrize("part", ["contacts", "forces", "limits", "schema_version"])
-def test_a_missing_part_is_an_error(part):
-    values = values_of(FULL)
-    del values[part]
-    assert [part in fault for fault in faults(values)] == [True]
-    if part != "schema_version":
-        again = values_of(FULL)
-        del again[part][0]["group"]
-        assert len(faults(again)) == 1

@@ -54,11 +54,6 @@ def test_the_ends_of_waits_and_contacts_count_as_in_the_activation(met, starts, 
     assert swept.false_alarms.tolist() == [count]
 
 
-def test_no_factors_are_no_rows():
-    swept = sweep(detection(0), [Contact(3.0, 3.2, 0.005)], Activation(), 1.0, np.empty(0))
-    assert swept.false_alarms.shape == (0,) and swept.latency.shape == (0, 1)
-
-
 def test_detections_of_one_operation_are_swept_each_with_its_own_clock_and_factors():
     made = [detection(seed) for seed in range(3)]
     slow = made[1].statistic.part(slice(0, None, 3))

@@ -21,14 +21,6 @@ def test_clusters_put_together_hold_the_same_values_each_cluster_as_a_whole():
     assert {len(places) for places in of_cluster} == {1}
 
 
-def test_few_clusters_stay_and_the_same_seed_gives_the_same():
-    groups = clusters_of([1.0, 2.0, 3.0], "abc")
-    assert groups.merged(3, 0) is groups
-    many = clusters_of(np.arange(100.0), range(100))
-    assert np.array_equal(many.merged(10, 1).values, many.merged(10, 1).values)
-    assert not np.array_equal(many.merged(10, 1).values, many.merged(10, 2).values)
-
-
 def test_a_difference_of_many_recordings_is_shown_and_none_is_not(monkeypatch):
     monkeypatch.setattr("cdtool.statistics.paired.MOST_CLUSTERS", 100)
     monkeypatch.setattr(clusters, "MOST_CLUSTERS", 100)

@@ -93,20 +93,10 @@ def test_where_r_has_no_lower_limit_since_all_are_detected_it_is_the_last_detect
     assert bounds(latency_quantile(TIED, TIED_CENSORED, 0.95)) == (80, 80, INF)
 
 
-def test_a_detection_comes_before_a_miss_at_the_same_time():
-    curve = survival([10.0, 10.0], [False, True])
-    assert curve.share.tolist() == [1.0, 0.5]
-
-
 def test_without_observation_nothing_is_known():
     quantile = latency_quantile([], [], 0.5)
     assert not quantile.known and math.isnan(quantile.low) and math.isnan(quantile.high)
     assert survival([], []).share.tolist() == [1.0]
-
-
-def test_one_contact_gives_a_value_and_an_open_interval():
-    quantile = latency_quantile([37.0], [False], 0.5)
-    assert quantile.known and bounds(quantile) == (37.0, 0.0, INF)
 
 
 def test_one_missed_contact_proves_nothing_and_six_prove_that_the_median_is_not_reached():
@@ -114,12 +104,6 @@ def test_one_missed_contact_proves_nothing_and_six_prove_that_the_median_is_not_
     assert bounds(latency_quantile([1000.0], [True], 0.5)) == (INF, 0.0, INF)
     assert bounds(latency_quantile([1000.0] * 5, [True] * 5, 0.5)) == (INF, 0.0, INF)
     assert bounds(latency_quantile([1000.0] * 6, [True] * 6, 0.5)) == (INF, INF, INF)
-
-
-def test_equal_latencies_hold_the_median_from_six_on_and_their_p95_from_below():
-    assert bounds(latency_quantile([40.0] * 5, [False] * 5, 0.5)) == (40.0, 0.0, INF)
-    assert bounds(latency_quantile([40.0] * 6, [False] * 6, 0.5)) == (40.0, 40.0, 40.0)
-    assert bounds(latency_quantile([40.0] * 30, [False] * 30, 0.95)) == (40.0, 40.0, INF)
 
 
 @pytest.mark.parametrize(("share", "first"), [(0.5, 7), (0.9, 46), (0.95, 98)])
@@ -136,19 +120,6 @@ def test_the_band_of_a_step_plot_has_no_holes():
     assert curve.low[0] == pytest.approx(0.83890238478092)
     assert (curve.share[-1], curve.low[-1], curve.high[-1]) == (0.0, 0.0, curve.high[-2])
     assert np.all((curve.low <= curve.share) & (curve.share <= curve.high))
-
-
-@given(st.lists(st.integers(0, 50), min_size=1, max_size=40))
-def test_the_median_of_what_was_all_detected_is_the_usual_one(latency):
-    assert latency_quantile(latency, [False] * len(latency), 0.5).value == np.median(latency)
-
-
-@given(LATENCIES, st.randoms(use_true_random=False), st.sampled_from([0.1, 0.5, 0.95]))
-def test_neither_order_nor_unit_of_time_matters(pairs, random, share):
-    quantile = bounds(latency_quantile(*columns(pairs), share))
-    random.shuffle(pairs)
-    latency, missed = columns(pairs)
-    assert bounds(latency_quantile(8.0 * latency, missed, share)) == tuple(8.0 * figure for figure in quantile)
 
 
 @given(LATENCIES, st.sampled_from([0.1, 0.25, 0.5, 0.75, 0.9, 0.95]))

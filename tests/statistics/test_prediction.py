@@ -44,14 +44,6 @@ def test_the_limit_is_the_inverse_of_the_chance(values, chance):
         assert prediction.chance_above(prediction.limit_for(chance)) == pytest.approx(chance, rel=1e-3)
 
 
-@settings(max_examples=30, deadline=None)
-@given(st.integers(3, 60), st.floats(-3.0, 12.0), st.floats(-3.0, 12.0))
-def test_a_higher_limit_is_exceeded_no_more_often(n, one, other):
-    prediction = Prediction(n, 2.0, 1.0)
-    low, high = sorted((one, other))
-    assert prediction.chance_above(high) <= prediction.chance_above(low)
-
-
 def test_more_runs_of_the_same_kind_make_the_prediction_more_certain():
     chances = [Prediction(n, 2.5, 0.6).chance_above(5.0) for n in (5, 10, 20, 40, 100, MOST_RUNS)]
     assert chances == sorted(chances, reverse=True)

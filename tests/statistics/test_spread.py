@@ -71,11 +71,6 @@ def test_the_value_is_the_mean_and_a_bound_is_missing_only_below_ten_recordings(
     assert not found.low > found.high
 
 
-def test_equal_values_give_an_interval_of_no_width():
-    interval = mean_interval([0.1] * 17, range(17))
-    assert (interval.value, interval.low, interval.high) == (0.1, 0.1, 0.1)
-
-
 @pytest.mark.parametrize(
     ("values", "clusters", "level", "said"),
     [

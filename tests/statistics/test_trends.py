@@ -57,11 +57,6 @@ def test_steady_values_show_something_in_at_most_one_season_of_a_hundred():
     assert change_over_runs(noise(0)).change == 0.0
 
 
-def test_with_many_comparisons_it_takes_more_to_be_shown():
-    values = noise(3) + 0.08 * RUNS
-    assert change_over_runs(values).kind == "drift" and change_over_runs(values, 10_000_000).kind == "steady"
-
-
 def test_equal_values_and_few_runs_are_steady():
     still = change_over_runs(np.full(20, 2.0))
     assert still.kind == "steady" and still.trend.p == 1.0 and still.trend.slope.value == 0.0
@@ -78,12 +73,3 @@ def test_equal_values_and_few_runs_are_steady():
 def test_the_quick_check_agrees_with_the_full_test(values, slope, comparisons):
     given_values = np.array(values) + slope * np.arange(len(values))
     assert may_change(given_values, comparisons) == (change_over_runs(given_values, comparisons).kind != "steady")
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 10_000), st.floats(-0.2, 0.2), st.floats(-9.0, 9.0))
-def test_mirrored_values_have_the_mirrored_trend(seed, slope, shift):
-    values = noise(seed, 20) + slope * np.arange(20)
-    one, other = change_over_runs(values + shift), change_over_runs(-values)
-    assert one.kind == other.kind
-    assert one.trend.slope.value == pytest.approx(-other.trend.slope.value, abs=1e-9)

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.detectors.detection import WHOLE_MACHINE, Signal, Status
@@ -88,37 +86,6 @@ def test_joints_have_their_own_motion_and_a_signal_of_the_whole_machine_that_of_
     _, whole = run_of(speed, values[:, 0], joints=("one", "two"), names=WHOLE_MACHINE)
     statistic, _ = FittedBaseline(1.0, 8.0).evaluate(run[0], whole)
     assert first_valid(statistic.status[:, 0]) < 110
-
-
-def test_missing_samples_of_speed_or_signal_only_delay_it():
-    rng = np.random.default_rng(6)
-    values, status = rng.standard_normal(600), np.zeros((600, 1), dtype=np.uint8)
-    status[40:60] = Status.GAP
-    values[40:60] = np.nan
-    speed = np.full(600, 0.5)
-    speed[80:200] = np.nan
-    found, _, _ = evaluated(speed, values, status=status)
-    assert np.all(found[40:60] == Status.GAP) and 220 < first_valid(found) < 260
-    values[300] = np.nan  # without a status
-    assert evaluated(speed, values, status=status)[0][300] == Status.GAP
-
-
-def test_the_time_counts_not_the_number_of_samples_on_an_irregular_clock():
-    rng = np.random.default_rng(7)
-    time = np.cumsum(rng.uniform(1 / 60, 1 / 30, 300))
-    status, _, _ = evaluated(np.full(300, 0.3), rng.standard_normal(300), time=time, warm_up=2.0)
-    assert 2.0 < time[first_valid(status)] - time[0] < 2.3
-
-
-@given(st.integers(50, 400), st.integers(0, 2**32 - 1))
-def test_a_later_sample_never_changes_the_limits(cut, seed):
-    rng = np.random.default_rng(seed)
-    speed = np.where(np.arange(400) < rng.integers(0, 300), 0.01, 0.6) + 0.01 * rng.standard_normal(400)
-    values = np.where(rng.random(400) < 0.05, np.nan, rng.standard_normal(400))
-    whole = evaluated(speed, values, warm_up=0.5)
-    part = evaluated(speed[:cut], values[:cut], warm_up=0.5)
-    for ours, theirs in zip(part, whole, strict=True):
-        np.testing.assert_array_equal(ours, theirs[:cut])
 
 
 def test_one_side_is_that_on_which_an_obstacle_opposes_the_present_motion():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from cdtool.base.errors import NothingValidError, UsageError
+from cdtool.base.errors import NothingValidError
 from cdtool.detectors.detection import Status
 from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.whitening import burg
@@ -143,18 +143,6 @@ def test_the_change_from_time_to_position_is_no_innovation():
     assert np.max(np.abs(statistic.values[statistic.valid])) < 20.0
 
 
-def test_another_rate_is_not_assessable(fitted):
-    time = TIME[::2]
-    statistic, _ = fitted.evaluate(stroke(time=time), signal(np.full(len(time), 100.0), time))
-    assert not statistic.valid[30:].any() and (statistic.status == Status.OTHER_RATE).any()
-    assert "other sample rate" in statistic.why_not()
-
-
 def test_a_signal_that_does_not_vary_is_refused():
     with pytest.raises(NothingValidError, match="variation"):
         Innovation().fit([(stroke(), signal(np.full(N, 3.0)))] * 12)
-
-
-def test_an_order_without_meaning_is_refused():
-    with pytest.raises(UsageError, match="order"):
-        Innovation(order=0)

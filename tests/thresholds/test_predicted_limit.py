@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.base.errors import UsageError
 from cdtool.detectors.detection import Status
 from cdtool.thresholds.predicted_limit import PredictedLimit
 from tests.thresholds.strokes import TIME, N, jittering_clock, noise_runs, signal
@@ -82,11 +81,3 @@ def test_limits_are_learned_on_the_prediction_and_not_on_the_signal():
     narrow = PredictedLimit(order=1, forgetting=0.95, ahead=0.0).fit(pairs)
     ratio = (wide.limit.greatest[0] - 100.0) / (narrow.limit.greatest[0] - 100.0)
     assert ratio == pytest.approx(3.39 / 0.25, rel=0.15)
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"order": 3}, {"forgetting": 1.0}, {"forgetting": 0.1}, {"ahead": -1.0}, {"safety_factor": 0.0}]
-)
-def test_settings_without_meaning_are_refused(wrong):
-    with pytest.raises(UsageError):
-        PredictedLimit(**wrong)

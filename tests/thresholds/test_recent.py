@@ -26,14 +26,6 @@ def test_another_key_other_runs_or_another_order_are_learned_again():
     assert [recent.value(key, items, learn) for key, items in asked] == [0, 1, 2, 3, 4, 0]
 
 
-def test_runs_that_are_gone_are_not_mistaken_for_new_ones_with_their_identity():
-    recent = Recent(1000)
-    for number in range(200):
-        runs = signals(1)
-        assert recent.value("a", runs, lambda: number) == number  # noqa: B023  called at once
-        del runs
-
-
 def test_no_run_is_kept():
     recent, runs = Recent(2), signals(1)
     weak = ref(runs[0])

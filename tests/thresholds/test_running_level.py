@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import UsageError
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
@@ -83,15 +82,6 @@ def test_limits_are_those_of_the_rule(still, following, seed, offset, contact, a
     np.testing.assert_allclose(found[1], upper, rtol=1e-9, atol=1e-9)
 
 
-def test_without_it_every_bit_stays(still, following):
-    values = 103.0 + np.random.default_rng(1).normal(size=N)
-    off = replace(following, adaptive_level=0.0)
-    assert np.array_equal(band_of(off, values)[1], band_of(still, values)[1], equal_nan=True)
-    assert FittedSignature.from_dict(following.to_dict()).adaptive_level == REACH
-    older = {key: value for key, value in following.to_dict().items() if key != "adaptive_level"}
-    assert FittedSignature.from_dict(older).adaptive_level == 0.0
-
-
 @pytest.mark.parametrize("offset", [-4.0, 4.0])
 def test_the_band_is_where_the_run_is_after_the_start(still, following, offset):
     values = np.full(N, 100.0 + offset)
@@ -130,28 +120,11 @@ def test_a_weak_contact_is_not_followed_before_it_is_as_old_as_the_guard(still, 
     assert limit[3900] > limit[2790] + 0.5
 
 
-def test_limits_do_not_depend_on_later_samples(following):
-    rng = np.random.default_rng(3)
-    values = 103.0 + rng.normal(size=N)
-    whole = band_of(following, values)
-    for end in (700, 1500, 3100):
-        changed = values.copy()
-        changed[end:] = 1e3 * rng.normal(size=N - end)
-        for limit, other in zip(whole, band_of(following, changed), strict=True):
-            np.testing.assert_array_equal(limit[:end], other[:end])
-
-
 def test_the_factor_that_a_sample_meets_does_not_depend_on_the_factor_that_is_set(following):
     values = 102.0 + np.random.default_rng(4).normal(size=N)
     _, met = exceedance(following, stroke(), signal(values))
     _, other = exceedance(following.with_safety_factor(2.0), stroke(), signal(values))
     np.testing.assert_allclose(other[np.isfinite(other)], met[np.isfinite(met)], rtol=1e-9)
-
-
-@pytest.mark.parametrize("reach", [-1.0, np.inf, np.nan])
-def test_a_reach_below_zero_or_without_end_is_refused(reach):
-    with pytest.raises(UsageError, match="adaptive_level is"):
-        Signature(adaptive_level=reach)
 
 
 @pytest.mark.parametrize("detector", [Momentum(), FrictionEkf()])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.base.errors import SignatureError, UsageError
+from cdtool.base.errors import SignatureError
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.recording import Recording, Series
@@ -114,21 +114,6 @@ def test_the_thesis_rule_is_the_mean_plus_one_standard_deviation_point_by_point(
     passed = np.flatnonzero(travel >= fitted.by_position.grid[point])[0]
     values = [s.values[passed, 0] for _, s in pairs]
     assert upper[point, 0] == pytest.approx(np.mean(values) + np.std(values, ddof=1), rel=1e-6)
-
-
-def test_an_unknown_setting_is_refused_with_what_is_known():
-    for wrong in ({"rule": "best"}, {"sides": "three"}, {"alignment": "phase"}):
-        with pytest.raises(UsageError, match="known"):
-            Signature(**wrong)
-
-
-def test_a_part_without_valid_samples_has_no_limit():
-    pairs = runs(12)
-    for _, s in pairs:
-        s.status[2000:2600] = Status.GAP
-    statistic, _ = Signature(alignment="time").fit(pairs).evaluate(stroke(), signal(np.zeros(N)))
-    assert (statistic.status[2030:2570] == Status.NO_LIMIT).all()
-    assert statistic.valid[2700:3900].all()
 
 
 @settings(max_examples=30, deadline=None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -98,12 +97,3 @@ def test_of_a_real_arm_a_force_made_from_a_motor_current_is_named(joint):
     assert found[0].start == pytest.approx(3.3, abs=0.3)  # first push according to the observer: 3.4 s
     name, r = follows_torque(recording, found)
     assert (name, r) == ("abcdef"[joint], pytest.approx(1.0, abs=0.02))
-
-
-def test_a_single_sample_causes_neither_a_doubt_nor_a_warning():
-    one = np.zeros((1, 1))
-    channels = {"torque": Series(np.zeros(1), one, "N m"), "force": Series(np.zeros(1), one, "N")}
-    recording = Recording("one", "made up", ("axis",), channels)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert np.isnan(follows_torque(recording, [])[1])

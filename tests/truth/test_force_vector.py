@@ -120,20 +120,9 @@ def test_an_axis_at_its_stop_is_seen_although_the_magnitude_changes():
     assert curves[1].time[curves[1].clipped].min() == pytest.approx(0.09, abs=0.03)
 
 
-def test_a_single_load_cell_is_left_as_it_is():
-    single = recording(clock(), np.zeros((8000, 1)))
-    assert with_scalar_force(single, GATE) is single
-
-
 def test_a_vector_is_never_mistaken_for_its_first_axis():
     with pytest.raises(RecordingError, match="3 axes"):
         cell_samples(Series(np.arange(4.0), np.zeros((4, 3)), "N"))
-
-
-def test_no_detector_sees_the_magnitude():
-    time = clock()
-    reduced = with_scalar_force(recording(time, REST + np.outer(pulse(time, 3.0), OBLIQUE)), GATE)
-    assert "force" not in reduced.without_ground_truth()
 
 
 def test_a_vector_without_any_complete_sample_has_no_contact():

@@ -148,23 +148,6 @@ def test_two_packages_with_one_name_are_both_named(install):
     assert done.status == 2 and "the packages one and two both provide a detector 'odd'" in done.err
 
 
-def test_a_short_name_of_two_plugins_is_refused_and_their_full_names_work(install):
-    install(DETECTOR, package="one")
-    install(DETECTOR.replace('"odd"', '"even"'), "even", package="two")
-    done = detect("od")
-    assert done.status == 2 and "the short name 'od' belongs to even and odd (give the full name)" in done.err
-    assert detect("odd").status == detect("even").status == 0
-
-
-def test_a_threshold_without_a_safety_factor_is_refused(install):
-    install(
-        "class Plugin:\n    name = 'odd'\n    needs = ()\n    fitted = ()\n    def fit(self, pairs): ...\n",
-        group="thresholds",
-    )
-    done = cdtool("list", "thresholds")
-    assert done.status == 3 and "'odd' of package 'odd-things' has no attribute 'safety_factor'" in done.err
-
-
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import re
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 
 import cdtool
 from cdtool.alarms.activation import Activation
-from cdtool.base.errors import ConfigurationError, SignatureError
+from cdtool.base.errors import SignatureError
 from cdtool.commands.detecting.prepared import prepared
 from cdtool.formats.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
@@ -78,15 +77,6 @@ def test_a_benchmark_scores_every_operation_of_a_long_log(folder):
     assert results.contacts[0].force_at_alarm_n > 10.0
 
 
-def test_the_plain_limit_works_in_a_benchmark(folder):
-    text = BENCHMARK.replace('operations = "motion"', 'operations = "motion"\nthreshold = "limit"')
-    (folder / "limit.toml").write_text(text)
-    results = cdtool.benchmark(folder / "limit.toml").results
-    outcomes = {row.detector: row.outcome for row in results.contacts}
-    assert outcomes["momentum"] == "detected"
-    assert results.provenance["threshold"] == "limit"
-
-
 def test_labels_are_the_ground_truth_without_a_load_cell(folder):
     text = "\n".join(line for line in MACHINE.splitlines() if not line.startswith("force"))
     (folder / "labels.toml").write_text(text)
@@ -94,16 +84,6 @@ def test_labels_are_the_ground_truth_without_a_load_cell(folder):
     results = cdtool.benchmark(folder / "label_benchmark.toml").results
     assert [row.outcome for row in results.contacts] == ["detected"] * 6
     assert all(row.peak_force_n is None and row.force_at_alarm_n is None for row in results.contacts)
-
-
-def test_a_trigger_channel_cuts_too_and_a_wrong_way_to_cut_is_refused(folder):
-    text = MACHINE + 'trigger = { column = "hit" }\n'
-    (folder / "trigger.toml").write_text(text.replace('label = { column = "hit", scale = 1 }\n', ""))
-    cut = {"threshold.limits": 70, "operations": "trigger"}
-    found = cdtool.detect(folder / "hits.csv", folder / "trigger.toml", detector="pt", settings=cut)
-    assert [detection.verdict.outcome for detection in found.detections] == ["alarm"] * 3
-    with pytest.raises(ConfigurationError, match="motion"):
-        cdtool.detect(folder / "hits.csv", folder / "machine.toml", settings=cut | {"operations": "strokes"})
 
 
 def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_path):
@@ -181,14 +161,6 @@ def test_an_unassessable_contact_has_a_reason(folder, tmp_path):
     row = cdtool.benchmark(folder / "lost.toml").results.contacts[0]
     assert (row.detector, row.outcome) == ("momentum", "not_assessable")
     assert "missing samples" in row.reason
-
-
-@pytest.mark.parametrize(("call", "first"), [(cdtool.detect, "logs"), (cdtool.explain, "log")])
-def test_detect_and_explain_accept_the_same_keywords(call, first):
-    log, *given = inspect.signature(call).parameters
-    assert log == first and given == ["machine", "benchmark", "signature", "detector", "settings"]
-    with pytest.raises(TypeError, match="'limits'"):
-        call("a.csv", "machine.toml", limits=[1.0])
 
 
 def test_false_alarms_are_counted_by_operation_and_named_by_the_log(folder):

@@ -164,13 +164,6 @@ def test_the_examples_in_its_docstrings_run(site):
     assert done.stdout.count("Test passed.") == 2
 
 
-def test_the_contract_tests_run_over_the_plugins(site):
-    chosen = ("-q", "-p", "no:cacheprovider", "-k", CONTRACTS, "tests/contracts")
-    done = python("-m", "pytest", *chosen, site=site)
-    assert done.returncode == 0, done.stdout[-3000:]
-    assert int(done.stdout.rpartition(" passed")[0].split()[-1]) > 30
-
-
 def test_the_page_shows_the_entry_points_of_the_package_and_its_commands_run(command, tmp_path):
     page = (ROOT / "docs" / "own-detector.md").read_text(encoding="utf-8")
     example = ROOT / "tests" / "plugin_example"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
-from cdtool.base.errors import ConfigurationError, NothingValidError, UsageError
+from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.detectors import DETECTORS
 from tests.command import cdtool
@@ -47,12 +47,6 @@ def test_a_detector_without_assessable_samples_does_not_stop_the_others(forearm)
     assert not results.skipped
     seen = [item.outcome for item in results.contacts if item.detector == "inertial_momentum"]
     assert seen == ["detected"] * 3
-
-
-def test_learning_a_signature_without_assessable_samples_is_a_clear_error(forearm):
-    free = sorted((forearm / "free").iterdir())
-    with pytest.raises(NothingValidError, match="not applicable 100 %"):
-        api.learn_signature(free, forearm / "machine.toml", "feekf", settings={"joints": ("forearm",)})
 
 
 def test_a_signature_monitors_the_joints_it_was_learned_for(forearm, tmp_path):
@@ -104,19 +98,6 @@ def test_an_energy_signal_belongs_to_the_whole_machine(forearm):
     assert found.joints == ("whole machine",)
     done = cdtool("detect", log, "-m", machine, "-d", "energy", "--set=threshold.limits=0.01")
     assert done.status == 0 and "whole machine" in done.out
-
-
-def test_the_notes_of_a_detector_are_shown(forearm):
-    machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
-    done = cdtool("detect", log, "-m", machine, "-d", "desired_dynamics", "--set=threshold.limits=9")
-    assert done.status == 0 and "tracking error of arm: rms" in done.out
-    values = json.loads(cdtool("detect", log, "-m", machine, "-d", "ddd", "--set=threshold.limits=9", "--json").out)
-    assert values[0]["notes"][1].startswith("tracking error of forearm")
-
-
-def test_info_names_every_joint(forearm):
-    done = cdtool("info", forearm / "stiff" / "01.csv", "-m", forearm / "machine.toml")
-    assert done.status == 0 and "speed [arm]" in done.out and "speed [forearm]" in done.out
 
 
 def test_a_benchmark_runs_the_given_detectors_or_all_that_the_logs_allow(forearm, tmp_path):

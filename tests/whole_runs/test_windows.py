@@ -7,19 +7,16 @@ import io
 import re
 import sys
 from contextlib import closing
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 import pytest
 
-from cdtool.base.files import locks as file_locks
 from cdtool.base.files.locks import holding, lock_handle
 from cdtool.base.files.writing import replaced_folder, write_text
 from cdtool.commands.console import streams
-from cdtool.commands.judging.runs import shown_path
 from cdtool.execution import processes
 from cdtool.execution.in_worker import Done
 from cdtool.formats.mcap import file_bytes
-from cdtool.report.plots.figures import slug
 from tests.command import FEW, cdtool
 from tests.fuzz.hostile_commands import make_bench
 from tests.windows_files import CAN_SIMULATE, windows_files
@@ -42,18 +39,6 @@ def left(folder: Path) -> list[str]:
     return [path.name for path in folder.rglob(".cdtool-*")]
 
 
-def test_the_simulation_refuses_what_windows_refuses(on_windows, tmp_path):
-    (tmp_path / "folder").mkdir()
-    path = tmp_path / "folder" / "open.csv"
-    with path.open("w"):
-        for change in (path.unlink, lambda: path.rename(tmp_path / "b"), lambda: (tmp_path / "folder").rename("c")):
-            with pytest.raises(PermissionError):
-                change()
-    path.unlink()
-    with pytest.raises(ImportError):
-        import fcntl  # noqa: F401
-
-
 def test_a_lock_is_held_by_one_and_its_file_is_removed_at_its_end(on_windows, tmp_path):
     target = tmp_path / "a.json"
     with holding(target, tmp_path, target):
@@ -61,29 +46,6 @@ def test_a_lock_is_held_by_one_and_its_file_is_removed_at_its_end(on_windows, tm
         with lock.open("r+b") as other:
             assert not lock_handle(other.fileno())
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_file_of_a_lock_that_another_process_waits_for_stays_for_it(monkeypatch, tmp_path):
-    path = tmp_path / "lock"
-    path.touch()
-    closed = []
-
-    def in_use(self, missing_ok=False):
-        assert closed, "an open file cannot be removed"
-        raise PermissionError(errno.EACCES, "used by another process")
-
-    monkeypatch.setattr(file_locks, "REMOVES_OPEN_FILES", False)
-    monkeypatch.setattr(Path, "unlink", in_use)
-    file_locks.remove_locked(path, lambda: closed.append(True))
-    assert path.exists()
-
-
-def test_a_file_is_closed_even_if_it_cannot_be_removed(monkeypatch, tmp_path):
-    closed = []
-    monkeypatch.setattr(file_locks, "REMOVES_OPEN_FILES", True)
-    with pytest.raises(OSError):
-        file_locks.remove_locked(tmp_path, lambda: closed.append(True))
-    assert closed
 
 
 def test_a_folder_is_replaced_without_an_exchange_of_folders(on_windows, monkeypatch, tmp_path):
@@ -97,17 +59,6 @@ def test_a_folder_is_replaced_without_an_exchange_of_folders(on_windows, monkeyp
         with replaced_folder(tmp_path / "report", lambda _: True) as part:
             write_text(part / "a.md", text)
     assert (tmp_path / "report" / "a.md").read_text() == "new" and left(tmp_path) == []
-
-
-def test_an_existing_folder_is_replaced_without_the_mount_points_that_python_311_does_not_know(monkeypatch, tmp_path):
-    def unsupported(self):
-        raise NotImplementedError("Path.is_mount() is unsupported on this system")
-
-    monkeypatch.setattr(Path, "is_mount", unsupported)
-    for text in ("old", "new"):
-        with replaced_folder(tmp_path / "report", lambda _: True) as part:
-            write_text(part / "a.md", text)
-    assert (tmp_path / "report" / "a.md").read_text() == "new"
 
 
 def test_commands_write_replace_and_reuse_their_files(on_windows, tmp_path):
@@ -169,19 +120,6 @@ def test_no_more_processes_are_started_than_windows_waits_for(monkeypatch):
         pool.begin(0, 4)
         ended = pool.ended(wait_for_one=True) or pool.ended(wait_for_one=True)  # at first it may be ready only
         assert pool.size == 2 and ended == [(0, Done(8))]
-
-
-def test_names_in_results_have_forward_slashes_on_every_system():
-    base = PureWindowsPath("C:/bench")
-    assert shown_path(PureWindowsPath(r"C:\bench\stiff\01.csv"), base) == "stiff/01.csv"
-    assert shown_path(PureWindowsPath(r"D:\logs\01.csv"), base) == "D:/logs/01.csv"
-    assert shown_path(PureWindowsPath(r"stiff\01.csv")) == "stiff/01.csv"
-
-
-@pytest.mark.parametrize("name", ["CON", 'a:b*c?"', "lpt1. ", "Tür/auf", "..", "größer ≥ 5"])
-def test_names_of_groups_become_names_of_files_that_every_system_allows(name):
-    made = f"triggers_{slug(name, set())}.png"
-    assert not FORBIDDEN.search(made) and made.partition(".")[0] not in DEVICES
 
 
 def test_every_file_of_the_repository_can_exist_on_every_system():

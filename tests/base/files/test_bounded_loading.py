@@ -15,7 +15,6 @@ from cdtool.base.files.bounded_loading import (
     ContentError,
     parse_own_json,
     parse_toml,
-    read_text,
     read_toml,
 )
 from cdtool.base.settings import Place
@@ -39,12 +38,6 @@ def test_the_largest_toml_file_takes_less_than_300_mib(line):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak / len(text) * MOST_TOML < 300 * MIB
-
-
-def test_the_mark_at_the_start_of_a_windows_text_is_no_part_of_it(tmp_path):
-    file = tmp_path / "machine.toml"
-    file.write_bytes(b"\xef\xbb\xbf[machine]\r\n")
-    assert read_text(file, ConfigurationError) == "[machine]\n"
 
 
 @pytest.mark.parametrize(

@@ -46,15 +46,6 @@ def test_a_file_is_made_of_its_pieces_or_stays_as_it_was(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.md"]
 
 
-def test_while_writing_only_dotfiles_in_tmp_or_lock_exist(tmp_path):
-    with replaced(tmp_path / "a.csv", tmp_path / "b.parquet") as parts:
-        assert all(path.name.startswith(".cdtool-") and path.suffix == ".tmp" for path in parts)
-        hidden = names(tmp_path)
-        assert all(name.startswith(".cdtool-") and name.endswith((".tmp", ".lock")) for name in hidden)
-        assert not list(tmp_path.glob("*.csv")) and not list(tmp_path.glob("*.parquet"))
-    assert names(tmp_path) == {"a.csv", "b.parquet"}
-
-
 @posix_only
 def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
     (tmp_path / "real").mkdir()
@@ -389,32 +380,6 @@ def test_sigterm_cleans_up_as_sigint_does(tmp_path, name, status, word):
     done = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (status, f"{word}\n")
     assert names(tmp_path) == set()
-
-
-STRUCK = """
-import os, signal, sys
-from importlib.abc import MetaPathFinder
-signal.signal(signal.SIGINT, signal.default_int_handler)
-class Struck(MetaPathFinder):
-    def find_spec(self, name, *_):
-        if name == module:
-            os.kill(os.getpid(), signal.SIGINT)
-module, sys.argv = sys.argv[1], ["cdtool", "list", "detectors"]
-sys.meta_path.insert(0, Struck())
-from cdtool.__main__ import main
-main()
-"""
-
-
-@posix_only
-@pytest.mark.parametrize(
-    "module",
-    ["cdtool.commands.app", "logging", "typer", "cdtool.base.exit_status", "cdtool.commands.list_known.command"],
-)
-def test_ctrl_c_during_the_first_imports_shows_no_traceback(module):
-    done = subprocess.run([sys.executable, "-c", STRUCK, module], cwd=ROOT, capture_output=True, text=True, check=False)
-    # Ended by the signal itself, which a shell shows as 130, or by the command once it catches signals.
-    assert done.returncode in (-signal.SIGINT, 130) and done.stderr in ("", "interrupted\n")
 
 
 @posix_only

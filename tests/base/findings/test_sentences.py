@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import cdtool.base.findings
-from cdtool.base.findings import Finding, lines_of, remark, worst_first
+from cdtool.base.findings import Finding, lines_of, remark
 from cdtool.base.findings.kinds import Severity, kind_of, sections
 from cdtool.base.findings.words import FindingWords
 
@@ -78,14 +78,6 @@ def test_findings_in_the_code_have_a_known_kind_and_its_numbers():
             assert sorted(named) == sorted(kind_of(kind).numbers), kind
 
 
-def test_code_asks_for_known_kinds():
-    """A mistyped kind would never be found. Other things have a `kind`, too: some of them have an underscore."""
-    asked = [node for node in sources() if isinstance(node, ast.Compare) and ast.unparse(node.left).endswith(".kind")]
-    names = {item.value for node in asked for item in ast.walk(node) if isinstance(item, ast.Constant)}
-    others = {"ends_before", "ends_inside", "no_value", "pressure_exceeds", "pressure_not_assessable"}
-    assert {name for name in names if "_" in str(name)} - others <= KINDS.keys()
-
-
 def test_the_table_of_kinds_is_complete_and_read_kind_by_kind():
     assert list(sections()) == list(KINDS)
     for name in KINDS:
@@ -113,21 +105,6 @@ def test_subject_and_variant_tell_findings_of_one_kind_apart():
     assert (Finding("no_clock").subject, Finding("no_clock").variant) == ("", "")
 
 
-@pytest.mark.parametrize(("kind", "numbers", "sentence"), SENTENCES, ids=[kind for kind, _, _ in SENTENCES])
-def test_a_finding_is_hashable_and_its_values_are_json(kind, numbers, sentence):
-    finding = Finding(kind, "time", numbers, "loss", file="bag_0.mcap")
-    assert finding in {finding} and finding != Finding(kind, "time", numbers)
-    values = json.loads(json.dumps(finding.to_dict()))
-    assert values["kind"] == kind and values["message"] == f"bag_0.mcap: {sentence}"
-    assert (values["channel"], values["severity"], values["file"]) == ("time", "loss", "bag_0.mcap")
-
-
-def test_severity_is_that_of_the_kind_where_none_is_given():
-    numbers = {"sheet": "Notes", "reason": "no numbers"}
-    assert Finding("sheet_left_out", "", numbers).severity == "note"
-    assert Finding("sheet_left_out", "", numbers, "loss").severity == "loss"
-
-
 def test_numbers_stand_apart_from_the_sentence():
     numbers = Finding("missing_values", "speed", {"count": 2, "values": 100}).to_dict()["numbers"]
     assert numbers == {"count": 2, "values": 100}
@@ -143,8 +120,3 @@ def test_a_finding_names_its_channel_and_the_part_of_its_log():
     assert str(remark("late")) == "late"
     assert str(remark("late", "speed")) == "speed: late"
     assert str(Finding("remark", "speed", {"text": "late"}, file="b.mcap")) == "speed: b.mcap: late"
-
-
-def test_losses_come_before_warnings_and_these_before_notes():
-    note, warning, loss = (remark(text, severity=text) for text in ("note", "warning", "loss"))
-    assert worst_first([note, warning, loss, warning]) == (loss, warning, warning, note)

@@ -37,31 +37,6 @@ def test_a_benchmark_has_the_bytes_of_a_local_one(gate, memory, tmp_path):
     assert "read from URLs: " in there.err and "URL" not in here.err
 
 
-def test_a_local_benchmark_file_may_name_logs_at_urls(gate, tmp_path):
-    text = (GATE / "benchmark.toml").read_text(encoding="utf-8")
-    text = text.replace('"machine.toml"', f'"{gate}/machine.toml"')
-    for group in ("free", "holdout", "stiff", "soft"):
-        text = text.replace(f'"{group}/', f'"{gate}/{group}/')
-    (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
-    done = cdtool("benchmark", tmp_path / "benchmark.toml", "-o", tmp_path / "results.json")
-    assert done.status == 0
-    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
-    assert {row["recording"] for row in results["recordings"]} >= {f"{gate}/stiff/01.mcap", f"{gate}/soft/04.csv"}
-
-
-def test_a_report_folder_is_written_and_replaced(gate, memory):
-    assert cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "pt", "-o", "memory://report").status == 0
-    assert {"/report/report.html", "/report/results.json", "/report/latency.png"} <= set(memory.find("/report"))
-    memory.pipe_file("/report/own.txt", b"mine")
-    refused = cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "pt", "-o", "memory://report")
-    assert refused.status == 2 and "memory://report/own.txt: is not part of a cdtool report" in refused.err
-    assert (
-        cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "gm", "-o", "memory://report", "--force").status
-        == 0
-    )
-    assert memory.cat("/report/own.txt") == b"mine"
-
-
 def test_a_signature_is_learned_used_and_updated(gate, memory, tmp_path):
     free = [f"{gate}/free/{path.name}" for path in sorted((GATE / "free").iterdir())]
     learned = cdtool(
@@ -83,24 +58,6 @@ def test_a_signature_is_learned_used_and_updated(gate, memory, tmp_path):
     assert cdtool("signature", "show", "memory://g.json").status == 0
     text = learned.out.encode()
     assert b"memory://g.json" in text
-
-
-@pytest.mark.parametrize("suffix", ["csv", "mcap", "parquet"])
-def test_a_log_is_converted_and_read_again(gate, memory, tmp_path, suffix):
-    target = f"memory://out/stiff 03.{suffix}"
-    done = cdtool("convert", f"{gate}/stiff/03.csv", target, "-m", f"{gate}/machine.toml")
-    assert done.status == 0, done.err
-    here = tmp_path / f"stiff 03.{suffix}"
-    assert cdtool("convert", GATE / "stiff/03.csv", here, "-m", MACHINE).status == 0
-    companions = [Path(f"{here}.machine.toml"), f"{target}.machine.toml"]
-    if suffix != "parquet":  # these contain the time of writing or an order of their own
-        assert memory.cat(f"/out/{here.name}") == here.read_bytes()
-    if companions[0].exists():
-        first, second = (api.read(log, machine) for log, machine in zip((here, target), companions, strict=True))
-        assert list(first.channels) == list(second.channels)
-        for name, series in first.channels.items():
-            assert series.values.tobytes() == second[name].values.tobytes()
-        assert first.digest == second.digest or suffix == "parquet"
 
 
 def test_the_other_commands_read_and_write_urls(gate, memory, tmp_path):
@@ -192,22 +149,9 @@ def test_a_pattern_of_a_url_names_the_logs_that_a_shell_would_name_in_a_folder(g
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
-def test_a_pattern_of_a_url_without_a_match_is_a_missing_file(gate):
-    done = cdtool("info", f"{gate}/fre/*.csv")
-    assert done.status == 2
-    assert f"{gate}/fre/*.csv: no such file" in done.err
-
-
 def test_a_path_at_a_url_is_one_log_in_python(gate):
     log = location(f"{gate}/stiff/03.csv")
     one, several = [
         api.detect(logs, MACHINE, detector="pt", settings={"threshold.limits": 50.0}) for logs in (log, [log])
     ]
     assert several[log].alarms.equals(one.alarms) and log in several
-
-
-def test_what_the_program_that_started_a_command_has_read_is_not_counted(tmp_path, monkeypatch):
-    monkeypatch.setenv("CDTOOL_REMOTE_FOLDER", str(tmp_path))
-    (tmp_path / "read").write_text("1000\n", encoding="ascii")
-    assert session.amount_read() == (1000, 1)
-    assert "URL" not in cdtool("info", GATE / "stiff" / "03.csv", "-m", MACHINE).err

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -59,13 +57,6 @@ def test_scattered_small_reads_transfer_little_and_consecutive_ones_few_requests
     for at in range(0, len(CONTENT), 1000):
         assert _read(file, at, 1000) == CONTENT[at : at + 1000]
     assert session.amount_read()[1] - before[1] <= 12
-
-
-def test_it_is_an_open_file(url):
-    with io.BufferedReader(RangedFile(url), 4096) as file:
-        assert file.read(10) == CONTENT[:10] and file.seek(-5, io.SEEK_END) == len(CONTENT) - 5
-        assert file.read() == CONTENT[-5:] and file.seek(3) == 3 and file.seek(2, io.SEEK_CUR) == 5
-        assert file.read(7) == CONTENT[5:12] and file.tell() == 12
 
 
 def test_a_replaced_file_is_noticed(url, memory):

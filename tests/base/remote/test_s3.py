@@ -16,7 +16,6 @@ import pytest
 import cdtool as api
 from cdtool.base.errors import CdtoolError, is_lasting
 from cdtool.base.remote import storage
-from cdtool.base.remote.remote_path import location
 from tests.base.remote.s3_server import SECRET, S3Server
 from tests.command import cdtool
 
@@ -77,35 +76,13 @@ def test_a_benchmark_in_several_processes_has_the_bytes_of_a_local_one(gate, buc
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "a b.csv",
-        "ü/Größe 日本.csv",
-        "log#7.csv",
-        "what?.csv",
-        "50%.csv",
-        "a+b&c=d.csv",
-        "[x].csv",
-        "a::b.csv",
-        "x//y.csv",
-    ],
+    ["a b.csv", "ü/Größe 日本.csv", "log#7.csv", "50%.csv", "[x]?+&=.csv", "x//y.csv"],
 )
 def test_names_have_any_characters(bucket, name):
     url = bucket.put(name, (GATE / "stiff" / "03.csv").read_bytes())
     done = cdtool("info", url, "-m", MACHINE)
     assert done.status in (0, 3) and done.out.startswith(f"{url}: csv"), done.err
     assert api.read(url, MACHINE).digest == api.read(GATE / "stiff" / "03.csv", MACHINE).digest
-
-
-def test_patterns_and_hidden_names(bucket):
-    for name in ("2026/a/1.csv", "2026/b/2.csv", "2026/b/.3.csv", "2026/4.csv"):
-        bucket.put(name, b"x")
-    bucket.put("2026/", b"")  # the mark of a folder that other tools make
-    base = location(f"{bucket.url}/2026")
-    from cdtool.commands.judging.runs import find_logs
-
-    assert [path.name for path in find_logs(["*/*.csv"], base)] == ["1.csv", "2.csv"]
-    assert [path.name for path in find_logs(["**/*.csv"], base)] == ["4.csv", "1.csv", "2.csv"]
-    assert [path.name for path in find_logs([f"{bucket.url}/2026/*.csv"], Path())] == ["4.csv"]
 
 
 def test_a_missing_object_or_bucket_is_one_line(bucket):
@@ -165,14 +142,6 @@ def changing(monkeypatch):
         monkeypatch.setattr(storage, "fetch", changed)
 
     return set_up
-
-
-def test_a_log_that_is_deleted_while_it_is_read_is_reported_once(without_limits, bucket, changing, tmp_path):
-    changing("stiff/03.csv", lambda: bucket.fs.rm_file(f"{bucket.name}/gate/stiff/03.csv"))
-    done = cdtool("benchmark", without_limits, "-o", tmp_path / "results.json")
-    skipped = json.loads((tmp_path / "results.json").read_text())["skipped"]
-    assert [item["recording"] for item in skipped] == ["stiff/03.csv"] and done.status == 3
-    assert "no such file" in skipped[0]["reason"] or "was removed" in skipped[0]["reason"]
 
 
 def test_a_log_that_is_replaced_while_it_is_read_is_reported_once(without_limits, bucket, changing, tmp_path):
@@ -323,17 +292,6 @@ def test_sigterm_leaves_no_copies(gate, tmp_path):
     process.send_signal(signal.SIGTERM)
     assert process.wait(60) == 143
     assert not list(tmp_path.glob("cdtool-remote-*"))
-
-
-def test_a_store_on_s3_is_used_again(gate, bucket, tmp_path):
-    words = ("benchmark", f"{gate}/benchmark.toml", "--store", f"{bucket.url}/store")
-    for number in range(2):
-        done = cdtool(*words, "-o", tmp_path / f"{number}.json")
-        assert done.status == 0, done.err
-    assert "store: 0 recordings computed" in done.out
-    assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
-    bucket.put("gate/stiff/03.csv", (GATE / "stiff" / "04.csv").read_bytes() + b"\n")
-    assert "store: 1 recording computed" in cdtool(*words).out
 
 
 def test_a_large_mcap_is_read_by_ranges(bucket, tmp_path):

@@ -53,17 +53,6 @@ def _use_copies() -> None:
         os.fspath(location("memory://logs/a.csv"))
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_what_a_worker_reads_is_counted(memory):
-    memory.pipe_file("/logs/a.mcap", b"x" * 100)
-    assert location("memory://logs/a.mcap").exists()  # as a command does before it starts workers
-    before = session.amount_read()
-    child = os.fork()
-    if not child:
-        os._exit(0 if storage.read_range("memory://logs/a.mcap", 10, 90) == b"x" * 80 else 1)
-    assert os.waitpid(child, 0)[1] == 0 and session.amount_read() == (before[0] + 80, before[1] + 1)
-
-
 def test_the_copies_are_bounded(memory, monkeypatch):
     monkeypatch.setenv("CDTOOL_CACHE_MIB", "2.5")
     for name in "abc":
@@ -81,16 +70,6 @@ def test_a_file_larger_than_the_bound_is_refused_before_it_is_read(memory, monke
     with pytest.raises(StorageError, match=r"has 1 MiB; .* \(set CDTOOL_CACHE_MIB to a larger number\)"):
         os.fspath(location("memory://logs/a.csv"))
     assert not copies()
-
-
-@pytest.mark.parametrize("text", ["", "many", "-3", "0", "nan"])
-def test_an_invalid_bound_is_the_usual_one(memory, monkeypatch, text):
-    monkeypatch.setenv("CDTOOL_CACHE_MIB", text)
-    memory.pipe_file("/logs/a.csv", b"1")
-    assert Path(os.fspath(location("memory://logs/a.csv"))).read_bytes() == b"1"
-    found = storage.ObjectInfo(4097 * MIB)
-    with pytest.raises(StorageError, match="the cache for local copies has 4096"):
-        staging._fetched("memory://logs/a.csv", found)
 
 
 def test_a_replaced_file_is_copied_again(memory, monkeypatch):
@@ -114,19 +93,6 @@ def test_a_file_that_changes_while_it_is_copied_is_not_used(memory, monkeypatch)
     with pytest.raises(StorageError, match="changed while it was read") as caught:
         os.fspath(location("memory://logs/a.csv"))
     assert not is_lasting(caught.value) and not copies()
-
-
-def test_a_file_that_changes_once_is_copied_again(memory, monkeypatch):
-    memory.pipe_file("/logs/a.csv", b"old")
-    fetch, contents = storage.fetch, [b"newer"]
-
-    def changing(url, target):
-        fetch(url, target)
-        if contents:
-            memory.pipe_file("/logs/a.csv", contents.pop())
-
-    monkeypatch.setattr(storage, "fetch", changing)
-    assert location("memory://logs/a.csv").open("rb").read() == b"newer"
 
 
 _COPIES = """

@@ -5,12 +5,11 @@ from __future__ import annotations
 import errno
 import pickle
 import sys
-from datetime import UTC, datetime
 from importlib import import_module
 
 import pytest
 
-from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, is_lasting
+from cdtool.base.errors import CdtoolError, ConfigurationError, is_lasting
 from cdtool.base.files.bounded_loading import read_bytes
 from cdtool.base.remote import storage
 from cdtool.base.remote.remote_path import location
@@ -115,30 +114,3 @@ def test_a_version_is_its_etag_and_size():
     assert one.digest == ObjectInfo(5, '"abc"', 2 * 10**18).digest
     assert one.modified != other.modified and one.modified // 10**9 == 10**9
     assert ObjectInfo(5, "", 123).digest.startswith("modified:") and ObjectInfo(5, "", 123).modified == 123
-
-
-@pytest.mark.parametrize(
-    ("found", "etag", "changed"),
-    [
-        (
-            {"size": 3, "ETag": '"e"', "LastModified": datetime(2020, 1, 1, tzinfo=UTC)},
-            '"e"',
-            1577836800 * 10**9,
-        ),
-        ({"size": 3, "etag": "e", "updated": "2020-01-01T00:00:00.5+00:00"}, "e", 1577836800_500_000_000),
-        ({"size": 3, "mtime": 12.5}, "", 12_500_000_000),
-        ({"size": None, "created": datetime(2020, 1, 1)}, "", 1577836800 * 10**9),
-        ({"size": 3, "LastModified": "yesterday"}, "", 0),
-    ],
-)
-def test_storages_name_version_and_time_differently(found, etag, changed):
-    info = ObjectInfo.of(found)
-    assert (info.size, info.etag, info.changed) == (found["size"] or 0, etag, changed)
-
-
-def test_an_error_of_a_log_names_the_url_once(memory):
-    memory.pipe_file("/logs/a.csv", b"")
-    from cdtool.commands.judging.runs import read
-
-    with pytest.raises(RecordingError, match=r"^memory://logs/a\.csv: is empty"):
-        read("memory://logs/a.csv", "sample_logs/gate/machine.toml")

@@ -21,20 +21,6 @@ def test_a_file_is_written_and_replaced_in_one_step(memory):
     assert path.open("rb").read() == b"new" and memory.find("/out") == ["/out/a b.json"]
 
 
-def test_several_files_are_written_when_all_are_complete(memory, tmp_path):
-    here, there, other = tmp_path / "a.csv", location("memory://out/b.csv"), location("memory://out/c.csv")
-    with pytest.raises(RuntimeError), replaced(there, here) as (first, second):
-        first.write_bytes(b"b"), second.write_bytes(b"a")
-        raise RuntimeError
-    assert not memory.find("/") and not here.exists()
-    with replaced(here, there, other) as parts:
-        for part, name in zip(parts, "abc", strict=True):
-            part.write_text(name)
-        assert not memory.find("/")
-    assert here.read_text() == "a" and there.read_bytes() == b"b" and other.read_bytes() == b"c"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
-
-
 def test_a_folder_is_uploaded_and_other_files_stay(memory):
     memory.pipe_file("/out/old.txt", b"old")
     memory.pipe_file("/out/report.html", b"old")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cdtool.base.remote.urls import complete, scheme_of, shown, without_secrets
+from cdtool.base.remote.urls import complete, shown, without_secrets
 
 
 @pytest.mark.parametrize(
@@ -29,10 +29,6 @@ def test_user_info_and_query_are_not_shown_and_used_for_access(url, expected):
 def test_the_query_of_a_log_is_that_of_its_runs():
     shown("https://host/cycles.csv?sig=xyz#7")
     assert complete("https://host/cycles.csv") == "https://host/cycles.csv?sig=xyz"
-
-
-def test_a_drive_or_a_relative_path_is_not_a_url():
-    assert [scheme_of(text) for text in ("C:/a.csv", "C://a.csv", "a/b.csv", "/a.csv", "a:b", "s3:/a")] == [""] * 6
 
 
 def test_messages_of_libraries_lose_their_secrets():

@@ -12,7 +12,7 @@ from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, status_of
 from cdtool.commands.compare.comparison import compare_builds
 from cdtool.statistics.rates import binomial_at_most, binomial_increase_at_most, poisson_increase_at_most
-from tests.commands.compare.questions import KEY, asked, latencies, row_of, single
+from tests.commands.compare.questions import asked, latencies, row_of, single
 from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
 
 OTHERS = {"bytes_of": "other", "names": "x"}
@@ -89,12 +89,6 @@ def test_a_spread_too_large_for_a_relevant_change_is_inconclusive_with_the_detec
     assert f"only a change of {latency.detectable:.1f} ms would have been shown" in row_of(found).words
     wide = compare_builds(single(old, force=None), new, relevant_change=0.5)
     assert wide.verdict == "no change shown" and wide.relevant_change == 0.5
-
-
-def test_a_missing_detector_makes_the_comparison_incomplete():
-    old = build_results({KEY: latencies(), ("pure_torque", "stiff"): latencies()})
-    found = compare_builds(old, build_results({KEY: latencies()}))
-    assert found.facts == (Fact.INCOMPLETE,) and status_of(found.facts) == 4
 
 
 @pytest.mark.parametrize("n", [3, 29, 30, 100])

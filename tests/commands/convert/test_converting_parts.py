@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-import cdtool
-from cdtool.base.errors import RecordingError, UsageError
+from cdtool.base.errors import UsageError
 from cdtool.commands.convert.converting import convert
 from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.machine_file import read_machine_file
@@ -64,22 +62,6 @@ def test_the_channels_of_all_parts_are_read_back_as_those_of_the_log(suffix, tmp
     assert_same(whole, logged(done.files[0], done.machine_files[0]), exact_time=suffix != ".mcap")
 
 
-def test_each_parts_name_and_digest_are_in_the_file(tmp_path):
-    folder = bag(tmp_path / "bag")
-    convert(folder, tmp_path / "out.mcap", machine=machine(tmp_path))
-    from mcap.reader import make_reader
-
-    with (tmp_path / "out.mcap").open("rb") as file:
-        told = next(iter(make_reader(file).iter_metadata())).metadata
-    digests = {
-        name: hashlib.sha256((folder / name).read_bytes()).hexdigest()
-        for name in sorted(f"bag_{number}.mcap" for number in range(11))
-    }
-    assert told["cdtool.source"] == "bag"
-    assert told["cdtool.parts"] == "; ".join(f"{name} {digest}" for name, digest in digests.items())
-    assert told["cdtool.sha256"] == read_recording(folder, read_machine_file(tmp_path / "machine.toml")).digest
-
-
 @pytest.mark.parametrize("arguments", [(), ("-m",)], ids=["all columns", "channels"])
 def test_missing_or_unreadable_parts_are_reported_with_status_3(arguments, tmp_path):
     folder = bag(tmp_path / "bag", count=4, listed=5)
@@ -107,37 +89,12 @@ def test_missing_or_unreadable_parts_are_reported_with_status_3(arguments, tmp_p
     assert info.status == 3 and "loss: part bag_1.mcap is left out" in info.out
 
 
-def test_a_folder_without_a_readable_part_is_one_line(tmp_path):
-    folder = bag(tmp_path / "bag", count=2)
-    for path in folder.glob("*.mcap"):
-        path.write_bytes(b"")
-    for options in ((), ("-m", machine(tmp_path))):
-        done = command("convert", folder, tmp_path / "out.csv", *options)
-        assert done.status == 2 and "bag_0.mcap: is empty" in done.err and done.err.count("\n") == 1
-
-
-def test_a_last_part_without_a_message_is_accepted(tmp_path):
-    folder = bag(tmp_path / "bag", count=2)
-    write_part(folder / "bag_2.mcap", 2.0, rows=0)
-    for known in (None, machine(tmp_path)):
-        done = convert(folder, tmp_path / "out.mcap", machine=known, force=True)
-        assert done.columns == 2
-    assert len(cdtool.info(folder, machine=machine(tmp_path)).channels) == 3
-
-
 def test_a_load_cell_that_only_some_parts_hold_is_written_from_these(tmp_path):
     folder = bag(tmp_path / "bag", count=2)
     write_part(folder / "bag_2.mcap", 2.0, ("speed",))
     done = convert(folder, tmp_path / "out.mcap", machine=machine(tmp_path))
     recording = logged(done.files[0], done.machine_files[0])
     assert (len(recording["speed"]), len(recording["force"])) == (384, 128)
-
-
-def test_a_part_without_a_measured_channel_is_refused(tmp_path):
-    folder = bag(tmp_path / "bag", count=2)
-    write_part(folder / "bag_2.mcap", 2.0, ("cell",))
-    with pytest.raises(RecordingError, match=r"bag_2\.mcap: no message of topic '/speed'"):
-        convert(folder, tmp_path / "out.mcap", machine=machine(tmp_path))
 
 
 def test_a_log_without_any_mapped_channel_is_one_line(tmp_path):
@@ -156,21 +113,3 @@ def test_no_part_is_overwritten_and_none_is_added(tmp_path):
     with pytest.raises(UsageError, match="is the log itself"):
         convert(folder, tmp_path / "link.mcap", force=True)
     assert len(list(folder.iterdir())) == 3
-
-
-def test_a_converted_log_in_parts_keeps_its_exact_times(tmp_path):
-    folder = tmp_path / "bag"
-    folder.mkdir()
-    for number in range(2):
-        part = write_part(tmp_path / "part.mcap", number + 1e-10)
-        convert(part, folder / f"bag_{number}.mcap", force=True)
-    expected = survey(Path(convert(folder / "bag_0.mcap", tmp_path / "one.csv").files[0])).columns["time [s]"].values
-    both = survey(Path(convert(folder, tmp_path / "both.csv").files[0])).columns["time [s]"].values
-    assert both[: len(expected)].tobytes() == expected.tobytes() and len(both) == 2 * len(expected)
-
-
-def test_info_of_parts_with_a_machine_file_lists_the_files(tmp_path):
-    told = cdtool.info(bag(tmp_path / "bag", count=3), machine=machine(tmp_path))
-    assert told.details["parts"] == "3, bag_0.mcap to bag_2.mcap"
-    assert told.details["/speed"].endswith(", 384 messages")
-    assert {channel.name: channel.samples for channel in told.channels} == {"speed": 384, "position": 384, "force": 192}

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import cdtool
 from cdtool.commands.convert.converting import convert
 from cdtool.commands.convert.log_rows import ColumnRows
 from cdtool.formats.channels.reading import survey
@@ -53,18 +52,6 @@ def test_all_columns_of_several_clocks_keep_the_start_without_a_machine_file(suf
         again = convert(path, tmp_path / "again.csv", force=True)
         for name in (path, again.files[0]):
             assert ColumnRows(Path(name)).origin == ColumnRows(log).origin > 1.6e9
-
-
-def test_info_shows_the_same_times_of_a_converted_table(tmp_path):
-    log, machine = dated(tmp_path / "run.csv"), known(tmp_path)
-    needs(".parquet")
-    for suffix in (".csv", ".parquet"):
-        done = convert(log, tmp_path / f"out{suffix}", machine=machine)
-        before = cdtool.info(log, machine=machine).channels
-        after = cdtool.info(done.files[0], machine=done.machine_files[0]).channels
-        assert [(c.name, c.start_s, c.duration_s, c.rate_hz) for c in before] == [
-            (c.name, c.start_s, c.duration_s, c.rate_hz) for c in after
-        ]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ import pytest
 
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import judge
-from cdtool.base.errors import UsageError
 from cdtool.commands.explain.margin_plot import plot_explanation
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
@@ -20,7 +19,6 @@ from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.results.explanation.explanation import explain_operation
 from cdtool.thresholds.limit import Limit
 from cdtool.truth.matching import match
-from tests.report.hostile import HOSTILE
 
 TIME = np.arange(4000) * 1e-3
 CONTACT = Contact(2.0, 2.4, 0.001)
@@ -73,37 +71,3 @@ def test_an_alarm_shows_channels_in_order_signal_margin_onset_and_debounce(drawn
         assert expected in shown, expected
     assert "time from contact onset [ms]" in shown
     assert "reference_speed" not in shown  # it neither moved nor does the detector read it
-
-
-def test_a_missed_contact_has_a_mark_where_the_signal_was_nearest_to_its_limit(drawn):
-    shown = drawn(50.0)
-    assert "missed: no alarm within 1000 ms" in shown and "nearest, " in shown
-    assert "outside for" not in shown and "\nalarm\n" not in shown
-
-
-def test_an_alarm_without_a_contact_counts_from_the_alarm(drawn):
-    shown = drawn(1.0, contacts=())
-    assert "false alarm at" in shown and "time from alarm [ms]" in shown
-    assert "load cell [" not in shown and "contact onset" not in shown
-
-
-def test_samples_not_assessable_are_hatched_and_have_no_margin(drawn):
-    shown = drawn(1.0, blind=True)
-    assert "not assessable: missing samples 100 %" in shown
-    assert "nearest" not in shown
-
-
-def test_the_same_event_gives_the_same_bytes_in_every_format(drawn, tmp_path):
-    for suffix in (".png", ".svg", ".pdf"):
-        for name in ("a", "b"):
-            drawn(1.0, path=f"{name}{suffix}")
-        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes(), suffix
-    with pytest.raises(UsageError, match=r"a\.gif"):
-        drawn(1.0, path="a.gif")
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_a_hostile_name_is_drawn_plainly_and_shortened(drawn, kind):
-    shown = drawn(1.0, name=HOSTILE[kind])
-    assert "momentum" in shown
-    assert "\x1b" not in shown and "\u202e" not in shown and "n" * 100 not in shown

@@ -111,28 +111,6 @@ def test_the_shaker_of_a_bench_is_not_a_speed_of_rotation(tmp_path):
     assert "values only" in draft.said("torque")
 
 
-def test_joints_numbered_with_gaps_are_joints_if_several_quantities_have_the_same_numbers(tmp_path):
-    run = stroke()
-    columns = {"time [s]": run.time}
-    for name, values in (("ENC_POS", run.travel), ("SPEED", run.speed), ("TORQUE", run.torque)):
-        columns |= {f"{name}|{number}": (k + 1.0) * values for k, number in enumerate((1, 2, 6))}
-    draft = drafted_columns(tmp_path, columns)
-    assert draft.channels["position"]["columns"] == ["ENC_POS|1", "ENC_POS|2", "ENC_POS|6"]
-    assert draft.channels["torque"]["columns"] == ["TORQUE|1", "TORQUE|2", "TORQUE|6"]
-
-
-def test_two_motors_of_one_axis_are_not_two_joints(tmp_path):
-    run = stroke()
-    draft = drafted_columns(
-        tmp_path,
-        {
-            "t [s]": run.time, "pos [mm]": 1e3 * run.travel, "vel [mm/s]": 1e3 * run.speed,
-            "motor 1 current [A]": run.torque, "motor 2 current [A]": 0.9 * run.torque + 0.01,
-        },
-    )  # fmt: skip
-    assert column(draft, "position") == "pos [mm]" and column(draft, "torque").startswith("motor")
-
-
 def test_clocks_inside_of_groups_are_no_channels(tmp_path):
     run = stroke()
     draft = drafted_columns(
@@ -158,55 +136,3 @@ def test_a_set_value_is_not_the_missing_measured_speed(tmp_path):
     run = stroke()
     draft = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": run.travel, "cmd_speed": run.speed})
     assert "speed" not in draft.channels
-
-
-def test_the_speed_in_metres_per_second_is_taken_before_an_electrical_one(tmp_path):
-    run = stroke()
-    draft = drafted_columns(
-        tmp_path,
-        {
-            "ms_today": np.round(1e3 * run.time), "erpm": 4e3 * run.speed,
-            "encoder_position": np.mod(7e3 * run.travel, 360.0),
-            "speed_meters_per_sec": run.speed, "tacho_meters": run.travel,
-        },
-    )  # fmt: skip
-    assert column(draft, "speed") == "speed_meters_per_sec" and draft.unit("speed") == "m/s"
-    assert column(draft, "position") == "tacho_meters" and draft.unit("position") == "m"
-
-
-def test_the_effort_with_the_sign_of_the_torque_is_taken_before_one_of_like_size(tmp_path):
-    run = stroke()
-    rectified = np.abs(run.torque) * np.where(run.time > 2.0, -1.0, 1.0)
-    draft = drafted_columns(
-        tmp_path,
-        {
-            "t [s]": run.time, "pos [m]": run.travel, "vel [m/s]": run.speed,
-            "current_motor": rectified, "q_axis_current": run.torque,
-        },
-    )  # fmt: skip
-    assert column(draft, "torque") == "q_axis_current"
-
-
-def test_measured_and_interpolated_positions_are_known_by_two_letters(tmp_path):
-    run = stroke()
-    columns = {"time": run.time}
-    for name, values in (("mp", run.travel), ("ip", np.roll(run.travel, -3)), ("mt", run.torque)):
-        columns |= {f"{name}{j}": j * values for j in (1, 2)}
-    columns["ip1"][-3:] = columns["ip1"][-4]
-    columns["ip2"][-3:] = columns["ip2"][-4]
-    draft = drafted_columns(tmp_path, columns)
-    assert draft.channels["position"]["columns"] == ["mp1", "mp2"]
-    assert draft.channels["torque"]["columns"] == ["mt1", "mt2"]
-    assert draft.channels["reference_position"]["columns"] == ["ip1", "ip2"]
-
-
-def test_the_same_position_in_counts_is_no_set_value(tmp_path):
-    run = stroke()
-    draft = drafted_columns(
-        tmp_path,
-        {
-            "t [s]": run.time, "speed [m/s]": run.speed, "pos [m]": np.round(run.travel, 3),
-            "motor current [A]": run.torque, "tachometer": np.floor(6631.6 * run.travel),
-        },
-    )  # fmt: skip
-    assert column(draft, "position") == "pos [m]" and "reference_position" not in draft.channels

@@ -7,7 +7,7 @@ import pytest
 
 from cdtool.commands.init.channel_guess import guess_channels
 from cdtool.commands.init.stream import Stream
-from tests.commands.init.layouts.motion import arm_motion, stroke_motion
+from tests.commands.init.layouts.motion import arm_motion
 
 QUANTITIES = {
     "q": "position", "qd": "speed", "i": "torque", "q_des": "reference_position", "qd_des": "reference_speed",
@@ -67,16 +67,6 @@ def test_set_values_behind_measured_ones_do_not_double_the_joints():
 def test_joints_at_rest_belong_to_their_blocks():
     found = blocks_of(("q", "qd", "i"), at_rest=(1,))
     assert found["position"] == "q" and found["speed"] == "qd"
-
-
-def test_one_axis_is_found_and_its_load_cell_is_no_drive():
-    generator = np.random.default_rng(2)
-    m = stroke_motion(generator, rate=200.0)
-    columns = [m.position[:, 0], m.noisy(m.speed, generator)[:, 0], m.push + generator.normal(0.0, 0.5, len(m.time))]
-    streams = [Stream(str(k), (str(k),), None, m.time, column[:, np.newaxis]) for k, column in enumerate(columns)]
-    found = guess_channels(streams, topics=False).found
-    assert "torque" not in found and found["force"].stream.columns == ("2",)
-    assert found["position"].stream.columns == ("0",) and found["speed"].stream.columns == ("1",)
 
 
 def test_noise_has_no_blocks():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import shutil
 import tomllib
@@ -108,31 +107,6 @@ def test_of_175_columns_the_robots_are_found(tmp_path):
     }  # fmt: skip
 
 
-@needs_data("mcap_samples/ur10_joint_states.mcap")
-def test_joints_have_the_names_in_the_messages(tmp_path):
-    values = drafted(data("mcap_samples/ur10_joint_states.mcap"), tmp_path)
-    assert values["machine"]["joints"][:2] == ["shoulder_pan_joint", "shoulder_lift_joint"]
-
-
-def test_german_names_are_understood(tmp_path):
-    import numpy as np
-
-    time = np.arange(2000) / 500.0
-    angle = np.sin(time)
-    moment = -np.sin(time) + 0.2 * np.sign(np.cos(time))  # a pure sine alone is a function of place and speed
-    rows = np.column_stack((time * 1e3, angle, np.cos(time), moment, angle + 1e-6 * time))
-    log = tmp_path / "log.csv"
-    header = "Zeit [ms],Istposition [rad],Geschwindigkeit [rad/s],Drehmoment [Nm],Sollposition [rad]"
-    np.savetxt(log, rows, delimiter=",", header=header, comments="")
-    values = drafted(log, tmp_path)
-    named = {name: str(column).split(" ")[0] for name, column in places(values["channels"]).items()}
-    assert named == {
-        "position": "Istposition", "speed": "Geschwindigkeit", "torque": "Drehmoment",
-        "reference_position": "Sollposition",
-    }  # fmt: skip
-    assert values["machine"]["type"] == "rotary_axis" and values["channels"]["time"]["unit"] == "ms"
-
-
 def test_nothing_is_overwritten_without_force(tmp_path):
     path = tmp_path / "machine.toml"
     path.write_text("mine")
@@ -165,12 +139,6 @@ def test_a_log_with_only_a_clock_is_one_line(tmp_path):
     assert not (tmp_path / "machine.toml").exists()
 
 
-@pytest.mark.parametrize("log", ["gate/stiff/03.csv", "gate/stiff/01.mcap", "arm/trial_1/stiff/01.csv"])
-def test_no_comment_is_wider_than_a_terminal(tmp_path, log):
-    text = init(LOGS / log, tmp_path / "machine.toml").text
-    assert max(len(line) for line in text.splitlines() if line.startswith("#")) <= 100
-
-
 def test_the_next_command_can_be_pasted_into_a_shell(tmp_path):
     folder = tmp_path / "Läufe 1"
     folder.mkdir()
@@ -179,12 +147,3 @@ def test_the_next_command_can_be_pasted_into_a_shell(tmp_path):
     done = cdtool("init", log, "-o", path)
     line = next(line for line in done.out.splitlines() if line.startswith("  cdtool info"))
     assert shlex.split(line) == ["cdtool", "info", str(log), "--machine", str(path)]
-
-
-def test_the_command_prints_the_draft_and_the_next_step(tmp_path):
-    done = cdtool("init", LOGS / "gate/stiff/03.csv", "-o", tmp_path / "machine.toml")
-    assert done.status == 0 and "guessed" in done.out and "cdtool info" in done.out
-    again = cdtool("init", LOGS / "gate/stiff/03.csv", "-o", tmp_path / "machine.toml")
-    assert again.status == 2 and "already exists" in again.err and "Traceback" not in again.err
-    shown = cdtool("init", LOGS / "gate/stiff/03.csv", "-o", tmp_path / "machine.toml", "--force", "--json")
-    assert "torque" in json.loads(shown.out)["channels"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
-from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.base.errors import UsageError
 from tests.command import cdtool, one_line
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
@@ -35,12 +35,6 @@ def test_the_settings_are_used_and_are_part_of_the_draft(glued, tmp_path):
     assert cdtool("info", glued, "-m", tmp_path / "m.toml").status == 0
 
 
-def test_lists_and_numbers_are_written_as_toml(glued, tmp_path):
-    csv = {"header": False, "skip_lines": 1, "missing": ["-", 'say "no"']}
-    api.init(glued, tmp_path / "m.toml", csv=csv)
-    assert tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"] == csv
-
-
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -61,11 +55,6 @@ def test_a_log_that_is_not_a_table_has_no_settings(tmp_path):
     log = next(iter(sorted(LOGS.rglob("*.mcap"))))
     with pytest.raises(UsageError, match="not a text table"):
         api.init(log, tmp_path / "m.toml", csv={"header": False})
-
-
-def test_a_wrong_key_is_refused_in_python_too(glued, tmp_path):
-    with pytest.raises(ConfigurationError, match="unknown key"):
-        api.init(glued, tmp_path / "m.toml", csv={"heder": False})
 
 
 def words_in(tmp_path, words):
@@ -94,9 +83,3 @@ def test_all_words_of_a_column_are_drafted_unless_they_are_many(tmp_path):
     assert csv == {"missing": ["OVL", "ERROR", "off"]}
     done = cdtool("init", words_in(tmp_path, ["a", "b", "c", "d", "e"]), "-o", tmp_path / "n.toml")
     assert done.status == 2 and "is not a number" in one_line(done.err)
-
-
-def test_given_words_stay_and_another_one_is_added(tmp_path):
-    log = words_in(tmp_path, ["OVL", "ERROR"])
-    api.init(log, tmp_path / "m.toml", csv={"missing": ["OVL"]})
-    assert tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"] == {"missing": ["OVL", "ERROR"]}

@@ -77,15 +77,6 @@ def test_file_names_make_the_groups_of_a_single_folder(gate, tmp_path):
     assert groups == {"foam": {"logs": ["../mixed/foam_01.csv"]}, "wall": {"logs": ["../mixed/wall*.csv"]}}
 
 
-def test_groups_have_the_letters_of_the_file_names(gate, tmp_path):
-    mixed = tmp_path / "mixed"
-    mixed.mkdir()
-    for name, log in zip(('Tür "Nord" 1', "門 1"), csv_logs(gate, "stiff"), strict=False):
-        shutil.copy(log, mixed / f"{name}.csv")
-    api.init_study(sorted(mixed.iterdir()), tmp_path / "study", machine=gate / "machine.toml")
-    assert set(drafted(tmp_path / "study")["impacts"]) == {"Tür_Nord", "門"}
-
-
 def test_without_ground_truth_it_writes_a_label_file_to_fill_in(gate, tmp_path):
     text = (gate / "machine.toml").read_text(encoding="utf-8")
     (gate / "blind.toml").write_text("\n".join(line for line in text.splitlines() if "force =" not in line))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections import Counter
 
 import numpy as np
@@ -25,12 +24,6 @@ SETS = {"public": LAYOUTS, "vendors": VENDORS, **SEALED}
 TABLES = [layout for layout in LAYOUTS if layout.name not in REFUSED and is_table(layout)]
 # Few small ones, for tests that run with every change.
 QUICK = [layout for layout in LAYOUTS if layout.name in ("german gate", "chinese servo", "odrive", "lift door")]
-
-
-def test_the_corpus_has_layouts_of_all_machines_with_names_of_their_own():
-    assert len(LAYOUTS) >= 40 and len({layout.name for layout in LAYOUTS}) == len(LAYOUTS)
-    assert {layout.machine for layout in LAYOUTS} == {"linear axis", "rotary axis", "robot"}
-    assert all(layout.source and layout.truth for layout in LAYOUTS)
 
 
 @pytest.mark.parametrize("layout", QUICK, ids=lambda layout: layout.name)
@@ -86,23 +79,6 @@ def small(folder, truths):
     return Layout("small", "a test", "linear axis", write(folder / "small.csv", columns), known)
 
 
-def test_the_score_counts_a_wrong_column_and_its_missing_mark(tmp_path):
-    """The truth is wrong here, so the right guess of the tool is what the score must refuse."""
-    layout = small(
-        tmp_path,
-        {
-            "pos [m]": (Truth("", unit="m"), np.sin),
-            "vel [m/s]": (Truth("speed", unit="mm/s"), np.cos),
-            "state": (Truth("position", unit="m"), lambda time: np.floor(time)),
-        },
-    )
-    done = score(layout, tmp_path)
-    assert done.right == ("speed", "time") and not done.missing
-    assert [text.split(":")[0] for text in done.wrong] == ["position"]
-    assert [text.split(":")[0] for text in done.units] == ["speed"]
-    assert {text.split(":")[0] for text in done.unmarked} == {"position", "speed"}
-
-
 def test_the_score_counts_joints_that_are_left_out(tmp_path):
     layout = small(
         tmp_path,
@@ -114,19 +90,3 @@ def test_the_score_counts_joints_that_are_left_out(tmp_path):
     )
     done = score(layout, tmp_path)
     assert "speed" in done.right and [text.split(":")[0] for text in done.wrong if "joints" in text] == ["position"]
-
-
-def test_the_score_accepts_further_channels_of_a_column_and_optional_columns(tmp_path):
-    """The position is a set value that may be mapped as a measured one; the current may stay unmapped."""
-    layout = small(tmp_path, {"pos [m]": (Truth("", unit="m"), np.sin), "strange": (Truth("torque"), np.ones_like)})
-    strict = score(layout, tmp_path)
-    assert strict.missing == ("torque",) and [text.split(":")[0] for text in strict.wrong] == ["position"]
-    accepting = dataclasses.replace(layout, accept={"pos [m]": ("position",), "strange": ("",)})
-    done = score(accepting, tmp_path)
-    assert done.expected == done.right == ("time",) and not done.missing
-
-
-def test_the_score_knows_columns_by_their_order_where_the_reader_has_other_names(tmp_path):
-    layout = small(tmp_path, {"pos [m]": (Truth("position", unit="m"), np.sin)})
-    renamed = dataclasses.replace(layout, truth=dict(zip(("A", "B"), layout.truth.values(), strict=True)))
-    assert set(score(renamed, tmp_path).right) == {"time", "position"}

@@ -35,14 +35,6 @@ def test_few_rows_are_drafted_or_listed(tmp_path, rows):
     assert len(drafted.channels) + len(drafted.unmapped) >= 2
 
 
-def test_a_joint_at_rest_without_values_is_listed(tmp_path):
-    run = stroke()
-    still = np.full(len(run.time), 0.25)
-    draft = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": run.travel, "pos b [m]": still})
-    listed = {item.columns[0]: item.why for item in draft.done.unmapped}
-    assert listed == {"pos b [m]": "constant"}
-
-
 def test_joints_have_the_names_in_the_columns(tmp_path):
     run = stroke()
     columns = {"t [s]": run.time}

@@ -45,13 +45,6 @@ def test_inertia_and_friction_of_opposite_signs_are_no_drive():
     assert motion.drive_fit(stream(time, odd), stream(time, speed)) == 0.0
 
 
-def test_a_weight_on_a_link_is_explained_by_the_position():
-    time = np.arange(4000) * 1e-3
-    angle, speed = np.sin(time) + 0.5, np.cos(time)
-    drive = 0.2 * np.gradient(speed, time) + 0.3 * np.sign(speed) + 20.0 * np.cos(angle)
-    assert motion.drive_fit(stream(time, drive), stream(time, speed), stream(time, angle)) > 0.9
-
-
 def test_a_unit_is_used_where_the_name_says_nothing(tmp_path):
     run = stroke()
     draft = drafted_columns(
@@ -63,20 +56,6 @@ def test_a_unit_is_used_where_the_name_says_nothing(tmp_path):
     assert columns == {
         "position": "CH 1 [mm]", "speed": "CH 2 [mm/s]", "force": "CH 3 [N]", "acceleration": "CH 4 [m/s²]",
     }  # fmt: skip
-
-
-def test_position_and_speed_are_found_without_names_and_marked(tmp_path):
-    run = stroke()
-    draft = drafted_columns(tmp_path, {"time": run.time, "uno": run.speed, "due": run.travel, "tre": run.torque})
-    assert draft.channels["position"]["column"] == "due" and draft.channels["speed"]["column"] == "uno"
-    assert draft.channels["torque"]["column"] == "tre"
-    assert all(draft.checked(name) for name in ("position", "speed", "torque"))
-
-
-def test_a_force_component_is_no_position(tmp_path):
-    run = stroke()
-    draft = drafted_columns(tmp_path, {"t": run.time, "force_x": run.force, "vel": run.speed})
-    assert "position" not in draft.channels and draft.channels["force"]["column"] == "force_x"
 
 
 def test_an_axis_at_rest_is_no_load_cell(tmp_path):
@@ -94,33 +73,11 @@ def test_a_modelled_effort_is_no_measured_one(tmp_path, name):
     assert any(name in item.columns for item in draft.done.unmapped) is ("target" not in name)
 
 
-def test_the_measured_of_two_like_names_is_the_one_behind(tmp_path):
-    run = stroke()
-    late = np.interp(run.time - 0.02, run.time, run.travel)
-    draft = drafted_columns(tmp_path, {"t": run.time, "xa pos": run.travel, "xb pos": late})
-    assert draft.channels["position"]["column"] == "xb pos" and draft.checked("position")
-    assert draft.channels["reference_position"]["column"] == "xa pos" and draft.checked("reference_position")
-
-
 def test_positions_of_different_parts_are_no_set_values_of_each_other(tmp_path):
     run = stroke()
     late = np.interp(run.time - 0.02, run.time, run.travel)
     draft = drafted_columns(tmp_path, {"t": run.time, "leaf angle": run.travel, "handle angle": late})
     assert draft.channels["position"]["column"] == "leaf angle" and "reference_position" not in draft.channels
-
-
-def test_the_other_side_of_a_gear_is_no_set_value(tmp_path):
-    run = stroke()
-    late = np.interp(run.time - 0.02, run.time, run.travel)
-    columns = {"t": run.time, "gear_position": late, "joint_position": run.travel, "joint_velocity": run.speed}
-    draft = drafted_columns(tmp_path, columns)
-    assert "reference_position" not in draft.channels
-
-
-def test_an_inertial_sensor_is_no_speed_by_its_values(tmp_path):
-    run = stroke()
-    draft = drafted_columns(tmp_path, {"t": run.time, "angle": run.travel, "trunk_imu_y": run.speed})
-    assert "speed" not in draft.channels
 
 
 @pytest.mark.parametrize(("others", "found"), [((), True), (("accy", "accz"), False)])
@@ -170,25 +127,6 @@ def test_units_are_not_derived_from_a_placeholder_clock(tmp_path):
     draft = drafted_columns(tmp_path, {"noise": irregular, "pos_counts": counts, "vel": run.speed})
     assert draft.channels["time"] == {"rate_hz": 1000.0} and draft.checked("time")
     assert draft.channels["position"]["scale"] == 1.0 and "placeholder" in draft.said("position")
-
-
-def test_fractions_of_a_second_alone_are_no_clock(tmp_path):
-    run = stroke()
-    parts = {"nanosec": np.mod(run.time, 1.0) * 1e9}
-    draft = drafted_columns(tmp_path, {**parts, "pos": run.travel, "vel": run.speed})
-    assert "column" not in draft.channels["time"] and draft.checked("time")
-
-
-def test_a_named_clock_is_taken_before_a_counter(tmp_path):
-    run = stroke()
-    draft = drafted_columns(tmp_path, {"seqno": np.arange(4000.0), "tm_ms": run.time * 1e3, "pos": run.travel})
-    assert draft.channels["time"] == {"column": "tm_ms", "unit": "ms"}
-
-
-def test_a_travel_beyond_any_machine_is_in_millimetres(tmp_path):
-    run = stroke()
-    draft = drafted_columns(tmp_path, {"t [s]": run.time, "pos": run.travel * 1e3, "vel": run.speed * 1e3})
-    assert (draft.unit("position"), draft.unit("speed")) == ("mm", "mm/s") and draft.checked("position")
 
 
 @pytest.mark.parametrize(("step", "expected"), [(1e-3, 22.0), (1e-2, 4.7)])

@@ -41,14 +41,6 @@ def test_fields_of_an_unknown_type_get_the_units_of_their_names_with_marks(tmp_p
     assert "SI" not in draft.text
 
 
-def test_units_in_the_names_of_fields_are_read_and_the_ratio_makes_them_certain(tmp_path):
-    run = stroke()
-    drive = {"motor_torque_nm": run.torque, "motor_speed_rad_s": run.speed, "motor_angle_rad": run.travel}
-    draft = drafted(write_json(tmp_path / "a.mcap", {"drive": drive}), tmp_path)
-    assert [draft.unit(name) for name in ("speed", "torque", "position")] == ["rad/s", "N m", "rad"]
-    assert draft.checked("torque") and not draft.checked("position") and not draft.checked("speed")
-
-
 @pytest.mark.parametrize(
     ("name", "known"),
     [
@@ -94,10 +86,3 @@ def test_a_force_sensor_is_never_the_torque(tmp_path):
     draft = drafted(path, tmp_path)
     assert "torque" not in draft.channels and draft.channels["force"]["field"] == "wrench.force.x"
     assert draft.channels["speed"]["topic"] == "/rpm" and draft.checked("speed")
-
-
-def test_unrecognised_topics_are_comments_in_the_file(tmp_path):
-    run = stroke()
-    path = write_json(tmp_path / "a.mcap", {"box": {"alpha": np.sin(run.time), "beta": np.sin(run.time) ** 2}})
-    draft = drafted(path, tmp_path)
-    assert not draft.done.channels and '#   topic = "box", field = "beta": ' in draft.text

@@ -42,11 +42,6 @@ def test_a_present_value_is_no_current(name):
     assert not is_current(name) and quantity_of(name) in ("position", "speed") and is_actual(name)
 
 
-@pytest.mark.parametrize("name", ["actual_current_0", "CurrentFeedback", "motor current", "Iq"])
-def test_a_motor_current_is_one(name):
-    assert is_current(name) and quantity_of(name) == "torque"
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -102,18 +97,6 @@ def test_joints_are_found_by_the_part_of_the_names_that_differs():
     assert {part[1] for part in families.values()} == {
         tuple(f"/states/{joint}/{field}" for joint in joints) for field in ("position", "effort")
     }
-
-
-def test_joints_are_found_in_names_in_mixed_case():
-    families = families_by_name(["LeftHipAngle", "RightHipAngle", "LeftHipTorque", "RightHipTorque"])
-    assert (("Left", "Right"), ("LeftHipAngle", "RightHipAngle")) in families.values()
-
-
-def test_the_joints_of_legs_are_not_the_legs():
-    legs = [f"{leg}_{part}" for leg in ("FL", "FR", "RL", "RR") for part in ("hip", "thigh", "calf")]
-    names = [f"{kind}_{joint}" for kind in ("q", "dq", "tau") for joint in legs]
-    families = families_by_name([*names, *(f"{leg}_force" for leg in ("FL", "FR", "RL", "RR"))])
-    assert families["q_#"][1] == tuple(f"q_{joint}" for joint in legs)
 
 
 @pytest.mark.parametrize(

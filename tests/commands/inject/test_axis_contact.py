@@ -18,7 +18,7 @@ from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Sensors
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
-from cdtool.recordings.recording import Recording, Series
+from cdtool.recordings.recording import Recording
 from tests.machines.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, without, without_references
 
@@ -72,18 +72,6 @@ def test_the_contact_is_where_the_log_reaches_it_to_a_fraction_of_a_sample() -> 
         later = contact.force.values[:, 0] > 0.0
         first = float(contact.force.time[np.argmax(later)])
         assert 0.0 <= first - at <= 1.1e-3
-
-
-def test_a_channel_on_a_clock_of_its_own_changes_on_that_clock() -> None:
-    free, _, _ = twins("stiff", 8)
-    rng = np.random.default_rng(0)
-    slow = 2.5e-3 * (np.arange(3200) + rng.uniform(-0.2, 0.2, 3200))
-    torque = Series(slow, np.interp(slow, free["torque"].time, free["torque"].values[:, 0]), "N")
-    mixed = replace(free, channels={**free.channels, "torque": torque})
-    injected = put(mixed, contact_in(mixed, 4.0))
-    added = injected["torque"].values[:, 0] - torque.values[: len(injected["torque"]), 0]
-    assert not np.any(added[injected["torque"].time <= 4.0])
-    assert np.max(np.abs(added)) > 20.0
 
 
 def test_missing_samples_stay_missing() -> None:

@@ -75,22 +75,6 @@ def test_positions_of_two_units_make_no_map(gate: Path) -> None:
         cdtool.coverage(path)
 
 
-def test_the_worst_contact_of_each_cell_has_a_trigger_plot(gate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Few traces are kept of the whole: the others are made.
-    for name in ("MOST_STRIKING", "MOST_SLOW", "MOST_SAMPLED"):
-        monkeypatch.setattr(f"cdtool.results.traces.choice.{name}", 2)
-    monkeypatch.setattr("cdtool.commands.inject.coverage.coverage._ALL_TRACES_KEPT", 4)
-    done = cdtool.coverage(gate / "coverage.toml", settings={"detectors": ["pi"]}, with_traces=True)
-    worst = {cell.recordings[0].recording for cells in done.map.cells.values() for cell in cells.values()}
-    assert set(done.traces) == worst
-    for cells in done.map.cells.values():
-        for cell in cells.values():
-            item = cell.recordings[0]
-            trace = done.traces[item.recording]
-            late = [panel.seen[0].late for panel in trace.panels if panel.seen[0].outcome == item.outcome]
-            assert item.is_missed or any(value == pytest.approx(1e-3 * item.latency_ms, abs=1e-6) for value in late)
-
-
 def test_logs_of_clearly_different_speed_split_the_map(gate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def by_log(speeds: Mapping[str, Sequence[float]]) -> dict[str, float | None]:
         return {log: 0.1 * (place + 1) for place, log in enumerate(speeds)}

@@ -60,13 +60,6 @@ def test_injected_contacts_are_scored_and_agree_with_the_real_ones(gate: Path) -
     assert found["momentum", "stiff"].real_count == 4
 
 
-def test_the_agreement_is_printed_after_the_verdict(gate: Path) -> None:
-    done = command("benchmark", gate / "inject.toml", "--detectors", "pi")
-    assert done.status == 0 and done.out.startswith("no limits are set")
-    line = next(line for line in done.out.splitlines() if line.startswith("pure_inertia: injected_stiff 2"))
-    assert "real (stiff) 27.5 ms, n = 8 and 4" in line
-
-
 def test_the_recordings_are_made_once_and_again_after_a_change(gate: Path) -> None:
     path = write(gate, INJECT)
     cdtool.benchmark(path)
@@ -137,15 +130,6 @@ def test_without_a_controller_there_are_two_brackets_and_no_pure_torque(gate: Pa
     assert "not tested by injected contacts" in refused[0].reason
 
 
-def test_an_unknown_accelerometer_leaves_the_acceleration_out(gate: Path) -> None:
-    without_table(gate / "model.toml", "model.sensors")
-    path = write(gate, INJECT)
-    path.write_text(path.read_text(encoding="utf-8").replace('"gm", "pt"', '"gm", "feekf"'), encoding="utf-8")
-    results = cdtool.benchmark(path).results
-    assert {row.detector for row in results.contacts} == {"momentum"}
-    assert any("bandwidth" in item.reason for item in results.skipped if item.recording == "friction_ekf")
-
-
 def test_positions_and_stiffnesses_may_be_a_grid(gate: Path) -> None:
     grid = '[inject]\nlogs = ["holdout/03.csv"]\npositions = { from = "0.4m", to = "1.0m", count = 4 }\n'
     grid += "stiffnesses_n_per_mm = { from = 5, to = 500, per_decade = 1 }\n"
@@ -192,14 +176,6 @@ def test_a_wrong_section_names_its_key(gate: Path, change: tuple[str, str], mess
     assert message in str(fault.value)
 
 
-def test_a_machine_without_mass_is_refused(gate: Path) -> None:
-    text = (gate / "model.toml").read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if not line.startswith("load_mass")]
-    (gate / "model.toml").write_text("\n".join(lines), encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="load_mass"):
-        cdtool.inject(write(gate, INJECT), gate / "out")
-
-
 def test_files_of_others_are_never_replaced(gate: Path) -> None:
     path = write(gate, INJECT)
     (gate / "injected").mkdir()
@@ -209,13 +185,6 @@ def test_files_of_others_are_never_replaced(gate: Path) -> None:
     assert (gate / "injected" / "notes.txt").read_text(encoding="utf-8") == "mine"
     with pytest.raises(UsageError, match="not an empty folder"):
         cdtool.inject(path, gate / "injected")
-
-
-def test_what_could_not_be_injected_is_counted(gate: Path) -> None:
-    path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "5m"]'))
-    skipped = [item for item in cdtool.benchmark(path).results.skipped if "never reaches 5" in item.reason]
-    assert [item.recording for item in skipped] == ["holdout/03.csv"]
-    assert command("benchmark", path).status == 3
 
 
 def test_a_folder_of_cdtool_inject_is_used_and_stays_the_users(gate: Path) -> None:
@@ -229,13 +198,6 @@ def test_a_folder_of_cdtool_inject_is_used_and_stays_the_users(gate: Path) -> No
     assert done.status == 2
     assert "holds contacts that cdtool inject made with other settings" in done.err
     assert (gate / "injected" / "mine.txt").read_text(encoding="utf-8") == "mine"
-
-
-def test_a_file_in_the_place_of_the_folder_is_one_line(gate: Path) -> None:
-    (gate / "injected").write_text("mine", encoding="utf-8")
-    done = command("benchmark", write(gate, INJECT))
-    assert done.status == 2
-    assert "holds other files" in done.err and "Traceback" not in done.err
 
 
 def test_a_dry_run_counts_the_contacts_that_are_not_made_yet_and_writes_nothing(gate: Path) -> None:

@@ -163,19 +163,6 @@ def test_the_force_is_that_of_the_obstacle_at_the_speed_of_the_point(robot: Urdf
     assert contact.force.at(np.array([1.4]))[0, 0] == 0.0
 
 
-def test_with_a_stiff_controller_the_joints_carry_the_force_and_hold_their_speed(
-    robot: UrdfRobot, recording: Recording
-) -> None:
-    soft = struck(recording, robot_model(robot, None), STIFF, stiffness=500.0)
-    _, jacobian, normal = motion_at_contact(robot, recording)
-    force = float(soft.force.at(np.array([1.45]))[0, 0])
-    expected = jacobian.T @ normal * force
-    assert np.max(np.abs(at(soft, "torque", 0.05) - expected)) < 0.1 * np.max(np.abs(expected))
-    frozen = struck(recording, robot_model(robot, None), FROZEN, stiffness=500.0)
-    slowed, held = (np.max(np.abs(at(item, "speed", 0.05))) for item in (frozen, soft))
-    assert held < 0.3 * slowed
-
-
 def test_a_known_controller_lies_between_the_brackets(robot: UrdfRobot, recording: Recording) -> None:
     gains = {"period": (0.001,) * 6, "speed_gain": (30.0,) * 6, "integral_gain": (100.0,) * 6}
     known = robot_model(robot, ModelTable({"controller": gains}))

@@ -124,14 +124,6 @@ def test_the_folder_is_a_benchmark_of_its_own_with_all_joints_changed(six: Path)
     assert command("benchmark", six / "out" / "benchmark.toml").status in (0, 3)
 
 
-def test_the_map_is_over_the_position_of_the_joint(six: Path) -> None:
-    text = INJECT.replace('["lift = 0.25rad"]', '{ from = "lift = 0.2rad", to = "lift = 0.3rad", count = 2 }')
-    made = cdtool.coverage(write(six, text), settings={"detectors": ["gm"]}).map
-    assert made.positions == (0.2, 0.3)
-    cells = made.cells["momentum"]
-    assert all(not cell.missed and cell.contacts == 2 for cell in cells.values())
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

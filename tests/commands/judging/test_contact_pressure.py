@@ -11,7 +11,6 @@ import cdtool
 from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import read_machine_file
-from cdtool.recordings.units import UNITS, find_unit
 from tests.synthetic.pressure_rig import Run, write_pressure_rig
 
 
@@ -19,15 +18,6 @@ from tests.synthetic.pressure_rig import Run, write_pressure_rig
 def rig(tmp_path) -> Path:
     write_pressure_rig(tmp_path, [Run(), Run()])
     return tmp_path
-
-
-def test_the_units_of_pressure_are_those_of_their_definitions():
-    known = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "mbar": 100.0, "bar": 1e5, "N/cm2": 1e4, "N/mm2": 1e6}
-    assert {name: UNITS[name].factor for name in known} == known
-    assert UNITS["psi"].factor == pytest.approx(6894.757293168361, rel=1e-15)
-    assert find_unit("N/cm²") == find_unit("N/cm^2") == UNITS["N/cm2"] and find_unit("N/mm²") == UNITS["MPa"]
-    assert {unit.si for name, unit in UNITS.items() if name in (*known, "psi")} == {"Pa"}
-    assert find_unit("mPa") is None  # not a megapascal
 
 
 def test_a_benchmark_is_the_same_with_and_without_it(rig):

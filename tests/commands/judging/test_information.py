@@ -52,22 +52,10 @@ def test_without_a_clock_no_rate_is_shown(tmp_path):
     assert [channel.rate_hz for channel in info.channels] == [None, None]
 
 
-def test_a_counter_named_time_does_not_hide_the_clock(tmp_path):
-    time = np.arange(100) * 0.04
-    info = cdtool.info(write(tmp_path / "a.csv", "time,timestamp,v", [np.arange(100.0), time + 5.0, np.sin(time)]))
-    assert info.channels[2].rate_hz == pytest.approx(25.0)
-
-
 @needs_data("ur3e/L0L1.csv")
 def test_the_real_clock_of_a_wide_robot_log_is_found():
     info = cdtool.info(data("ur3e/L0L1.csv"))
     assert info.channels[0].rate_hz == pytest.approx(25.0, rel=0.05)
-
-
-def test_a_log_without_a_header_has_a_clock_too():
-    info = cdtool.info(UR10E_LOGS / "no_torque.csv.gz")
-    assert info.channels[3].rate_hz == pytest.approx(100.0)
-    assert info.channels[3].duration_s == pytest.approx(5.664)
 
 
 def test_swapped_columns_of_joints_are_reported(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.base.errors import ConfigurationError
-from cdtool.base.settings import Place, read
+from cdtool.base.settings import Place
 from cdtool.commands.judging.named_logs import LogsOf, OnsetTable, labels_of, read_label_file
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 
@@ -55,10 +55,3 @@ def test_the_settings_of_the_labels_reach_the_file(tmp_path):
     labels = labels_of(of_file, logs(tmp_path), [tmp_path / "01.csv"])
     assert labels is not None and labels.kinds == ("hard",) and labels.clock == "source"
     assert labels.contacts["01.csv"][0].start == 1_743_674_400.0
-
-
-def test_an_unknown_clock_of_the_labels_is_refused():
-    place = Place("b.toml", "onset.")
-    read(OnsetTable, {"labels": "l.csv", "labels_clock": "log"}, place)
-    with pytest.raises(ConfigurationError, match=r"onset\.labels_clock: is 'log'.*recording"):
-        place.finish()

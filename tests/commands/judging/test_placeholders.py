@@ -8,7 +8,6 @@ import pytest
 from cdtool.commands.init.drafting import init
 from cdtool.commands.judging.information import info
 from tests.base.findings.facts import fact_of
-from tests.command import cdtool
 
 KINDS = ("placeholder_inertia", "placeholder_ratio", "placeholder_scale", "unchecked_lines")
 
@@ -53,19 +52,11 @@ def test_a_draft_has_warnings_with_the_speed_that_a_placeholder_causes(log, tmp_
     )
 
 
-def test_a_complete_machine_file_has_no_such_warning(log, tmp_path):
-    assert placeholders(log, machine_file(tmp_path, ratio=0.01, mass=20.0, scale=0.05)) == {}
-
-
 def test_each_placeholder_is_found_alone(log, tmp_path):
     complete = {"ratio": 0.01, "mass": 20.0, "scale": 0.05}
     for key, value, kind in (("ratio", 1.0, "placeholder_ratio"), ("mass", 0.0, "placeholder_inertia"),
                              ("scale", 1.0, "placeholder_scale")):  # fmt: skip
         assert set(placeholders(log, machine_file(tmp_path, **{**complete, key: value}))) == {kind}
-
-
-def test_a_motor_without_a_gear_may_have_the_ratio_1(log, tmp_path):
-    assert placeholders(log, machine_file(tmp_path, "rotary_axis", mass=0.2, scale=0.05)) == {}
 
 
 def test_marks_are_counted_by_key_after_the_line_and_before_it(log, tmp_path):
@@ -78,9 +69,3 @@ def test_marks_are_counted_by_key_after_the_line_and_before_it(log, tmp_path):
     assert placeholders(log, path) == {
         "unchecked_lines": ("unchecked_lines", {"count": 2, "keys": ("transmission_ratio", "load_mass")})
     }
-
-
-def test_info_shows_the_warning(log, tmp_path):
-    shown = cdtool("info", log, "-m", machine_file(tmp_path))
-    text = " ".join((shown.out + shown.err).split())
-    assert "placeholder of cdtool init: with it the load moves at 150 m/s" in text

@@ -6,17 +6,12 @@ import csv
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import cdtool
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.commands.judging.runs import find_logs
-from cdtool.formats.channels.run_reading import read_runs
-from cdtool.formats.machine_file import read_machine_file
-from cdtool.recordings.operations import RunCut
 from cdtool.results.files.results_file import to_json
-from cdtool.truth.synchronisation import latency
 from tests.command import FEW, one_line
 from tests.command import cdtool as command
 
@@ -107,18 +102,6 @@ def test_a_benchmark_of_runs_has_the_results_of_separate_files(folder, separate,
     assert {trace.recording for trace in done.traces} == {row.recording for row in done.results.recordings}
 
 
-def test_a_benchmark_by_the_clock_that_starts_again_has_the_same_results(folder, separate):
-    path = benchmark_file(folder, "reset", 'operations = "clock-reset"', "all.csv#{}")
-    for number, key in enumerate(("holdout_*", "stiff_*", "soft_*"), 3):
-        path.write_text(path.read_text().replace(f"#{key}", f"#{number}"))
-    path.write_text(path.read_text().replace("#free_*", "#[12]"))
-    assert figures(cdtool.benchmark(path).results) == figures(separate.results)
-
-
-def test_the_results_of_runs_do_not_depend_on_the_number_of_jobs(together):
-    assert to_json(cdtool.benchmark(together, jobs=3).results) == to_json(cdtool.benchmark(together).results)
-
-
 def test_a_run_that_is_learned_from_cannot_be_scored(folder, together):
     path = folder / "twice.toml"
     path.write_text(together.read_text().replace("#holdout_*", "#free_04"))
@@ -137,15 +120,6 @@ def test_a_run_that_is_named_twice_is_learned_from_once(folder, together):
     assert [(item.recording, item.reason) for item in results.skipped] == [
         ("all.csv#free_04", "given more than once, used once")
     ]
-
-
-def test_a_run_without_its_cut_and_a_folder_for_plots_are_understood(folder, tmp_path):
-    log = f"{folder / 'all.csv'}#stiff_03"
-    options = ("-m", folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
-    refused = command("detect", log, *options)
-    assert refused.status == 2 and "state how it is cut, as operations=column:NAME" in one_line(refused.err)
-    drawn = command("detect", log, *options, "--set=operations=column:run_id", "--plot", tmp_path / "plots")
-    assert drawn.status == 0 and len(list((tmp_path / "plots").iterdir())) == 1
 
 
 def test_runs_are_named_only_where_logs_are_cut_and_the_file_may_contain_the_mark(folder, tmp_path):
@@ -220,16 +194,6 @@ def test_detect_and_explain_show_each_run_by_name(folder):
     assert refused.status == 2 and "--plot names one file for 5 runs" in one_line(refused.err)
 
 
-def test_one_call_for_one_recording_refuses_several_runs(folder):
-    given = {"detector": "gm", "settings": {"threshold.limits": 400, "operations": "column:run_id"}}
-    log, machine = folder / "all.csv", folder / "machine.toml"
-    with pytest.raises(UsageError, match="has 5 runs"):
-        cdtool.detect(log, machine, **given)
-    assert len(cdtool.explain(log, machine, **given).runs) == 5
-    assert cdtool.detect(f"{log}#stiff_03", machine, **given).recording.name.endswith("#stiff_03")
-    assert len(cdtool.detect([log], machine, **given)) == 5
-
-
 def test_a_signature_learned_from_runs_knows_these_runs(folder, tmp_path):
     signature = tmp_path / "gate.json"
     learned = command(
@@ -290,22 +254,6 @@ def changed(folder: Path, name: str, operations: str, logs: str, *changes: tuple
     return path
 
 
-def both_ways(folder, *changes):
-    """Results from separate files and from runs of one file, with the same changes of the benchmark file."""
-    plain = cdtool.benchmark(changed(folder, "plain", "", "{}.csv", *changes))
-    cut = cdtool.benchmark(changed(folder, "cut", 'operations = "column:run_id"', "all.csv#{}", *changes))
-    return plain.results, cut.results
-
-
-@pytest.mark.parametrize("part", ['to = "5s"', 'from = "0.5s"\nto = "0.6m"'])
-def test_parts_of_runs_that_are_learned_from_are_those_of_separate_files(folder, part):
-    plain, cut = both_ways(folder, ("[learn]", f"[learn]\n{part}"))
-    assert figures(cut) == figures(plain)
-    assert (
-        list(cut.provenance["learned_sections"].values()) == 1 * list(plain.provenance["learned_sections"].values())[:1]
-    )
-
-
 def test_runs_are_learned_from_until_their_onset_and_scored_without_their_own_part(folder):
     until = (
         ("[learn]", '[signature]\nforce = true\n[learn]\nuntil = "onset"'),
@@ -332,21 +280,6 @@ def test_runs_are_learned_from_until_their_onset_and_scored_without_their_own_pa
     assert other.provenance["scored_without_own_part"] == list(patterns)
     cut.write_text(named.replace('"all.csv#stiff_*", "all.csv#soft_*", "all.csv#free_*"', '"all.csv#[fs]*"'))
     assert figures(cdtool.benchmark(cut).results) == figures(one), "other patterns name the same runs"
-
-
-def test_the_synchronisation_is_measured_on_runs_as_on_files(folder, monkeypatch):
-    monkeypatch.setattr(latency, "LEAST_CONTACTS", 2)  # the folder has no more
-    monkeypatch.setattr(latency, "_WIDEST_OFFSET", 1.0)
-    plain, cut = both_ways(folder, ("above_n = 20.0", 'above_n = 20.0\nsynchronisation = "measured"'))
-    assert figures(cut) == figures(plain)
-    early = 'to = "3s"\nlogs = '
-    with pytest.raises(ConfigurationError, match="measured, but not assessable"):
-        both_ways(
-            folder,
-            ("above_n = 20.0", 'above_n = 20.0\nsynchronisation = "measured"'),
-            ("[impacts.stiff]\nlogs = ", f"[impacts.stiff]\n{early}"),
-            ("[impacts.soft]\nlogs = ", f"[impacts.soft]\n{early}"),
-        )
 
 
 def test_a_load_cell_in_a_file_of_its_own_cannot_be_divided_into_runs(folder):
@@ -379,19 +312,3 @@ def test_a_label_may_be_about_a_run_of_a_file_that_is_only_learned_from(folder):
     )
     done = cdtool.benchmark(path).results
     assert [item.recording for item in done.skipped if "shows a contact" in item.reason] == ["learned.csv#free_03"]
-
-
-@pytest.mark.parametrize("word", ["None", "null", "free"])
-def test_a_word_for_no_value_is_a_label_like_any_other(tmp_path, word):
-    rows = [f"{0.01 * i:.2f},{np.sin(0.05 * i):.5f},{word if (i // 100) % 2 == 0 else 'stroke'}" for i in range(600)]
-    log = tmp_path / "labelled.csv"
-    log.write_text("t,v,phase\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    machine = tmp_path / "m.toml"
-    machine.write_text(
-        '[machine]\ntype = "rotary_axis"\nname = "a"\ncoordinates = "load"\nload_inertia = 1.0\n'
-        '[channels]\ntime = { column = "t", unit = "s" }\n'
-        'speed = { column = "v", unit = "rad/s" }\n',
-        encoding="utf-8",
-    )
-    found = read_runs(log, read_machine_file(machine), RunCut.of("label:phase"))
-    assert len(found.runs) + len(found.left_out) == 6

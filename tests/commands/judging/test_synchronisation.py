@@ -47,10 +47,6 @@ def test_the_filter_of_the_simulated_speed_is_found_as_its_latency():
     assert found["low"] <= true <= found["high"] and found["offset"] == pytest.approx(true, abs=1e-4)
 
 
-def test_a_log_without_a_contact_says_nothing_about_its_load_cell():
-    assert not any(item.channel == "force" and "latency" in item.message for item in survey("free/03.csv").findings)
-
-
 def test_what_is_not_assessable_has_a_reason():
     facts = [fact_of(item) for item in survey("stiff/03.csv").findings if item.kind == "shift_not_assessable"]
     assert facts and all(fact.numbers["reason"] for fact in facts)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -68,12 +67,6 @@ def test_the_file_holds_the_classes_and_the_option(door, learned, capsys):
     assert "between learned speeds: backward at 0.2 m/s to 0.3 m/s" in shown
 
 
-def test_a_budget_sets_the_factor_of_all_classes(door):
-    forced = replace(RULE, force=True)
-    made = learn(door, "slow", "fast", rule=forced, false_alarm_budget="1/20op").signature
-    assert made.origin.by == "budget" and len({item.safety_factor for item in made.current}) == 1
-
-
 def test_a_single_speed_is_reported_once_for_each_direction(door):
     findings = learn(door, "slow").findings
     assert [item.kind for item in findings] == ["single_speed"] * 2
@@ -106,20 +99,6 @@ def test_a_run_between_the_classes_teaches_none_of_them(door, learned):
     )
     assert all("no signature for its class" in item.reason for item in done.refused if "near" in item.recording)
     assert len(done.added) == 3 and all("slow" in name for name in done.added)
-
-
-def test_a_check_says_that_a_run_lies_between_the_learned_speeds(door, learned):
-    write_log(door / "between.csv", 2, {}, 20, 0.25)
-    write_signature(door / "checked.json", learned.signature)
-    logs = [door / "slow.csv", door / "between.csv"]
-    skipped = cdtool.check_signature(door / "checked.json", logs, door / "machine.toml").skipped
-    between = [item.reason for item in skipped if "between" in item.recording]
-    assert between and all("between learned speeds: only runs at a learned speed" in reason for reason in between)
-    write_log(door / "beyond.csv", 2, {}, 20, 0.4)
-    logs = [door / "slow.csv", door / "beyond.csv"]
-    skipped = cdtool.check_signature(door / "checked.json", logs, door / "machine.toml").skipped
-    beyond = [item.reason for item in skipped if "beyond" in item.recording]
-    assert beyond and all("no signature for its class" in reason for reason in beyond)
 
 
 def test_contacts_and_false_alarms_of_a_log_cut_into_strokes_have_its_name(door):

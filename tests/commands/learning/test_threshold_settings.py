@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 import cdtool
-from cdtool.alarms.activation import Activation
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.formats.signature_store import write_signature
-from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.cusum import Cusum
-from cdtool.thresholds.glr import Glr
-from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
 from tests.synthetic.door import MACHINE, write_log
@@ -70,13 +65,6 @@ def test_a_budget_sets_the_factor_of_each_class_alike(door):
     assert all(row.outcome == "detected" for row in done.results.contacts)
 
 
-def test_a_table_has_the_rules_own_settings(door):
-    rule = read_benchmark_file(written(door, '[threshold]\nname = "glr"\nwindows = [8, 64]\nsafety_factor = 7\n')).rule
-    assert isinstance(rule, Glr) and rule.windows == (8, 64) and rule.safety_factor == 7.0 and rule.sides == "one"
-    rule = read_benchmark_file(written(door, '[threshold]\nname = "innovation"\norder = 6\nsides = "two"\n')).rule
-    assert isinstance(rule, Innovation) and rule.order == 6 and rule.sides == "two"
-
-
 def test_what_the_signature_learns_is_set_in_its_own_table(door):
     file = written(door, '[threshold]\nname = "cusum"\n[signature]\nposition_step = 0.01\nalignment = "position"\n')
     rule = read_benchmark_file(file).rule
@@ -93,21 +81,6 @@ def test_limits_set_by_hand_replace_learned_ones_and_results_state_it(door):
     learned = cdtool.benchmark(written(door, '[threshold]\nname = "limit"\n')).results
     assert learned.provenance["safety_factor_set"] == "by default"
     assert 50.0 not in {row.limit for row in learned.contacts}
-
-
-def test_results_state_the_unit_of_the_statistic(door):
-    units = cdtool.benchmark(written(door, 'threshold = "cusum"\n')).results.provenance["units"]
-    assert units == {"momentum": "1"}
-    units = cdtool.benchmark(written(door, 'threshold = "trend"\n')).results.provenance["units"]
-    assert units == {"momentum": "N/s"}
-
-
-def test_the_activation_has_a_table_of_its_own(door):
-    text = "[activation]\ndebounce = 4\nrearm_s = 0.3\nhysteresis = 0.2\nlatch = true\n"
-    setup = read_benchmark_file(written(door, text))
-    assert setup.activation == Activation(4, 0.3, 0.2, True)
-    provenance = cdtool.benchmark(setup).results.provenance
-    assert [provenance[key] for key in ("debounce_samples", "rearm_s", "hysteresis", "latch")] == [4, 0.3, 0.2, True]
 
 
 def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
@@ -155,30 +128,6 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
 def test_a_wrong_threshold_is_one_line_that_names_its_key(door, text, said):
     with pytest.raises(ConfigurationError, match=said):
         read_benchmark_file(written(door, text))
-
-
-@dataclass(frozen=True)
-class InnovationOfAnyOrder(Innovation):
-    """As a plug-in may write it: a number that may be left out."""
-
-    order: int | None = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        """Accept every order."""
-
-
-def test_a_number_may_be_given_where_none_is_the_default(monkeypatch, door):
-    monkeypatch.setitem(THRESHOLDS.table, "innovation", f"{__name__}:InnovationOfAnyOrder")
-    file = written(door, '[threshold]\nname = "innovation"\n')
-    rule = read_benchmark_file(file, settings={"threshold.order": 10}).rule
-    assert isinstance(rule, InnovationOfAnyOrder) and rule.order == 10
-    with pytest.raises(ConfigurationError, match=r"--set threshold\.order: is 'ten'"):
-        read_benchmark_file(file, settings={"threshold.order": "ten"})
-
-
-def test_a_signature_may_follow_its_runs(door):
-    rule = read_benchmark_file(written(door, "[signature]\nadaptive_level = 6\n")).rule
-    assert isinstance(rule, Signature) and rule.adaptive_level == 6.0
 
 
 def test_limits_set_by_hand_belong_to_one_detector_and_to_no_budget(door):

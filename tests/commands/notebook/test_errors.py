@@ -22,10 +22,6 @@ def test_an_error_is_shown_with_the_line_of_the_caller_and_a_next_step_and_witho
     assert lines[2] == "next step: check the path"
 
 
-def test_an_error_that_was_not_raised_and_has_no_hint_is_shown_as_one_line():
-    assert cdtool.CdtoolError("the drive is broken")._render_traceback_() == ["CdtoolError: the drive is broken"]
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -41,8 +37,3 @@ def test_an_error_that_was_not_raised_and_has_no_hint_is_shown_as_one_line():
 )
 def test_a_list_that_is_empty_or_is_no_list_is_refused_with_what_to_give(call, words):
     assert words in "\n".join(shown(call))
-
-
-def test_one_channel_of_a_recording_is_a_frame_of_one_column():
-    recording = cdtool.read(LOG, MACHINE)
-    assert recording.to_frame("speed").equals(recording.to_frame(["speed"]))

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
@@ -14,18 +11,7 @@ import cdtool
 from cdtool.base.errors import UsageError
 from tests.commands.notebook.values import GATE, LOG, MACHINE
 
-ROOT = Path(__file__).parents[3]
 PNG = b"\x89PNG"
-CHILD = """
-import sys
-import cdtool
-result = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
-figures = [getattr(result.plot, name)() for name in ("latency", "survival", "amoc", "triggers")]
-figures.append(cdtool.detect("sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml", detector="gm",
-    settings={"threshold.limits": 400.0}).plot())
-assert all(figure._repr_png_()[0].startswith(b"\\x89PNG") for figure in figures)
-print("matplotlib.pyplot" in sys.modules)
-"""
 
 
 @pytest.fixture(scope="module")
@@ -45,12 +31,6 @@ def test_a_figure_shows_itself_with_a_description(result, name):
 def test_a_picture_in_a_notebook_is_that_of_the_report(result, tmp_path):
     result.save(tmp_path / "latency.png")
     assert result.plot.latency()._repr_png_()[0] == (tmp_path / "latency.png").read_bytes()
-
-
-def test_no_figure_needs_pyplot():
-    done = subprocess.run([sys.executable, "-c", CHILD], capture_output=True, text=True, check=False, cwd=ROOT)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["False"]
 
 
 def test_the_triggers_of_a_recording_or_group_are_chosen(result):

@@ -63,18 +63,6 @@ def test_the_columns_are_typed_and_hold_the_values_of_the_rows(result):
         assert shown == [getattr(row, name) for row in rows], name
 
 
-def test_detectors_and_groups_are_in_the_order_of_the_benchmark_file(result):
-    assert result.contacts.detector.cat.categories.tolist() == list(result.results.detectors)
-    assert result.contacts.group.cat.categories.tolist() == ["stiff", "soft", "holdout"]
-    medians = result.contacts.groupby(["group", "detector"], observed=True).latency_ms.median()
-    assert medians.index.tolist()[0] == ("stiff", result.results.detectors[0])
-
-
-def test_a_frame_is_made_once(result):
-    assert result.contacts is result.contacts
-    assert result.frame("contacts") is not result.contacts
-
-
 def test_the_summary_has_the_metrics_of_the_limits(result):
     summary = result.summary()
     assert set(summary.columns) == set(FIGURES) and summary.index.names == ["group", "detector"]
@@ -125,14 +113,6 @@ def test_the_signal_becomes_a_frame_with_its_limits(found):
     valid = frame[frame["gate status"] == "VALID"]
     outside = valid[valid["gate statistic"] > valid["gate upper"]]
     assert 0.0 <= found.alarms.time_s[0] - outside.index[0] < 0.05
-
-
-def test_a_log_without_alarm_or_contact_has_empty_frames_with_all_columns(found):
-    quiet = cdtool.detect(GATE / "holdout" / "03.csv", MACHINE, detector="momentum", settings={"threshold.limits": 1e6})
-    assert quiet.outcome == "no alarm" and len(quiet.alarms) == len(quiet.contacts) == 0
-    for name in ("alarms", "contacts"):
-        full, empty = getattr(found, name), getattr(quiet, name)
-        assert full.dtypes.astype(str).to_dict() == empty.dtypes.astype(str).to_dict()
 
 
 def test_detect_takes_one_log_or_many_and_lists_what_cannot_be_read(tmp_path):

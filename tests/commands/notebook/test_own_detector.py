@@ -45,13 +45,6 @@ def test_a_detector_of_ones_own_is_learned_and_detects():
     assert found.contacts.alarm_s.tolist() == same.contacts.alarm_s.tolist()
 
 
-def test_a_detector_with_other_gains_needs_a_signature_of_its_own():
-    learned = cdtool.learn_signature(FREE, MACHINE, Momentum(bandwidth=40.0))
-    assert cdtool.detect(LOG, MACHINE, signature=learned, detector=Momentum(bandwidth=40.0)).outcome == "alarm"
-    with pytest.raises(cdtool.CdtoolError, match=r"learned with bandwidth = 40\.0"):
-        cdtool.detect(LOG, MACHINE, signature=learned, detector=Momentum())
-
-
 def test_a_detector_that_violates_the_contract_is_refused_in_one_line():
     class Nothing:
         name = "nothing"

@@ -180,15 +180,6 @@ def test_a_trigger_shortly_before_the_contact_and_an_offset_of_the_cell_are_no_s
     assert kinds(cdtool.protocol(write_protocol(tmp_path))) == []
 
 
-def test_a_point_without_a_profile_has_one_reason_the_true_one(tmp_path):
-    write_rig(tmp_path, FORCES)
-    path = write_protocol(tmp_path)
-    path.write_text(path.read_text(encoding="utf-8").replace('profile = "en_', '# "'), encoding="utf-8")
-    assert kinds(cdtool.protocol(path)) == kinds_of(check_protocol(path).verdict) == ["no_profile"]
-    path.write_text(path.read_text(encoding="utf-8").replace("repetitions = 3", "repetitions = 4"), encoding="utf-8")
-    assert kinds(cdtool.protocol(path)) == ["no_profile", "too_few_repetitions"]
-
-
 def test_rows_that_the_reader_drops_are_never_a_pass(tmp_path):
     write_rig(tmp_path, (*FORCES, half_sine(900.0)))
     header, rest = (tmp_path / "edge" / "04.csv").read_text(encoding="utf-8").split("\n", 1)

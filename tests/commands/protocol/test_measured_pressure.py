@@ -47,12 +47,6 @@ def test_a_pressure_in_every_unit_is_the_same_peak(tmp_path, unit, scale):
     assert item.peak == pytest.approx(100.0, abs=0.5) and item.late_peak == pytest.approx(0.0, abs=0.5)
 
 
-def test_a_unit_of_another_quantity_is_refused_with_the_known_ones(tmp_path):
-    with pytest.raises(ConfigurationError, match="'N' does not measure contact_pressure") as fault:
-        made(tmp_path, Run(), unit="N")
-    assert "Pa" in fault.value.hint
-
-
 @pytest.mark.parametrize(
     ("pressure", "outcome", "kinds"),
     [
@@ -83,26 +77,6 @@ def test_a_limited_pressure_that_was_not_measured_is_never_a_pass(tmp_path):
     assert protocol.verdict.reasons[0].values["missing"] == 2
     assert "pressure not measured in 2 of 2 repetitions" in words_of("en").reasons(protocol.verdict, "incomplete")[0]
     assert result(made(tmp_path / "one", Run(), Run(None)))[1] == ["pressure_not_measured"]
-
-
-def test_a_point_may_say_why_and_the_reason_is_a_deviation(tmp_path):
-    reason = 'pressure_not_applicable = "<flat> pad of 50 cm2"'
-    protocol = made(tmp_path, Run(None), point=reason, instrument=False)
-    assert result(protocol) == ("pass", [])
-    page = page_of(protocol)
-    places = [page.index(text) for text in ("Deviations and exclusions", "edge: pressure not measured", "&lt;flat&gt;")]
-    assert places == sorted(places)
-    mark = 'pressure_not_applicable = "FILL IN: why"'
-    assert result(made(tmp_path / "mark", Run(None), point=mark)) == ("incomplete", ["pressure_not_measured"])
-    # It excuses a measurement that is missing, not one above the limit.
-    assert result(made(tmp_path / "fail", Run(half_sine(300.0)), point=reason))[0] == "fail"
-
-
-def test_a_profile_without_pressure_limits_shows_the_pressure_and_says_so(tmp_path):
-    runs = [Run(half_sine(900.0), half_sine(200.0))] * 3
-    protocol = made(tmp_path, *runs, profile="en_12453_wide_gap", instrument=False)
-    assert [kind for kind in result(protocol)[1] if "pressure" in kind] == []
-    assert "the profile en_12453_wide_gap does not limit the pressure" in page_of(protocol)
 
 
 def test_both_peaks_are_compared_and_a_difference_is_a_deviation(tmp_path):

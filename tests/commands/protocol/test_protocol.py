@@ -90,22 +90,6 @@ def force_rig(tmp_path, monkeypatch) -> list[Path]:
     return sorted(Path("edge").iterdir())
 
 
-def test_a_rig_that_has_only_a_force_needs_five_commands_each_named_by_the_one_before(force_rig, tmp_path):
-    first = cdtool("init", *force_rig, "-o", "study")
-    info, draft = commands(first)
-    assert (info[0], draft[:2]) == ("info", ["protocol", "init"])  # no benchmark: there is nothing to score
-    (check,) = commands(cdtool(*draft))
-    incomplete = cdtool(*check)
-    assert (incomplete.status, commands(incomplete)[0][:2]) == (4, ["protocol", "write"])
-    fill_in(tmp_path / "study" / "protocol.toml")
-    (write,) = commands(cdtool(*check))
-    assert write[:2] == ["protocol", "write"]
-    made = cdtool(*write[:-1], "protocol.html")
-    assert made.status == 0 and "protocol: pass" in made.out, made.out + made.err
-    nothing = cdtool("protocol", "write", "study/protocol.toml")
-    assert nothing.status == 2 and "-o protocol.pdf" in nothing.err
-
-
 def test_a_benchmark_without_detectors_takes_those_of_the_option_and_else_names_the_protocol(rig, tmp_path):
     path = rig / "without.toml"
     path.write_text((rig / "benchmark.toml").read_text(encoding="utf-8").replace('["gm"]', "[]"), encoding="utf-8")
@@ -208,27 +192,6 @@ def test_without_typst_a_pdf_is_refused_before_the_benchmark_runs(rig, tmp_path,
     made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "protocol.pdf")
     assert made.status == 2 and made.out == ""
     assert "pip install '.[pdf]'" in made.err and len(made.err.splitlines()) == 1
-
-
-def test_a_pdf_has_every_number_of_the_results_that_the_protocol_shows(rig, tmp_path):
-    pytest.importorskip("typst", reason="needs the extra pdf")
-    pypdf = pytest.importorskip("pypdf")
-    benchmark = rig / "with_force.toml"
-    text = (rig / "benchmark.toml").read_text(encoding="utf-8")
-    benchmark.write_text(text + '[force]\nprofile = "en_12453_reducing_gap"\n', encoding="utf-8")
-    path = rig / "with_force_protocol.toml"
-    written = write_protocol(rig).read_text(encoding="utf-8")
-    path.write_text(written.replace('"benchmark.toml"', '"with_force.toml"'), encoding="utf-8")
-    targets = ("-o", tmp_path / "protocol.pdf", "-o", tmp_path / "results.json")
-    assert cdtool("benchmark", benchmark, "-p", path, *targets).status == 0
-    shown = "".join(page.extract_text() for page in pypdf.PdfReader(tmp_path / "protocol.pdf").pages)
-    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
-    numbers = [step["peak_n"] for row in results["forces"] for step in row["steps"]]
-    numbers += [row["latency_ms"] for row in results["contacts"]]
-    words = re.findall(r"[\d.]+", shown)
-    assert len(numbers) == 12
-    assert [value for value in numbers if f"{value:.4g}" not in words] == []
-    assert all(row["sha256"] in shown for row in results["recordings"])
 
 
 def test_a_protocol_file_names_the_key_of_a_missing_file_and_is_no_benchmark_for_a_table_machine(tmp_path):

@@ -6,15 +6,11 @@ import csv
 import json
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pytest
 
-from cdtool.formats.labels.trigger_file import read_triggers
 from tests.command import Outcome, cdtool, one_line
-from tests.report.hostile import HOSTILE
 
-ROOT = Path(__file__).parents[3]
 QUIET = "holdout/01.csv,,plc,\nholdout/02.csv,,plc,\n"
 
 
@@ -125,13 +121,6 @@ def test_an_unassessable_section_over_a_contact_shortens_the_exposure(logs, meas
     assert next(row for row in part["contacts"] if row["recording"] == "stiff/01.csv")["outcome"] == "missed"
 
 
-def test_a_recording_without_assessable_time_is_not_assessable_with_a_reason(logs, measured):
-    rows = "stiff/01.csv,0,plc,100\nstiff/02.csv,0,plc,100\n"
-    values, _ = scored(logs, rows, "--set=triggers.listed_only=true", status=3)
-    assert {row["outcome"] for row in values["contacts"]} == {"not_assessable"}
-    assert {row["reason"] for row in values["contacts"]} == {"stated in the trigger file"}
-
-
 def test_listed_only_leaves_recordings_out_detector_by_detector(logs, measured):
     at = onsets(measured)
     rows = f"stiff/01.csv,{at['stiff/01.csv'] + 0.04},plc,\nstiff/02.csv,{at['stiff/02.csv'] + 0.04},plc,\n"
@@ -175,12 +164,6 @@ def test_triggers_on_the_source_clock_are_converted_and_a_wrong_clock_is_reporte
     assert [item["recording"] for item in wrong["skipped"]] == ["stiff/01.csv", "soft/01.csv"]
 
 
-def test_trigger_times_in_ms_are_named(logs, measured):
-    rows = "".join(f"{name},{1e3 * (onset + 0.045):.0f},plc,\n" for name, onset in onsets(measured).items())
-    _, err = scored(logs, rows + QUIET, status=3)
-    assert "are the times in ms? time_s is in seconds" in err and "triggers.clock" not in err
-
-
 def test_rows_of_recordings_that_are_not_scored_are_a_note(logs, measured):
     """Without a row about a scored recording, all of them would count as monitored without an alarm."""
     done = score(logs, after(measured, 0.05) + "stiff/99.csv,1.0,plc,\nfree/01.csv,2.0,plc,\n")
@@ -188,28 +171,6 @@ def test_rows_of_recordings_that_are_not_scored_are_a_note(logs, measured):
     assert "not scored are not used: free/01.csv, stiff/99.csv" in one_line(done.err) and "left out" not in done.err
     done = score(logs, "stiff/99.csv,1.0,plc,\n")
     assert done.status == 2 and "no row is about a scored recording: stiff/99.csv" in one_line(done.err)
-
-
-@pytest.mark.parametrize(
-    ("separator", "mark", "encoding"),
-    [(";", ",", "utf-8"), (";", ",", "utf-8-sig"), ("\t", ",", "utf-16"), ("\t", ".", "utf-8"), (";", ".", "cp1252")],
-)
-def test_a_trigger_file_may_be_written_like_a_log(logs, measured, separator, mark, encoding):
-    """As an office program in German or French saves it, compared with commas and points."""
-    usual = "recording,time_s,detector,blind_until_s\n" + after(measured, 0.05)
-    (logs / "usual.csv").write_text(usual, encoding="utf-8")
-    cells = [
-        [cell.replace(".", mark) if i == 1 else cell for i, cell in enumerate(row.split(","))]
-        for row in usual.split("\n")
-    ]
-    (logs / "saved.csv").write_text("\r\n".join(map(separator.join, cells)), encoding=encoding, newline="")
-    assert read_triggers(logs / "saved.csv").rows == read_triggers(logs / "usual.csv").rows
-
-
-def test_a_file_name_that_fits_two_recordings_is_refused(logs, measured):
-    done = score(logs, "01.csv,1.0,plc,\n")
-    assert done.status == 2 and done.out == "" and done.err.count("\n") == 1
-    assert "'01.csv' fits holdout/01.csv, soft/01.csv, stiff/01.csv" in done.err
 
 
 @pytest.mark.parametrize(
@@ -260,45 +221,3 @@ def test_limits_apply_to_external_triggers(logs, measured, tmp_path):
     assert kept.status == 0 and kept.out.startswith("all 3 limits are met\n")
     slow = score(folder, after(measured, 0.07) + "stiff/99.csv,1.0,plc,\n")
     assert slow.status == 1 and "limit violated: plc.stiff.p95_ms: 70 is more than 60" in slow.out
-
-
-def test_the_example_gives_the_lines_of_its_page():
-    examples = ROOT / "docs" / "examples"
-    page = (ROOT / "docs" / "own-detector.md").read_text(encoding="utf-8")
-    assert (examples / "triggers.csv").read_text(encoding="utf-8") in page
-    done = cdtool("score", examples / "triggers.csv", "-b", ROOT / "sample_logs" / "gate" / "benchmark.toml")
-    assert done.status == 1 and done.out.startswith("4 of 9 limits not met (4 violated)")
-    shown = [line for line in page.splitlines() if line.split()[1:2] == ["plc"]]
-    assert len(shown) == 3 and set(shown) <= {line.rstrip() for line in done.out.splitlines()}
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_hostile_names_stay_text_in_the_terminal_and_in_every_report(logs, measured, kind, tmp_path):
-    name = HOSTILE[kind].replace("\ud800", "").strip() or "x"  # UTF-8 files cannot contain a surrogate
-    path = tmp_path / "triggers.csv"
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(["recording", "time_s", "detector"])
-        for recording, onset in onsets(measured).items():
-            writer.writerow([recording, onset + 0.05, name])
-        writer.writerow([name, 1.0, name])
-    targets = [tmp_path / f"r.{suffix}" for suffix in ("json", "csv", "xml", "html", "md")]
-    outputs = [word for target in targets for word in ("-o", target)]
-    done = cdtool("score", path, "-b", logs / "benchmark.toml", *outputs)
-    assert done.status == 0 and "Traceback" not in done.err, done.err
-    assert not set(done.out + done.err) & set("\x1b\x00\u202e\u2067\r")
-    assert json.loads(targets[0].read_text(encoding="utf-8"))["detectors"] == [name]
-    ElementTree.parse(targets[2])
-    assert "<script>alert" not in targets[3].read_text(encoding="utf-8")
-    assert sorted(item.name for item in tmp_path.iterdir()) == sorted(
-        [path.name, *(target.name for target in targets), "r.traces.json.gz"]
-    )
-
-
-def test_triggers_have_no_threshold_value_or_limit(logs, measured, tmp_path):
-    report = tmp_path / "score.html"
-    values, _ = scored(logs, after(measured, 0.05) + "holdout/01.csv,2.0,plc,\n", "-o", report)
-    rows = [*values["contacts"], *values["false_alarms"]]
-    assert len(rows) == 5 and {row["outcome"] for row in values["contacts"]} == {"detected"}
-    assert {(row["side"], row["statistic"], row["limit"]) for row in rows} == {(None, None, None)}
-    assert "above" not in report.read_text(encoding="utf-8").partition("holdout/01.csv")[2][:600]

@@ -10,9 +10,7 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import ConfigurationError, MistakesError, UsageError
-from cdtool.commands.detecting.prepared_benchmark import prepare_benchmark
 from cdtool.commands.scoring.benchmark import benchmark
-from cdtool.formats.machine_file import read_machine_file
 from cdtool.results.files.results_file import read_results, to_json
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["feekf", "gm"]\n'
@@ -55,12 +53,6 @@ def test_a_label_file_replaces_the_load_cell(gate):
     for ours, theirs in zip(labelled.results.contacts, plain.results.contacts, strict=True):
         assert (ours.kind, ours.found_by) == ("head", "label file")
         assert ours.latency_ms == pytest.approx(theirs.latency_ms + 10.0, abs=1e-6)
-
-
-def test_a_label_that_fits_recordings_of_two_groups_is_refused(gate):
-    (gate / "both.csv").write_text("recording,start_s,end_s\n01.csv,6.0,6.2\n", encoding="utf-8")
-    with pytest.raises(ConfigurationError, match=r"both\.csv: '01\.csv' fits holdout/01\.csv, stiff/01\.csv"):
-        run(gate, HEAD, LEARN, ONSET, 'labels = "both.csv"\n', STIFF, HOLDOUT)
 
 
 def test_limits_on_detectors_that_are_not_run_are_reported_and_not_checked(gate):
@@ -176,16 +168,6 @@ def test_each_run_of_a_budget_is_tested_with_thresholds_of_the_others(gate, monk
     assert len(taught) == 24 and not any(judged & learned for judged, learned in taught)
 
 
-def test_a_budget_does_not_depend_on_the_order_of_the_files(gate):
-    names = [f"free/{number:02d}.csv" for number in range(1, 13)]
-    factors = []
-    for ordered in (names, names[::-1], names[5:] + names[:5]):
-        learn = f"[learn]\nlogs = {ordered}\n".replace("'", '"')
-        done = run(gate, 'false_alarm_budget = "1/4op"\n', HEAD, learn, ONSET, STIFF)
-        factors.append([item.safety_factor for item in done.results.calibration])
-    assert factors[0] == factors[1] == factors[2]
-
-
 def test_identical_files_under_two_names_are_not_scored_twice(gate):
     shutil.copy(gate / "stiff" / "01.csv", gate / "twice.csv")
     with pytest.raises(ConfigurationError, match=r"twice\.csv and stiff/01\.csv have identical content"):
@@ -203,27 +185,6 @@ def test_the_force_of_a_contact_ends_where_the_next_begins(gate):
     labelled = run(gate, HEAD, LEARN, ONSET, 'labels = "two.csv"\n', STIFF)
     peaks = [row.peak_force_n for row in labelled.results.contacts if row.recording == first.recording][:2]
     assert peaks[0] < 50.0 < 1000.0 < peaks[1]
-
-
-def test_detectors_may_be_given_only_on_the_command_line(gate):
-    head = 'machine = "machine.toml"\n'
-    with pytest.raises(ConfigurationError, match="detectors: is missing"):
-        run(gate, head, LEARN, ONSET, STIFF)
-    limit = '[limits]\n"gm.stiff.missed" = { max = 0 }\n'
-    done = run(gate, head, LEARN, ONSET, STIFF, limit, detectors=("gm", "pi"))
-    assert done.results.detectors[0] == "momentum" and len(done.results.detectors) == 2
-    assert [item.outcome for item in done.results.limits] == ["met"]
-    assert "momentum" in run(gate, head, LEARN, ONSET, STIFF, detectors=("all",)).results.detectors
-    assert prepare_benchmark(gate / "b.toml", detector="gm").detector == "momentum"
-
-
-@pytest.mark.parametrize("made", ['operations = "motion"\n[machine]\n', '[machine]\noperations = "motion"\n'])
-def test_operations_in_a_machine_file_get_a_hint_where_they_belong(gate, made):
-    text = (gate / "machine.toml").read_text(encoding="utf-8")
-    (gate / "cut.toml").write_text(text.replace("[machine]\n", made), encoding="utf-8")
-    with pytest.raises(ConfigurationError, match=r"operations: is a key of the benchmark file") as fault:
-        read_machine_file(gate / "cut.toml")
-    assert "--set operations=motion" in fault.value.hint
 
 
 def test_a_missing_machine_file_hides_no_other_mistake(gate):

@@ -11,13 +11,9 @@ import pytest
 import cdtool
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.commands.scoring.dry_run import dry_run
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.tune.tuned_files import _rebase
-from cdtool.execution.store.store import Store
 from cdtool.results.changed_conditions import condition_rows
-from cdtool.results.files.results_file import to_json
-from tests.bits import every_value
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["gm", "pt"]\n'
 TABLES = """[learn]
@@ -96,16 +92,6 @@ def test_a_group_has_the_window_of_its_counterpart_and_a_section_of_its_own(read
     assert setup.impacts[FREE].is_impact_free and setup.scoring["window_s"] == {"stiff": 0.8}
     assert {str(setup.sections[path]) for path in setup.impacts[STRUCK].logs} == {"from 0.5 s"}
     assert setup.inputs and set(setup.impacts[FREE].logs) < set(setup.inputs)
-
-
-def test_the_store_has_them(gate, tmp_path):
-    file, store = write(gate, WINTER), Store(tmp_path / "store")
-    first = cdtool.benchmark(file, store=store)
-    assert dry_run(file, store=store).logs == ()
-    again = cdtool.benchmark(file, store=store)
-    assert again.stored is not None and again.stored.computed == 0
-    assert to_json(again.results) == to_json(first.results)
-    assert every_value(again.evaluated.conditions) == every_value(first.evaluated.conditions)
 
 
 @pytest.mark.parametrize(

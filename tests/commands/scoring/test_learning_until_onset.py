@@ -12,7 +12,6 @@ from cdtool.commands.judging.runs import load_runs
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog, learn_thresholds
-from cdtool.results.files.results_file import to_json
 from cdtool.results.results import Results
 from tests.command import cdtool as command
 from tests.command import one_line
@@ -108,11 +107,6 @@ def test_the_limits_of_a_log_are_those_learned_from_the_others_alone(gate):
     assert own["momentum"] == alone.thresholds["momentum"]
 
 
-@pytest.mark.parametrize("jobs", [2, 3])
-def test_the_results_do_not_depend_on_the_number_of_jobs(setup, results, jobs):
-    assert to_json(results) == to_json(benchmark(setup, jobs=jobs).results)
-
-
 def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate, results, prepared):
     rows = {row.recording: row.latency_ms for row in results.contacts}
     for log in sorted(gate.glob("s*/*.csv")):
@@ -149,11 +143,6 @@ def test_sections_limit_what_is_learned_and_what_is_scored(gate):
     assert seconds["stiff/01.csv"] > 6.0
     assert done.provenance["sections"]["stiff/03.csv"] == "from 1 s to 6.9 s"
     assert done.provenance["learned_sections"]["soft/01.csv"] == "from 0.5 s to 0.5 m of travel"
-
-
-def test_logs_that_are_cut_into_strokes_are_scored_without_their_own_strokes(gate):
-    done = benchmark(setup_of(gate, HEAD, 'operations = "motion"\n', LEARN, ONSET, GROUPS)).results
-    assert [row.outcome for row in done.contacts] == ["detected"] * 7 and not done.false_alarms
 
 
 def changed_copy(gate, folder, column, change):

@@ -18,11 +18,6 @@ def rule(**values: object) -> OnsetRule:
     return found.rule
 
 
-def test_the_default_is_three_milliseconds_and_is_stated_in_time():
-    assert rule().hold == 0.003
-    assert rule(above_n=20.0, back_to_n=8.0).described == "load cell above 20 N for 3 ms, followed back to 8 N"
-
-
 @pytest.mark.parametrize(
     ("values", "said"),
     [

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import FEW, Outcome, cdtool
+from tests.command import Outcome, cdtool
 from tests.synthetic.ageing import write_ageing_gate
 
 
@@ -45,19 +45,6 @@ def test_show_lists_the_content_of_the_file(signature):
     assert [joint["moved"] for joint in values["classes"][0]["joints"]] == [0.0]
 
 
-def test_show_of_another_threshold_names_it(gate_folder, tmp_path):
-    path = tmp_path / "cusum.json"
-    free = logs_of(gate_folder)
-    learned = cdtool(
-        "learn-signature", *free, "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold=cusum", "-o", path
-    )
-    assert learned.status == 0 and "cusum, safety factor 15 by default" in learned.out, learned.err
-    done = cdtool("signature", "show", path)
-    assert done.status == 0 and "threshold: cusum, safety factor 15 by default" in done.out
-    refused = cdtool("signature", "update", path, *free, "-m", gate_folder / "machine.toml")
-    assert refused.status == 2 and "contains the threshold cusum, not a signature" in refused.err
-
-
 def test_runs_learned_from_are_checked_against_the_others(signature, gate_folder):
     done = check(signature, gate_folder, *logs_of(gate_folder))
     assert done.status == 0, done.err
@@ -66,16 +53,6 @@ def test_runs_learned_from_are_checked_against_the_others(signature, gate_folder
     coverage = values["classes"][0]["coverage"]
     assert len(coverage["runs"]) == 11 and 0.0 < coverage["chance"] < 0.2
     assert values["classes"][0]["drift"] is None
-
-
-def test_a_stricter_target_needs_more_runs(signature, gate_folder):
-    found = []
-    for target in (0.2, 1e-3, 1e-5):
-        done = check(signature, gate_folder, *logs_of(gate_folder), "--target", target, "--json")
-        found.append(json.loads(done.out)["classes"][0]["coverage"])
-    assert found[0]["more_runs"] == 0
-    needed = [item["factor_needed"] for item in found]
-    assert needed == sorted(needed) and needed[0] < needed[-1]
 
 
 def test_a_steady_season_shows_no_drift_and_another_shows_what_and_where(signature, gate_folder, seasons, tmp_path):
@@ -147,32 +124,6 @@ def test_a_log_that_is_given_twice_counts_once(gate_folder, signature, tmp_path)
         for logs in (free, [*free, *free])
     )
     assert once == twice
-
-
-def test_logs_are_cut_as_for_learning(gate_folder, tmp_path):
-    path, machine = tmp_path / "cut.json", ("-m", gate_folder / "machine.toml")
-    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", "--set=operations=motion", "-o", path)
-    assert cdtool(*learn).status == 0
-    again = cdtool("signature", "update", path, *logs_of(gate_folder), *machine)
-    assert again.status == 2 and "already in the signature" in again.err
-    other = cdtool("signature", "update", path, *logs_of(gate_folder), *machine, "--set=operations=whole")
-    assert other.status == 2 and "--set operations: unknown key" in other.err
-
-
-def test_the_origin_of_a_budget_is_dropped_when_the_factor_changes(gate_folder, tmp_path):
-    path, machine = tmp_path / "b.json", ("-m", gate_folder / "machine.toml")
-    learn = ("learn-signature", *logs_of(gate_folder), *machine, "-d", "gm", FEW, "-o", path)
-    done = cdtool(*learn, "--false-alarm-budget", "1/5op", "--set=activation.debounce=5")
-    assert done.status == 0 and "set for 1/5op on 11 operations" in done.out, done.err
-    log = gate_folder / "holdout" / "01.csv"
-    assert "with an activation different" not in cdtool("detect", log, *machine, "-s", path).out
-    assert (
-        "with an activation different from the file's"
-        in cdtool("detect", log, *machine, "-s", path, "--set=activation.debounce=1").out
-    )
-    updated = cdtool("signature", "update", path, log, *machine)
-    shown = " ".join(cdtool("signature", "show", path).out.split())
-    assert ("before 1 more run" in shown) == (updated.status == 0)
 
 
 def test_limits_set_by_hand_exclude_a_factor_and_need_no_runs(gate_folder, tmp_path):

@@ -18,7 +18,6 @@ from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.recording import Recording
 from tests.command import cdtool as command
-from tests.command import keys
 
 ARM = ArmParameters()
 COUNTS = {"free": 1, "holdout": 1, "stiff": 3, "soft": 1}
@@ -80,16 +79,6 @@ def test_the_links_true_motion_is_found_again_on_the_load_side(folder: Path) -> 
         assert np.polyfit(truth, felt, 1)[0] == pytest.approx(1.0, abs=0.15)
 
 
-def test_the_machine_file_describes_the_simulated_arm(folder: Path) -> None:
-    machine = read_machine_file(folder / "machine.toml").machine
-    inertia = np.array([ARM.arm_inertia, ARM.forearm_inertia]) + np.array(ARM.reflected_inertia)
-    np.testing.assert_allclose(machine.nominal_inertia, inertia, rtol=1e-12)
-    np.testing.assert_allclose(machine.gravity_torque, ARM.gravity_torque, rtol=1e-12)
-    assert machine.coupling == pytest.approx(ARM.coupling_inertia, rel=1e-12)
-    joint_side = np.array(machine.viscous_friction) / np.array(machine.transmission_ratio) ** 2
-    np.testing.assert_allclose(joint_side, ARM.viscous_friction, rtol=1e-12)
-
-
 @pytest.mark.parametrize(("trial", "watched"), [(1, "arm"), (2, "forearm")])
 def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: Trial, watched: str) -> None:
     simulate_arm(tmp_path / "logs", {"free": 2, "soft": 1}, seed=6, trial=trial)
@@ -100,17 +89,6 @@ def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: 
     assert values["signature"] == {"force": True, "position_step": 2e-3, "position_window": 22e-3, "sides": "one"}
     assert values["activation"] == {"debounce": 7}
     assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "hold_s": 0.003}
-
-
-def test_the_command_gives_the_same_bytes_whatever_else_is_written(folder: Path, tmp_path: Path) -> None:
-    counts = keys(free=0, holdout=0, stiff=4, soft=0)
-    done = command("simulate", "arm", "--trial", 1, *counts, "--seed", 6, "--set", "format=mixed", "-o", tmp_path / "b")
-    assert done.status == 0, done.err
-    for name in ("stiff/01.mcap", "stiff/02.mcap", "stiff/03.csv", "machine.toml"):
-        assert (tmp_path / "b" / name).read_bytes() == (folder / name).read_bytes()
-    other = command("simulate", "arm", "--trial", 2, *counts, "--seed", 6, "-o", tmp_path / "c")
-    assert other.status == 0, other.err
-    assert (tmp_path / "c" / "stiff" / "03.csv").read_bytes() != (folder / "stiff" / "03.csv").read_bytes()
 
 
 def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_path: Path) -> None:

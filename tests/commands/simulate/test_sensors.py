@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from cdtool.commands.simulate import sensors
-from cdtool.commands.simulate.gate_model import Array, GateParameters
-
-GATE = GateParameters()
+from cdtool.commands.simulate.gate_model import Array
 
 
 def test_coloured_noise_and_resonance_have_the_stated_deviation_and_colour() -> None:

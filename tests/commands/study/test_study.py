@@ -151,24 +151,6 @@ def test_a_derivative_part_and_a_force_limit_of_the_controller_count(tmp_path):
     assert held["peak_force_n"] < 0.85 * plain["peak_force_n"]
 
 
-def test_the_first_frequency_of_the_load_says_whether_waves_matter(tmp_path):
-    (tmp_path / "study.toml").write_text("[impact]\nfirst_frequency = 18\n", encoding="utf-8")
-    done = cdtool("study", "sensors", "-m", GATE, "--study", tmp_path / "study.toml")
-    assert "waves matter: the contact lasts" in done.out and "assumed: impact.first_frequency" not in done.out
-    (tmp_path / "study.toml").write_text("[impact]\nfirst_frequency = 500\n", encoding="utf-8")
-    assert (
-        "the load counts as rigid: the contact lasts"
-        in cdtool("study", "sensors", "-m", GATE, "--study", tmp_path / "study.toml").out
-    )
-    assert "assumed: impact.first_frequency = none: the load is rigid" in cdtool("study", "sensors", "-m", GATE).out
-
-
-def test_a_figure_is_drawn(tmp_path):
-    path = tmp_path / "ranking.svg"
-    assert cdtool("study", "sensors", "-m", GATE, "-o", path).status == 0
-    assert "load_cell" in path.read_text(encoding="utf-8")
-
-
 def test_the_figures_of_the_thesis_are_drawn_again(tmp_path):
     done = cdtool("study", "figures", "-o", tmp_path / "new")
     assert (done.status, done.err) == (0, "")
@@ -223,18 +205,6 @@ def test_a_machine_without_inertias_is_refused(tmp_path):
     assert done.status == 2 and "no lever is given" in done.err
 
 
-def test_a_joint_is_required_if_there_are_several(tmp_path):
-    gantry = tmp_path / "gantry.toml"
-    gantry.write_text(
-        '[machine]\ntype = "linear_axis"\njoints = ["x", "y"]\nmotor_inertia = [0.001, 0.001]\n'
-        "load_mass = [20.0, 200.0]\ntransmission_ratio = 0.005\n",
-        encoding="utf-8",
-    )
-    done = cdtool("study", "sensors", "-m", gantry)
-    assert done.status == 2 and "2 joints (set joint to one of them: x, y)" in done.err
-    assert ranked("-m", gantry, "--set", "joint=x") != ranked("-m", gantry, "--set", "joint=y")
-
-
 def test_the_page_shows_what_the_command_prints(monkeypatch, tmp_path):
     page = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
     (block,) = [block.split("```")[0] for block in page.split("```console\n$ cdtool ")[1:]]
@@ -244,15 +214,6 @@ def test_the_page_shows_what_the_command_prints(monkeypatch, tmp_path):
     printed = [line.rstrip() for line in cdtool(*paths).out.splitlines()]
     assert len(shown) >= 9 and shown[-1] == "..."
     assert [line.rstrip() for line in shown[:-1]] == printed[: len(shown) - 1]
-
-
-def test_the_page_names_every_key_of_a_study():
-    page = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
-    assumed = cdtool("study", "sensors", "-m", GATE).out.split("assumed: ")[1:]
-    assert len(assumed) > 25
-    for line in assumed:
-        key = line.split(" = ")[0]
-        assert f"`{key}`" in page or f"`{key.rpartition('.')[2]}`" in page, key
 
 
 def test_the_order_of_the_thesis_does_not_always_hold(tmp_path):

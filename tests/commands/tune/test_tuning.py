@@ -14,7 +14,6 @@ import cdtool as api
 from cdtool import simulate_gate
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.files.bounded_loading import parse_toml
-from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.tune import tuning as module
 from cdtool.commands.tune.command import _show
@@ -197,26 +196,10 @@ def test_too_few_runs_are_refused_with_the_numbers_needed(tmp_path):
     assert "19 are needed to set the limit, 25 to check it, 59 to be 95 % sure of it" in done.err
 
 
-def test_between_the_two_numbers_figures_are_apparent(gate):
-    setup = read_benchmark_file(gate / "benchmark.toml")
-    few = replace(setup, learn=setup.learn[:20], threshold="limit", rule=Limit())
-    made = tune(few, replace(QUICK, false_alarm_budget=BUDGET))
-    assert not made.is_nested and made.detectors[0].nested is None
-    assert made.detectors[0].chosen_in_folds == ()
-
-
 def test_without_contacts_there_is_nothing_to_tune_on(gate):
     setup = read_benchmark_file(gate / "benchmark.toml")
     with pytest.raises(UsageError, match="no contact to tune on"):
         tune(replace(setup, impacts={}), OPTIONS)
-
-
-def test_changed_conditions_are_not_tuned_on(quick):
-    winter = replace(quick.impacts["stiff"], condition="winter", counterpart="stiff")
-    made = tune(replace(quick, impacts={**quick.impacts, "winter/stiff": winter}), QUICK)
-    assert set(made.groups) == {"stiff", "soft"}
-    (note,) = [item for item in made.findings if item.kind == "conditions_not_tuned_on"]
-    assert note.severity == "note" and note.reason.startswith("1 changed condition: not used for tuning")
 
 
 def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
@@ -257,35 +240,6 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
 def test_wrong_options_are_one_line(gate, tmp_path, arguments, words):
     done = command("tune", gate / "benchmark.toml", "--false-alarm-budget", "1/20op", "-o", tmp_path / "t", *arguments)
     assert done.status == 2 and words in done.err and done.err.count("\n") == 1
-
-
-def few_of(quick, group, count):
-    """The quick benchmark with so many logs in a group."""
-    kept = {**quick.impacts, group: replace(quick.impacts[group], logs=quick.impacts[group].logs[:count])}
-    return replace(quick, impacts=kept)
-
-
-def test_a_group_with_one_contact_has_no_nested_results_and_the_reason_is_stated(quick):
-    made = tune(few_of(quick, "stiff", 1), QUICK)
-    assert not made.is_nested
-    assert made.detectors[0].why_not_nested == "the contacts of stiff are in one part: at least 2 logs are needed"
-
-
-def test_two_days_leave_nothing_to_learn_from(quick, tmp_path):
-    for number, path in enumerate(quick.learn):
-        (tmp_path / f"2026-11-{3 + number % 2:02d}").mkdir(exist_ok=True)
-        shutil.copy(path, tmp_path / f"2026-11-{3 + number % 2:02d}" / path.name)
-    days = tuple(sorted(tmp_path.glob("2026*/*.csv")))
-    impacts = {}
-    for group in ("stiff", "soft"):
-        folder = tmp_path / "2026-11-03" / group
-        folder.mkdir()
-        for path in quick.impacts[group].logs:
-            shutil.copy(path, folder / path.name)
-        impacts[group] = replace(quick.impacts[group], logs=tuple(sorted(folder.iterdir())))
-    split = replace(quick, learn=days, impacts=impacts, split=Split.DAY)
-    made = tune(split, QUICK)
-    assert not made.is_nested and "in 2 parts that stay together" in made.detectors[0].why_not_nested
 
 
 def test_the_force_is_not_minimised_where_none_is_known(quick, tmp_path):

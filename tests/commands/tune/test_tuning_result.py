@@ -16,13 +16,6 @@ def tuned():
     return cdtool.tune(GATE / "benchmark.toml", "1/2op", detectors=["momentum"], settings=settings)
 
 
-def test_it_is_one_line_and_a_frame_with_a_row_per_detector_and_group(tuned):
-    assert repr(tuned).startswith("TuningResult(1 detector: ") and "momentum with limit at 1/2op: stiff " in repr(tuned)
-    assert tuned.summary().group.tolist() == ["stiff", "soft"] and tuned.best.detector == "momentum"
-    assert "<p>Tuned: " in tuned._repr_html_()
-    assert tuned.skipped.columns.tolist() == ["recording", "reason"] and dict(tuned.unusable) == {}
-
-
 def test_it_is_saved_as_the_command_writes_it_and_the_result_can_be_used(tuned, tmp_path):
     written = tuned.save(tmp_path / "tuned")
     names = {path.name for path in written}

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from cdtool.base.errors import RecordingError
-from cdtool.formats.channels.reading import element_names, read_recording, survey
+from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.machine_file import read_machine_file
-from cdtool.formats.source import TopicDetails
 
 pytest.importorskip("rosbags")
 from rosbags.rosbag1 import Writer as Writer1
@@ -66,21 +65,6 @@ def test_a_bag_is_mapped_like_an_mcap_file_with_joints_by_name(bag, tmp_path):
     assert recording.origin == START / 1e9
     np.testing.assert_array_equal(recording["position"].values, VALUES[:, 0, ::-1])
     np.testing.assert_array_equal(recording["torque"].values, VALUES[:, 2, ::-1])
-    np.testing.assert_allclose(recording["speed"].time, np.arange(60) * 0.01, atol=1e-12)
-
-
-def test_the_survey_shows_every_field_and_the_names_of_the_joints(bag):
-    source = survey(the_file(bag))
-    assert source.columns["/joint_states velocity[:]"].values.tobytes() == VALUES[:, 1].tobytes()
-    assert source.topics["/joint_states"] == TopicDetails("sensor_msgs/msg/JointState", 60)
-    assert element_names(the_file(bag), "/joint_states") == ("shoulder", "elbow")
-
-
-@pytest.mark.parametrize("clock", ["publish", "header"])
-def test_another_clock_of_a_message_can_be_chosen(bag, tmp_path, clock):
-    text = MACHINE.replace("[channels.mcap]", f"[channels.mcap]\ntime = {{ clock = '{clock}' }}")
-    (tmp_path / "machine.toml").write_text(text)
-    recording = read_recording(bag, read_machine_file(tmp_path / "machine.toml"))
     np.testing.assert_allclose(recording["speed"].time, np.arange(60) * 0.01, atol=1e-12)
 
 

@@ -11,14 +11,11 @@ import numpy as np
 import pytest
 import zstandard
 
-import cdtool
 from cdtool.base.errors import RecordingError
 from cdtool.formats.bags.rosbag2 import Rosbag2
-from cdtool.formats.channels.reading import read_as_logged, read_recording, survey
+from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.messages.schemas import DEFINITIONS
-from cdtool.formats.source import TopicDetails
-from tests.command import cdtool as command
 
 START = 1_700_000_000_000_000_000
 MACHINE = """[machine]
@@ -36,15 +33,6 @@ CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timesta
     data BLOB NOT NULL);
 CREATE INDEX timestamp_idx ON messages (timestamp ASC);
 """
-IRON = (
-    FOXY.replace(
-        "format TEXT NOT NULL)", "format TEXT NOT NULL, offered_qos_profiles TEXT, type_description_hash TEXT)"
-    )
-    + """
-CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,
-    encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);
-"""
-)
 FLOAT = "std_msgs/msg/Float64"
 
 
@@ -109,21 +97,6 @@ def test_a_bag_without_definitions_is_read_with_the_standard_ones_and_says_so(tm
     assert said.severity == "note" and "standard ones of std_msgs/msg/Float64" in str(said)
 
 
-def test_a_bag_is_surveyed_with_its_topics(tmp_path):
-    source = survey(write_bag(tmp_path / "log.db3"))
-    assert source.topics == {"/speed": TopicDetails(FLOAT, 100), "/cell": TopicDetails(FLOAT, 50)}
-    assert source.format == "rosbag2" and list(source.columns) == ["/speed data", "/cell data"]
-
-
-def test_the_definitions_of_a_bag_come_before_the_standard_ones(tmp_path, machine):
-    text = "float32 spare\nfloat64 data\n"
-    longer = [(topic, time, b"\x00\x01\x00\x00" + bytes(8) + raw[4:]) for topic, time, raw in rows()]
-    path = write_bag(tmp_path / "log.db3", longer, schema=IRON, definitions=[(FLOAT, "ros2msg", text)])
-    recording = read_recording(path, machine)
-    check(recording)
-    assert "standard_definitions" not in kinds_of(recording.findings)
-
-
 def test_a_type_without_a_definition_is_named_with_the_next_step(tmp_path, machine):
     path = write_bag(tmp_path / "log.db3", kinds=("my_msgs/msg/Speed", FLOAT))
     with pytest.raises(
@@ -133,16 +106,6 @@ def test_a_type_without_a_definition_is_named_with_the_next_step(tmp_path, machi
     source = survey(path)
     assert list(source.columns) == ["/cell data"]
     assert "undecodable_messages" in kinds_of(source.findings)
-
-
-def test_a_standard_type_that_cdtool_does_not_write_is_known_by_rosbags(tmp_path):
-    pytest.importorskip("rosbags")
-    path = write_bag(
-        tmp_path / "log.db3",
-        [(1, START, b"\x00\x01\x00\x00" + struct.pack("<f", 1.5))] * 3,
-        ("std_msgs/msg/Float32", FLOAT),
-    )
-    assert survey(path).columns["/speed data"].values.tolist() == [1.5, 1.5, 1.5]
 
 
 @pytest.mark.parametrize("end", ["zstd", "zst"])
@@ -218,27 +181,6 @@ def bag_folder(folder: Path, parts: int = 3, compress: bool = False) -> Path:
     return folder
 
 
-def test_the_parts_of_a_folder_are_one_log_in_order(tmp_path, machine):
-    folder = bag_folder(tmp_path / "bag", 11)
-    check(read_recording(folder, machine), 1100)
-    assert len(survey(folder).columns["/speed data"].values) == 1100
-    missing = next(folder.glob("bag_4.*"))
-    missing.unlink()
-    lost = [item for item in read_as_logged(folder, machine).recording.findings if item.severity == "loss"]
-    assert [item.kind for item in lost] == ["part_missing"] and missing.name in str(lost[0])
-
-
-def test_a_folder_is_a_log_of_a_benchmark_where_its_metadata_says_so(tmp_path):
-    from cdtool.commands.judging.runs import find_logs
-
-    first, second = bag_folder(tmp_path / "bag_1", 1), bag_folder(tmp_path / "bag_2", 2)
-    (tmp_path / "bag_3").mkdir()
-    assert find_logs(["bag_*"], tmp_path) == [first, second]
-    assert find_logs(["bag_1"], tmp_path) == [first]
-    with pytest.raises(cdtool.base.errors.UsageError, match="no file matches 'bag_3'"):
-        find_logs(["bag_3"], tmp_path)
-
-
 @pytest.mark.parametrize("version", [8, 9])
 @pytest.mark.parametrize("mode", ["NONE", "MESSAGE"])
 def test_what_rosbags_writes_is_read_to_the_bit(tmp_path, version, mode):
@@ -288,15 +230,6 @@ def test_a_damaged_bag_is_one_line_or_a_counted_loss(tmp_path, index):
                 assert any(item.severity in ("loss", "warning") for item in source.findings), counts
 
 
-def test_a_truncated_bag_keeps_what_is_before_the_cut(tmp_path):
-    path = write_bag(tmp_path / "log.db3", rows(0.0, 4000))
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
-    source = survey(path)
-    assert 500 < len(source.columns["/speed data"].values) < 4000
-    assert "bag_damaged" in kinds_of(source.findings)
-
-
 @pytest.mark.parametrize(
     ("row", "count"),
     [
@@ -339,50 +272,6 @@ def test_decompression_bombs_are_refused(tmp_path):
     zeros = zstandard.compress(bytes(2**29))
     bomb = write_bag(tmp_path / "messages.db3", [(1, START + k, zeros) for k in range(3)])
     assert [item.numbers["count"] for item in survey(bomb).findings if item.kind == "damaged_rows"] == [3]
-
-
-def test_other_databases_and_other_compressed_files_are_refused(tmp_path):
-    other = tmp_path / "other.db3"
-    with closing(sqlite3.connect(other)) as base, base:
-        base.execute("CREATE TABLE x (a)")
-    with pytest.raises(RecordingError, match="an SQLite database, but not a ROS 2 bag"):
-        survey(other)
-    for name, content in (("log.zst", b"hello"), ("log.db3.zstd", b"")):
-        (tmp_path / name).write_bytes(zstandard.compress(content))
-        with pytest.raises(RecordingError, match="zstd-compressed"):
-            survey(tmp_path / name)
-
-
-def test_an_empty_bag_and_one_without_the_topic_are_named(tmp_path, machine):
-    path = write_bag(tmp_path / "log.db3", [])
-    with pytest.raises(RecordingError, match=r"no message of topic '/speed'"):
-        read_recording(path, machine)
-    assert not survey(path).columns
-
-
-def test_a_bag_is_cut_into_runs_by_a_topic(tmp_path, machine):
-    from cdtool.formats.channels.run_reading import read_runs
-    from cdtool.recordings.operations import RunCut
-
-    path = write_bag(tmp_path / "log.db3", [(topic, time, raw) for topic, time, raw in rows()])
-    with closing(sqlite3.connect(path)) as base, base:
-        base.execute("INSERT INTO topics VALUES(9, '/run', ?, 'cdr')", (FLOAT,))
-        base.executemany(
-            "INSERT INTO messages(topic_id, timestamp, data) VALUES(9, ?, ?)",
-            [(START, number(4.0)), (START + 500_000_000, number(5.0))],
-        )
-    found = read_runs(path, machine, RunCut("column", "/run data")).runs
-    assert [(run.recording.name, len(run.recording["speed"])) for run in found] == [("log#4", 50), ("log#5", 50)]
-
-
-def test_info_and_convert_take_a_bag_as_any_other_log(tmp_path):
-    folder = bag_folder(tmp_path / "bag", 2)
-    (tmp_path / "machine.toml").write_text(MACHINE)
-    shown = command("info", folder)
-    assert shown.status == 0 and "/speed data" in shown.out
-    done = command("convert", folder, tmp_path / "log.mcap", "-m", tmp_path / "machine.toml")
-    assert done.status == 0, done.err
-    assert len(survey(tmp_path / "log.mcap").columns) >= 2
 
 
 def test_definitions_of_the_standard_packages_are_known_and_others_are_not():

@@ -97,13 +97,6 @@ def test_faulty_stamps_are_dropped_from_every_channel_and_reported_with_their_li
     assert np.isclose(recording["torque"].values[10, 0], 0.1 * 11 * 0.5 / RATIO)
 
 
-def test_a_gap_of_the_clock_is_reported_once_and_not_for_each_channel(log, machine):
-    columns = gate_columns()
-    columns["t"][25:] += 500.0
-    facts = [fact for _, fact in channels_and_facts(read_recording(log(table(columns)), machine()))]
-    assert sum(fact.kind == "sample_gaps" for fact in facts) == 1
-
-
 def test_missing_infinite_and_saturated_values_are_masked_and_counted(log, machine):
     columns = gate_columns()
     columns["i_motor"][3] = np.nan

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cdtool.commands.judging.information import info
-from cdtool.formats.channels.clock_guess import is_clock_name
 from cdtool.formats.csv.table import DAY_S
 
 
@@ -18,16 +17,6 @@ def test_excel_days_are_distinguished_from_seconds_at_any_rate(tmp_path, rate_hz
     shown = info(path)
     assert any(finding.numbers.get("evidence", "") == "excel" for finding in shown.findings)
     assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(rate_hz, rel=1e-3)] * 2
-
-
-@pytest.mark.parametrize("name", ["log.t", "run(2).time_ms", "Sheet1!Time [s]", "a.b.zeit"])
-def test_the_last_part_of_a_name_is_that_of_a_clock(name):
-    assert is_clock_name(name)
-
-
-@pytest.mark.parametrize("name", ["log.torque", "speed [m.t]", "target.q"])
-def test_other_last_parts_are_no_clocks(name):
-    assert not is_clock_name(name)
 
 
 @pytest.mark.parametrize(("name", "is_one"), [("time", True), ("travel", False)])

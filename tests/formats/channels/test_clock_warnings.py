@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.commands.judging.information import info
 from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.recordings.clock import clean_time
 from tests.base.findings.facts import fact_of
 from tests.command import cdtool
 from tests.formats.channels.test_channel_assembly import channels_and_facts, gate_columns, table
@@ -29,13 +27,6 @@ def test_a_counters_wrap_is_reported_for_the_counter_in_the_file(log, machine):
     columns["t"] = np.mod(65536.0 - 300.0 + 10.0 * np.arange(50), 65536.0)
     facts = [fact for _, fact in channels_and_facts(read_recording(log(table(columns)), machine()))]
     assert [fact.numbers["restart"] for fact in facts if fact.kind == "backward_stamps"] == [{"wrapped_bits": 16}]
-
-
-def test_a_clock_that_stands_still_is_a_clear_error(log, machine):
-    columns = gate_columns()
-    columns["t"][:] = 0.0
-    with pytest.raises(RecordingError, match="time: none of the 50 time stamps is above 0 s: the clock stands still"):
-        read_recording(log(table(columns)), machine())
 
 
 def two_topics(path, starts, stamps=40):
@@ -68,11 +59,6 @@ def test_channels_whose_times_do_not_overlap_are_reported_with_their_distance(tm
         fact_of(item) == ("clocks_apart", {"distance": pytest.approx(distance, rel=1e-6), "before": before})
         for item in findings
     )
-
-
-def test_every_row_of_a_clock_that_runs_backward_is_counted():
-    (finding,) = clean_time(np.arange(5000, 0, -1) * 1e-3).findings
-    assert finding.kind == "backward_stamps" and (finding.numbers["count"], finding.numbers["rows"]) == (4999, 5000)
 
 
 @pytest.mark.parametrize(("steady", "wanted"), [(True, ["speed, torque"]), (False, [])])

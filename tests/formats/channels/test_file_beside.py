@@ -7,12 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError
-from cdtool.formats.channels.file_beside import rises
 from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
@@ -104,14 +101,6 @@ def test_a_pressure_sensor_has_a_file_too_whose_clock_does_not_concern_a_latency
     (tmp_path / "cell_03.csv").unlink()
     without = read_as_logged(tmp_path / "03.csv", read_machine_file(path)).recording
     assert "contact_pressure" not in without and len(facts(without, "absent_file")) == 1
-
-
-def test_several_triggers_are_aligned_in_their_middle(tmp_path):
-    write_log(tmp_path, (0.5, 1.5, 3.5))
-    write_cell(tmp_path, 2.0, (0.5, 1.5, 3.5))
-    recording = read(tmp_path, TRIGGER)
-    assert facts(recording, "file_aligned")[0].numbers["shift"] == pytest.approx(-2.0, abs=5e-3)
-    assert not facts(recording, "triggers_drift") and not facts(recording, "triggers_differ")
 
 
 def test_clocks_that_run_apart_are_reported_and_widen_what_is_known(tmp_path):
@@ -239,36 +228,6 @@ def test_a_log_without_the_trigger_has_no_cell(tmp_path):
     assert "no column 'synch'" in facts(recording, "absent_file")[0].numbers["reason"]
 
 
-def test_findings_on_the_file_have_its_name(tmp_path):
-    write_log(tmp_path)
-    write_cell(tmp_path, 0.0)
-    recording = read(tmp_path, TRIGGER, cell=f"{CELL}, saturation = [-1000, 400]")
-    (found,) = [item for item in recording.findings if item.kind == "saturated_values"]
-    assert found.file == "cell_03.csv" and found.channel == "force"
-
-
-def test_a_vector_may_be_in_a_file_of_its_own(tmp_path):
-    write_log(tmp_path)
-    write_cell(tmp_path, 0.0)
-    cell = CELL.replace('column = "F"', 'columns = ["F", "trig"]')
-    assert read(tmp_path, "time_offset = 0.0", cell=cell)["force"].joint_count == 2
-
-
-@pytest.mark.parametrize(
-    ("pattern", "place"),
-    [
-        ("cell_{stem}.csv", "day/cell_03.csv"),
-        ("cells/{name}", "day/cells/03.csv"),
-        ("../cells/{folder}/{stem}.csv", "cells/day/03.csv"),
-    ],
-)
-def test_the_name_of_the_file_follows_from_the_log(tmp_path, pattern, place):
-    (tmp_path / "day").mkdir()
-    file = machine(tmp_path, "time_offset = 0.0", CELL.replace("cell_{stem}.csv", pattern))
-    (path,) = file.files_beside(tmp_path / "day" / "03.csv")
-    assert path.resolve() == (tmp_path / place).resolve()
-
-
 @pytest.mark.parametrize(
     ("cell", "align", "said"),
     [
@@ -289,14 +248,6 @@ def test_a_wrong_entry_is_refused_by_its_key(tmp_path, cell, align, said):
     assert "channels.force" in str(fault.value)
 
 
-def test_only_a_force_may_be_in_a_file_of_its_own(tmp_path):
-    path = tmp_path / "machine.toml"
-    speed = 'speed = { file = "{stem}_v.csv", column = "v", unit = "m/s" }'
-    path.write_text(f'{AXIS}[channels]\ntime = {{ column = "t", unit = "s" }}\n{speed}\n', encoding="utf-8")
-    with pytest.raises(ConfigurationError, match=r"speed\.file: unknown key"):
-        read_machine_file(path)
-
-
 def test_a_cell_beside_a_log_of_topics_is_aligned_by_a_topic(tmp_path):
     time = jittered(0.0, 4.0, 200.0, 1)
     speed = Stream("/joints", "sensor_msgs/msg/JointState", time, {"velocity": np.ones((len(time), 1))}, ("axis",))
@@ -311,19 +262,3 @@ def test_a_cell_beside_a_log_of_topics_is_aligned_by_a_topic(tmp_path):
     assert np.abs(force.values[:, 0] / 100.0 - force.time).max() < 0.0075
     with pytest.raises(ConfigurationError, match="give topic and field"):
         machine(tmp_path, TRIGGER, section=section)
-
-
-@given(st.lists(st.booleans(), min_size=1, max_size=60), st.integers(0, 3))
-def test_a_rise_is_a_step_from_low_to_high_whatever_the_noise(levels, seed):
-    values = np.repeat(np.array(levels, dtype=float), 3)
-    noise = np.random.default_rng(seed).uniform(-0.1, 0.1, len(values))
-    time = np.arange(len(values)) * 0.01
-    found = rises(Series(time, values + noise, "1"))
-    if any(levels) and not all(levels):
-        expected = time[1:][np.diff(values) > 0.5]
-        assert found.tolist() == expected.tolist()
-
-
-def test_a_trigger_that_never_changes_does_not_rise():
-    time = np.arange(10) * 0.01
-    assert len(rises(Series(time, np.ones(10), "1"))) == len(rises(Series(time, np.full(10, np.nan), "1"))) == 0

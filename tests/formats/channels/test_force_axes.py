@@ -11,7 +11,7 @@ import pytest
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.commands.convert.converting import convert
-from cdtool.formats.channels.reading import read_as_logged, survey
+from cdtool.formats.channels.reading import read_as_logged
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.recordings.recording import Recording
@@ -47,40 +47,15 @@ def test_a_direction_selects_the_component_along_it(tmp_path, direction, expecte
     assert force.joint_count == 1 and force.values[3, 0] == pytest.approx(expected)
 
 
-def test_an_axis_that_a_direction_does_not_need_may_be_missing(tmp_path):
-    text = table().replace("0.03,0.30,3,-6,16", "0.03,0.30,,-6,16").replace("0.05,0.50,5,-10,20", "0.05,0.50,5,-10,")
-    force = read(tmp_path, VECTOR.replace("}", ', direction = "z" }'), text)["force"]
-    assert force.values[3, 0] == 16.0 and np.isnan(force.values[5, 0])
-
-
 def test_each_axis_has_its_scale(tmp_path):
     vector = 'force = { columns = ["fx", "fy", "fz"], unit = "V", scale = [10.0, 20.0, -5.0] }'
     assert read(tmp_path, vector, table())["force"].values[3].tolist() == [30.0, -120.0, -80.0]
-
-
-def test_a_saturated_axis_is_named(tmp_path):
-    recording = read(tmp_path, VECTOR.replace("}", ", saturation = [-30.0, 1000.0] }"), table())
-    (found,) = [item for item in recording.findings if item.kind == "saturated_values"]
-    assert (found.channel, found.numbers["count"]) == ("force fy", 5)
 
 
 def test_an_axis_in_another_unit_is_named(tmp_path):
     recording = read(tmp_path, VECTOR, table("t,v,fx [N],fy [kN],fz [N]").replace("t,v,", "t,v,"))
     (found,) = [fact_of(item) for item in recording.findings if item.kind == "unit_contradicted"]
     assert (found.numbers["header"], found.numbers["stated"]) == ("fy [kN]", "N")
-
-
-@pytest.mark.parametrize(
-    "machine", [AXIS, AXIS.replace("linear_axis", "rotary_axis").replace("load_mass = 10.0\n", "")]
-)
-def test_the_number_of_joints_does_not_matter(tmp_path, machine):
-    joints = machine + 'joints = ["a", "b"]\n'
-    speed = COLUMNS.replace('column = "v", unit = "m/s"', 'columns = ["v", "v"], unit = "UNIT"')
-    unit = "rad/s" if "rotary" in machine else "m/s"
-    (tmp_path / "machine.toml").write_text(f"{joints}{speed.replace('UNIT', unit)}{VECTOR}\n", encoding="utf-8")
-    (tmp_path / "log.csv").write_text(table(), encoding="utf-8")
-    recording = read_as_logged(tmp_path / "log.csv", read_machine_file(tmp_path / "machine.toml")).recording
-    assert recording["speed"].joint_count == 2 and recording["force"].joint_count == 3
 
 
 def test_a_log_without_one_axis_has_no_force(tmp_path):
@@ -121,15 +96,6 @@ def write_log(folder: Path, axes: FloatArray, time: FloatArray) -> Path:
     return folder / "log.mcap"
 
 
-def test_a_single_field_is_a_single_load_cell(tmp_path):
-    force = 'force = { topic = "/cell", fields = ["wrench.force.y"] }'
-    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{force}\n", encoding="utf-8")
-    axes = np.random.default_rng(0).normal(size=(200, 3))
-    log = write_log(tmp_path, axes, np.arange(200) * 5e-3)
-    recording = read_as_logged(log, read_machine_file(tmp_path / "machine.toml")).recording
-    assert recording["force"].values.tolist() == axes[:, 1:2].tolist()
-
-
 @pytest.mark.parametrize("also", ["", ', direction = "-z"'])
 def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, also):
     time = np.arange(200) * 5e-3
@@ -143,24 +109,6 @@ def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, als
         convert(log, tmp_path / name, machine=machine)
         again = read_machine_file(tmp_path / f"{name}.machine.toml")
         assert read_as_logged(tmp_path / name, again).recording["force"].values.tolist() == found.tolist()
-
-
-def test_an_infinite_value_of_an_axis_of_a_container_with_clocks_names_the_axis(tmp_path):
-    axes = np.random.default_rng(0).normal(size=(200, 3))
-    axes[7, 1] = np.inf
-    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{TOPIC}\n", encoding="utf-8")
-    log = write_log(tmp_path, np.where(np.isinf(axes), 1.0, axes), np.arange(200) * 5e-3)
-    convert(log, tmp_path / "new.parquet", machine=read_machine_file(tmp_path / "machine.toml"))
-    with h5py.File(tmp_path / "new.h5", "w") as file:
-        for name, column in survey(tmp_path / "new.parquet").columns.items():
-            file[name] = column.values
-            file[name].attrs["unit"] = column.unit or "1"
-        file["force y"][7] = np.inf
-    again = read_machine_file(tmp_path / "new.parquet.machine.toml")
-    (found,) = (
-        item for item in read_as_logged(tmp_path / "new.h5", again).recording.findings if item.severity == "loss"
-    )
-    assert (found.kind, found.channel) == ("infinite_values", "force force y")
 
 
 @pytest.mark.parametrize(

@@ -186,14 +186,6 @@ def test_a_channel_whose_unit_is_contradicted_has_no_value(log, machine, channel
     assert [item.severity for item in unit_findings(recording, channel)] == ["loss"]
 
 
-def test_the_unit_1_is_only_compared_if_the_machine_file_states_a_share():
-    plain = Column("x", np.empty(0), unit="1")
-    torque = ChannelSource("torque", ("x",), unit="N m", stated="N m")
-    assert channel_unit_findings(torque, [plain]) == []
-    duty = ChannelSource("torque", ("x",), factor=(0.01,), unit="1", stated="%")
-    assert channel_unit_findings(duty, [plain])[0].numbers["ratio"] == pytest.approx(100.0)
-
-
 def test_a_channel_of_linear_and_rotary_joints_is_in_the_si_unit_of_each():
     both = ChannelSource("position", ("a", "b"), factor=(1.0, 1.0), unit="SI", stated="SI")
     columns = [Column("a", np.empty(0), unit="rad"), Column("b", np.empty(0), unit="m")]

@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.reading import read_recording
-from cdtool.formats.csv import Csv
 from cdtool.formats.large_integers import rounded_integers
-from cdtool.formats.pieces import join_pieces
 from tests.formats.conftest import COLUMNS
 
 EPOCH = 1_700_000_000_123_456_789
@@ -91,18 +89,6 @@ def test_any_stamps_are_exact_to_the_nanosecond(log, machine, first, steps, unit
     time = read_recording(path, machine(clock_in(unit)))["speed"].time
     assert same(time, [stamp - first for stamp in stamps[: len(time)]])
     assert len(time) >= len(stamps) - (not last)
-
-
-def test_without_a_machine_file_rounded_stamps_are_counted(log):
-    text = "stamp,x\n" + "".join(f"{EPOCH + i},{i}\n" for i in range(30))
-    for source in (Csv().columns(log(text)), join_pieces(Csv().pieces(log(text)), sort=False)):
-        assert rounding_findings(source) == [Finding("rounded_integers", "stamp", {"count": 30})]
-
-
-def test_rounded_numbers_of_other_columns_are_counted_with_a_machine_file(log, machine):
-    rows = "".join(f"{i},1,{2**53 + 2 * i - 4}\n" for i in range(8))
-    recording = read_recording(log("t,i_motor,n_motor\n" + rows), machine())
-    assert rounding_findings(recording)[0] == Finding("rounded_integers", "n_motor", {"count": 5})
 
 
 @pytest.mark.parametrize(

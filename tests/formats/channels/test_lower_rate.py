@@ -70,10 +70,6 @@ def test_single_missing_cells_and_a_sensor_that_fails_stay_missing_values(log, m
     assert ("missing_values", {"count": 150, "values": 400}) in facts(dead, "speed") and len(dead["speed"]) == 400
 
 
-def test_a_label_in_few_rows_keeps_all_rows(log, machine):
-    assert len(read_recording(log(table()), machine(CHANNELS))["label"]) == 400
-
-
 def test_info_shows_the_rate_of_a_channel_and_no_missing_values(log, machine):
     path = log(table())
     plain = {channel.name: channel for channel in cdtool.info(path).channels}

@@ -13,13 +13,10 @@ from hypothesis import strategies as st
 from cdtool import convert
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
-from cdtool.formats.channels.parts import join_parts, missing_part_findings
 from cdtool.formats.channels.reading import log_parts, read_recording, survey
-from cdtool.formats.columns import Column
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.formats.source import Source, TopicDetails
+from cdtool.formats.source import TopicDetails
 from tests.base.findings.facts import fact_of
 
 START = 1_700_000_000
@@ -90,15 +87,6 @@ def test_parts_are_ordered_by_their_times_and_not_by_their_names(tmp_path):
     assert source.topics["/speed"].messages == 1100
 
 
-def test_a_topic_in_only_some_parts_is_surveyed_from_these(tmp_path):
-    folder = bag(tmp_path / "bag", count=2)
-    time = 2.0 + np.arange(50) / 50
-    write_part(folder / "bag_2.mcap", time, time, ("/speed", "/event"))
-    source = survey(folder)
-    assert len(source.columns["/speed data"].values) == 250
-    np.testing.assert_allclose(source.columns["/event data"].time, time, rtol=0.0, atol=5e-7)
-
-
 def test_overlapping_parts_are_sorted_and_reported(tmp_path):
     folder = tmp_path / "bag"
     folder.mkdir()
@@ -157,16 +145,6 @@ def test_the_missing_last_of_two_parts_is_a_loss(tmp_path):
     assert losses(survey(folder).findings) == [("part_missing", {"part": "bag_1.mcap", "metadata": "metadata.yaml"})]
 
 
-def test_a_compressed_part_is_reported_unless_it_also_exists_uncompressed(tmp_path):
-    folder = bag(tmp_path / "bag")
-    metadata(folder, "".join(["  relative_file_paths:\n", *(f"  - bag_{i}.mcap.zstd\n" for i in range(3))]))
-    assert losses(survey(folder).findings) == []
-    (folder / "bag_1.mcap").rename(folder / "bag_1.mcap.zstd")
-    assert losses(survey(folder).findings) == [
-        ("part_compressed", {"part": "bag_1.mcap.zstd", "metadata": "metadata.yaml"})
-    ]
-
-
 def test_a_part_of_another_format_than_the_others_is_a_loss(tmp_path):
     folder = bag(tmp_path / "bag", count=1)
     (folder / "bag_1.db3").write_bytes(b"SQLite format 3\0")
@@ -182,17 +160,6 @@ def test_a_folder_without_any_of_its_parts_is_refused_with_the_name_of_the_first
         with pytest.raises(RecordingError, match=r"part bag_0\.db3 of metadata\.yaml is not in the folder") as fault:
             read(tmp_path)
         assert "\n" not in str(fault.value)
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "relative_file_paths:", "relative_file_paths: [", "relative_file_paths: none", "\0\xff" * 50, "- a\n- b\n"],
-    ids=["empty", "no item", "an open list", "a word", "bytes", "another list"],
-)
-def test_metadata_that_cannot_be_parsed_has_no_effect(tmp_path, text):
-    folder = bag(tmp_path / "bag", count=1)
-    (folder / "metadata.yaml").write_bytes(text.encode("latin-1"))
-    assert missing_part_findings(folder, log_parts(folder)) == []
 
 
 def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
@@ -240,20 +207,6 @@ def test_parts_that_overlap_are_refused(tmp_path):
     write_part(folder / "bag_1.mcap", 0.5 + np.arange(100) / 100, np.zeros(100))
     with pytest.raises(RecordingError, match=r"bag_1\.mcap: overlaps the previous part"):
         read_recording(folder, machine(tmp_path))
-
-
-def test_a_stray_stamp_at_the_beginning_of_a_part_is_no_overlap(tmp_path):
-    parts = []
-    for number in (0, 1):
-        time = number + np.arange(100) / 100
-        time[0] -= START * number  # the stamp of a header that is not set
-        column = Column("/speed data", np.arange(100.0), time)
-        parts.append(Source(tmp_path / f"bag_{number}.mcap", "mcap", {column.name: column}, START))
-    item = ChannelSource("speed", topic="/speed", field="data", keys=("/speed data",))
-    joined, _ = join_parts(
-        tmp_path, [(part, ChannelMap(TimeSource(), (item,), ("axis",), topics=True)) for part in parts]
-    )
-    assert len(joined.columns["/speed data"].values) == 200
 
 
 def test_a_table_with_the_suffix_of_a_part_is_one_line(tmp_path):

@@ -7,7 +7,6 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.formats.channels.reading import choose_format, read_recording, survey
-from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
 from tests.data_folder import UR10E_LOGS
 from tests.formats.conftest import TOPICS
@@ -106,19 +105,3 @@ def test_a_six_joint_arm_logged_without_a_header_is_read_by_column_numbers(machi
     assert recording.joints == tuple(joints)
     assert recording.duration == pytest.approx(19.72, abs=0.05)
     assert recording.start == pytest.approx(3262.867)
-
-
-def test_a_folder_of_mcap_files_is_one_log_in_parts(tmp_path):
-    bag = tmp_path / "bag"
-    bag.mkdir()
-    time = np.arange(1000) * 1e-3
-    for number in (0, 1):
-        stream = Stream("/speed", "std_msgs/msg/Float64", time, {"data": time + number})
-        write_mcap(bag / f"bag_{number}.mcap", [stream], start_ns=10**18 + number * 10**9)
-    (tmp_path / "machine.toml").write_text(
-        '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n'
-        '[channels.mcap]\nspeed = { topic = "/speed", field = "data" }\n'
-    )
-    recording = read_recording(bag, read_machine_file(tmp_path / "machine.toml"))
-    assert recording.name == "bag" and len(recording["speed"]) == 2000
-    assert recording["speed"].time[-1] == pytest.approx(1.999)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.base.errors import ConfigurationError, RecordingError, UsageError
+from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.reading import read_as_logged
-from cdtool.formats.channels.run_reading import read_runs, split_run
+from cdtool.formats.channels.run_reading import read_runs
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.recordings.operations import RunCut
@@ -153,24 +153,6 @@ def test_runs_can_be_chosen_by_id_or_by_pattern(tmp_path, machine):
     assert read_runs(Path(f"{log}#a2"), machine, cut).runs[0].recording.digest == whole.digest
 
 
-def test_a_file_whose_name_contains_the_mark_is_no_run(tmp_path):
-    path = tmp_path / "log#1.csv"
-    path.touch()
-    assert split_run(path) == (path, "")
-    assert split_run(Path(f"{path}#7")) == (path, "7")
-    assert split_run(tmp_path / "none.csv#7") == (tmp_path / "none.csv", "7")
-
-
-def test_a_line_number_in_a_finding_is_that_of_the_file(tmp_path, machine):
-    second = table(1)
-    second[20] = second[19]
-    lines = [f"{row},1" for row in table(0)] + [f"{row},2" for row in second]
-    log = tmp_path / "log.csv"
-    log.write_text("\n".join(["t,w,tau,cell,run_id", *lines, ""]))
-    repeated = [fact_of(item) for item in read_runs(log, machine, RunCut("clock-reset")).runs[1].recording.findings]
-    assert [fact.numbers["first"] for fact in repeated if fact.kind == "repeated_stamps"] == [(1 + ROWS + 21,)]
-
-
 @pytest.mark.parametrize(
     ("cut", "words"),
     [
@@ -304,60 +286,3 @@ def test_texts_of_parquet_and_hdf5_are_ids(tmp_path, machine):
         assert [Path(logged.recording.source).name for logged in found.runs] == [f"{path.name}#A", f"{path.name}#B"]
         assert_equal_runs(found, tmp_path, machine, [0, 2])
         assert [item.numbers["count"] for item in found.findings if item.kind == "samples_outside_runs"] == [ROWS]
-
-
-def test_columns_with_clocks_of_their_own_are_cut_where_each_clock_starts_again(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    (tmp_path / "machine.toml").write_text(
-        MACHINE.replace('"t", unit', '"time", unit')
-        .replace('"w"', '"drive/w"')
-        .replace('"tau"', '"drive/tau"')
-        .replace('"cell"', '"cell/f"')
-    )
-    machine = read_machine_file(tmp_path / "machine.toml")
-    with h5py.File(tmp_path / "log.h5", "w") as file:
-        for group, rate, names in (("drive", 100, ("w", "tau")), ("cell", 400, ("f",))):
-            time = np.tile(np.arange(rate) / rate, 3)
-            file[f"{group}/time"] = time
-            file[f"{group}/time"].attrs["unit"] = "s"
-            for name in names:
-                file[f"{group}/{name}"] = np.arange(3.0 * rate)
-    found = read_runs(tmp_path / "log.h5", machine, RunCut("clock-reset"))
-    first = [(run.recording["speed"].values[0, 0], run.recording["force"].values[0, 0]) for run in found.runs]
-    assert first == [(0.0, 0.0), (100.0, 400.0), (200.0, 800.0)]
-
-
-def test_an_id_with_a_clock_of_its_own_holds_until_the_next_one(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    (tmp_path / "machine.toml").write_text(
-        MACHINE.replace('"t", unit', '"time", unit')
-        .replace('torque = { column = "tau", unit = "N m" }\n', "")
-        .replace('"w"', '"drive/w"')
-        .replace('"cell"', '"cell/f"')
-    )
-    with h5py.File(tmp_path / "log.h5", "w") as file:
-        for name, time, values in (
-            ("drive/w", np.arange(300) / 100.0, np.arange(300.0)),
-            ("cell/f", np.arange(100) / 33.0, np.arange(100.0)),
-            ("state/run", np.array([0.5, 1.0, 1.5, 2.0]), np.array([3.0, 3.0, 8.0, 8.0])),
-        ):
-            group = file.require_group(name.partition("/")[0])
-            group["time"], file[name] = time, values
-            group["time"].attrs["unit"] = "s"
-    found = read_runs(tmp_path / "log.h5", read_machine_file(tmp_path / "machine.toml"), RunCut("column", "state/run"))
-    spans = [(run.recording.name, run.recording["speed"].values[[0, -1], 0].tolist()) for run in found.runs]
-    assert spans == [("log#3", [50.0, 149.0]), ("log#8", [150.0, 299.0])]
-    assert [run.recording["force"].values[0, 0] for run in found.runs] == [17.0, 50.0]
-
-
-@pytest.mark.parametrize("text", ["column:", "label: ", "columns:x", "clockreset", "", "column"])
-def test_another_word_for_a_cut_is_refused(text):
-    with pytest.raises(UsageError):
-        RunCut.of(text)
-
-
-def test_a_machine_file_without_channels_is_named(tmp_path):
-    path = tmp_path / "machine.toml"
-    path.write_text('[machine]\ntype = "rotary_axis"\ncoordinates = "load"\n')
-    with pytest.raises(ConfigurationError, match="no channel in"):
-        read_runs(log_of(tmp_path / "log.csv", ["1"]), read_machine_file(path), RunCut("column", "run_id"))

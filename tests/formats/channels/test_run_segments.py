@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.formats.channels.run_segments import id_text, segments_by_id, segments_by_reset
+from cdtool.formats.channels.run_segments import segments_by_id, segments_by_reset
 
 NAN = float("nan")
 
@@ -36,11 +36,6 @@ def test_every_sample_with_an_id_is_in_exactly_one_run_which_has_this_id(parts):
         assert len(set(names(found))) == len(found)
 
 
-def test_an_id_that_comes_back_is_a_second_run():
-    found = segments_by_id(np.array([1.0, 1.0, 2.0, 1.0, 2.0, 1.0]), {}, True)
-    assert names(found) == ["1", "2", "1/2", "2/2", "1/3"]
-
-
 def test_missing_ids_are_bridged_only_between_equal_ids():
     ids = np.array([NAN, 1.0, NAN, 1.0, NAN, 2.0, NAN])
     assert spans(segments_by_id(ids, {}, True)) == [(1, 4), (5, 6)]
@@ -51,13 +46,6 @@ def test_texts_that_would_have_the_same_name_have_names_of_their_own():
     words = {-1.0: "A", -2.0: "A/2", -3.0: " A_2", -4.0: "..\\A"}
     assert names(segments_by_id(np.array([-2.0, -3.0, -4.0]), words, True)) == ["A_2", "A_2/2", ".._A"]
     assert names(segments_by_id(np.array([-1.0, -2.0, -1.0, -2.0]), words, True)) == ["A", "A_2", "A/2", "A_2/2"]
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(7.0, "7"), (0.5, "0.5"), (0.1 + 0.2, "0.30000000000000004"), (-1.0, "a?b"), (1e300, "1e+300")]
-)
-def test_an_id_is_written_with_the_digits_that_it_needs_and_without_control_characters(value, text):
-    assert id_text(value, {-1.0: "a\x1bb"}) == text
 
 
 @settings(max_examples=40)

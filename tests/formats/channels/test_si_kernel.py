@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cdtool.base.errors import RecordingError
-from cdtool.formats.channels.channel_assembly import _is_constant, convert_to_si
+from cdtool.formats.channels.channel_assembly import convert_to_si
 from cdtool.formats.channels.channel_map import ChannelSource
-from cdtool.recordings.clock import differentiate, integrate
 from cdtool.recordings.plausible import IMPOSSIBLE
-from cdtool.recordings.recording import UNITLESS, Series
+from cdtool.recordings.recording import UNITLESS
 
 NUMBER = st.sampled_from(
     [0.0, -0.0, 1.0, -1.0, 5.0, math.nan, math.inf, -math.inf, 1e308, -1e308, IMPOSSIBLE, -IMPOSSIBLE]
@@ -60,27 +57,3 @@ def test_values_and_counts_are_those_of_whole_arrays(data, joints, channel, vali
         assert np.array_equal(np.isnan(scaled), ~known)
         assert scaled[known].tobytes() == expected[known].tobytes()
         assert list(masked.values()) == (counts.tolist() if counts.any() else [])
-
-
-@given(
-    arrays(
-        np.float64,
-        st.tuples(st.integers(0, 6), st.integers(1, 2)),
-        elements=st.sampled_from([0.0, -0.0, 1.0, math.nan, math.inf]),
-    )
-)
-def test_a_value_is_constant_if_all_finite_ones_of_at_least_two_are_equal(values):
-    series = Series(np.arange(len(values), dtype=float), values, "m/s")
-    finite = (column[np.isfinite(column)] for column in values.T)
-    assert _is_constant(series) == [len(known) > 1 and bool(np.all(known == known[0])) for known in finite]
-
-
-def test_channels_of_one_clock_share_its_times_and_its_period():
-    clock = Series([0.0, 0.1, 0.2], [1.0, 2.0, 3.0], "rad")
-    assert clock.period == 0.1
-    for made in (clock.with_values([1, 2, 3], "m"), integrate(clock, "m"), differentiate(clock, 50.0, "rad/s")):
-        assert made.time is clock.time
-        assert made.period == clock.period
-        assert made.values.dtype == np.float64 and made.values.shape == (3, 1) and not made.values.flags.writeable
-    with pytest.raises(RecordingError, match="expected"):
-        clock.with_values([1.0, 2.0], "m")

@@ -50,15 +50,6 @@ def test_channels_of_different_clocks_make_one_recording(two_groups, tmp_path):
     assert recording["position"].values.shape == (10, 2)
 
 
-def test_a_clock_column_of_the_machine_file_takes_precedence_over_the_files_own(two_groups, tmp_path):
-    text = MACHINE.replace('"time", unit = "s"', '"drive/t", unit = "s"').replace(
-        'force = { column = "cell/force", unit = "N" }', ""
-    )
-    (tmp_path / "machine.toml").write_text(text)
-    recording = read_recording(two_groups, read_machine_file(tmp_path / "machine.toml"))
-    assert recording["position"].time[-1] == 90.0
-
-
 def test_an_epoch_clock_of_the_machine_file_beside_the_files_own_is_subtracted_once(tmp_path):
     with h5py.File(tmp_path / "log.h5", "w") as file:
         for name in ("clock", "time"):
@@ -127,15 +118,6 @@ def test_a_declared_dataset_without_data_is_refused_by_its_size(tmp_path):
         file.create_dataset("v", shape=(10**10,), dtype="f8", chunks=(2**16,))
     with pytest.raises(RecordingError, match="times its size: refused"):
         survey(path)
-
-
-def test_the_epoch_is_subtracted_from_the_times(tmp_path):
-    path = tmp_path / "log.h5"
-    with h5py.File(path, "w") as file:
-        file.create_dataset("time", data=1.7e9 + np.arange(5.0)).attrs["unit"] = "s"
-        file["v"] = np.arange(5.0)
-    source = survey(path)
-    assert source.origin == 1.7e9 and source.columns["v"].time.tolist() == [0, 1, 2, 3, 4]
 
 
 def test_damaged_files_are_one_line(two_groups):

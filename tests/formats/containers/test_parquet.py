@@ -62,16 +62,6 @@ def test_integers_that_float64_cannot_represent_are_reported(saved):
     assert one.findings[0] == Finding("rounded_integers", "big", {"count": 1})
 
 
-def test_a_file_cut_off_anywhere_is_one_line(saved):
-    path = saved({"t": np.arange(5000.0), "v": np.random.default_rng(1).normal(size=5000)})
-    data = path.read_bytes()
-    for cut in (7, 9, 40, len(data) // 3, len(data) // 2, len(data) - 300, len(data) - 9, len(data) - 1):
-        path.write_bytes(data[:cut])
-        with pytest.raises(RecordingError) as caught:
-            Parquet().columns(path)
-        assert "\n" not in str(caught.value) and path.name in str(caught.value)
-
-
 def test_flipped_bytes_are_one_line_or_a_table(saved):
     path = saved({"t": np.arange(500.0), "v": np.random.default_rng(1).normal(size=500)}, compression="zstd")
     data = bytearray(path.read_bytes())

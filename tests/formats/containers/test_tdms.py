@@ -111,20 +111,6 @@ def test_waveforms_without_a_start_keep_their_offset_from_the_common_origin(save
     assert fact_of(warning) == ("no_start_time", {"channels": ("n",)})
 
 
-def test_a_start_in_1904_is_an_empty_stamp(saved):
-    empty = np.datetime64("1904-01-01T00:00:00", "us")
-    rows = [channel("m", name, np.arange(5.0), wf_increment=0.01, wf_start_time=empty) for name in "ab"]
-    source = survey(saved(rows))
-    assert source.origin == 0.0 and not source.findings
-    source = survey(saved([*rows, channel("m", "c", np.arange(5.0), wf_increment=0.01, wf_start_time=START)]))
-    assert fact_of(source.findings[0]) == ("no_start_time", {"channels": ("a", "b")})
-
-
-def test_an_integer_increment_is_a_clock(saved):
-    source = survey(saved([channel("m", "i", np.arange(5.0), wf_increment=2)]))
-    assert source.columns["i"].time.tolist() == [0, 2, 4, 6, 8]
-
-
 def test_stamps_in_nanoseconds_since_1970_are_exact_next_to_waveforms(saved):
     first = int(START.astype("datetime64[ns]").astype(np.int64)) + 123_456_789
     stamps = first + np.cumsum(np.random.default_rng(5).integers(900_001, 1_100_000, 200))
@@ -153,13 +139,3 @@ def test_a_clock_with_its_own_start_is_not_shifted_and_is_reported(saved):
     source = survey(path)
     assert source.columns["F"].time.tolist() == [0.0, 0.001, 0.002, 0.003, 0.004]
     assert ("no_start_time", {"channels": ("F",)}) in [fact_of(finding) for finding in source.findings]
-
-
-def test_warnings_of_the_library_are_reported_and_not_printed(saved, capfd):
-    path = saved([channel("m", "v", np.arange(100.0))])
-    path.write_bytes(path.read_bytes()[:-30])
-    source = survey(path)
-    assert capfd.readouterr() == ("", "")
-    told = [finding for finding in source.findings if finding.kind == "library_message"]
-    assert [item.severity for item in told if item.numbers["text"].startswith("Last segment")] == ["note"]
-    assert [finding.severity for finding in source.findings].count("loss") == 1

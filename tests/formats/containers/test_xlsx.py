@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
-from cdtool.commands.judging.information import info
 from cdtool.formats.channels.reading import choose_format, read_as_logged, survey
 from cdtool.formats.containers.xlsx import Xlsx
 from cdtool.formats.csv import Csv
@@ -93,13 +92,6 @@ def test_a_preamble_blank_rows_and_an_offset_are_those_of_a_text_table(tmp_path)
     assert np.isfinite(source.columns["t [s]"].values).sum() == 15
 
 
-def test_texts_with_a_decimal_comma_are_numbers(tmp_path):
-    rows = [[0.01 * i, f"{0.5 * i:.2f}".replace(".", ",")] for i in range(20)]
-    source = survey(save(tmp_path / "log.xlsx", Run=[["t", "F"], *rows]))
-    assert source.columns["F"].values.tolist() == [0.5 * i for i in range(20)]
-    assert source.columns["t"].values.tolist() == [0.01 * i for i in range(20)]
-
-
 def test_a_table_opened_with_the_wrong_decimal_mark_is_a_warning(tmp_path):
     """1,234 became 1234, and 1,5 stayed a text."""
     rows = [[0.01 * i, 1234 if i % 5 == 0 else f"1,{i}"] for i in range(20)]
@@ -150,12 +142,6 @@ def test_a_time_of_day_in_any_format_passes_midnight(tmp_path):
     workbook.save(tmp_path / "log.xlsx")
     steps = np.diff(survey(tmp_path / "log.xlsx").columns["t"].values)
     np.testing.assert_allclose(steps, 1.0, rtol=0.0, atol=1e-5)
-
-
-def test_excel_days_without_a_date_format_are_the_clock_in_days(tmp_path):
-    rows = [[45231.5 + 0.01 * i / 86400, 1.0 * i] for i in range(50)]
-    shown = info(save(tmp_path / "log.xlsx", Run=[["time", "F"], *rows]))
-    assert shown.channels[0].rate_hz == pytest.approx(100.0, rel=1e-3)
 
 
 def test_cells_with_errors_are_missing_and_counted(tmp_path):
@@ -218,16 +204,6 @@ def test_commands_read_a_workbook(tmp_path):
 
 
 # --- Damaged and hostile files
-
-
-@pytest.mark.parametrize("share", [0.02, 0.3, 0.7, 0.99])
-def test_a_truncated_workbook_is_one_clear_error(tmp_path, share):
-    path = save(tmp_path / "log.xlsx", Run=[["t", "F"], *ramp()])
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(RecordingError, match=r"log\.xlsx: damaged or not an Excel workbook") as fault:
-        survey(path)
-    assert "\n" not in str(fault.value)
 
 
 def test_damaged_bytes_are_one_line_or_the_same_values(tmp_path):

@@ -88,13 +88,6 @@ def test_an_export_separated_by_blanks_is_refused_with_the_option_that_helps(tmp
         survey(path)
 
 
-def test_a_channel_with_the_name_of_another_has_that_of_its_symbol_or_its_column(tmp_path):
-    channels = [Channel("ActPos", "1", ramp(9), symbol=f"Axis{i}.ActPos") for i in (1, 2)]
-    assert survey(write_export(tmp_path / "run.csv", channels, Options())).names == ("Axis1.ActPos", "Axis2.ActPos")
-    alike = [replace(channel, symbol="Axis.ActPos") for channel in channels]
-    assert survey(write_export(tmp_path / "run.csv", alike, Options())).names == ("ActPos#1", "ActPos#2")
-
-
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-be", "latin-1"])
 def test_any_encoding_of_text_is_read(tmp_path, encoding):
     channels = [replace(CHANNELS[0], name="Geschwindigkeit [ä²]"), *CHANNELS[1:]]
@@ -167,18 +160,6 @@ def test_words_in_a_channel_leave_it_out_of_a_survey_and_are_an_error_where_it_i
         read_recording(tmp_path / "run.csv", machine(CHANNEL_MAP.replace("ActTorque", "sState")))
 
 
-def test_the_end_mark_is_a_note_and_words_between_rows_are_refused(tmp_path):
-    text = export(CHANNELS, Options(eof=True, end="\n"))
-    path = tmp_path / "run.csv"
-    path.write_text(text)
-    assert [finding.kind for finding in survey(path).findings] == ["words_below_rows"]
-    lines = text.splitlines()
-    lines.insert(-20, "EOF")
-    path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(RecordingError, match="'EOF' between the rows"):
-        survey(path)
-
-
 def test_a_truncated_line_is_dropped_and_reported(tmp_path):
     path = write_export(tmp_path / "run.csv", SORTED, Options())
     path.write_bytes(path.read_bytes()[:-6])
@@ -209,18 +190,6 @@ def test_an_export_without_any_name_is_refused_with_the_option_that_helps(tmp_pa
     (tmp_path / "run.csv").write_text(text)
     with pytest.raises(RecordingError, match=r"no line with the names of channels .*at least the names"):
         survey(tmp_path / "run.csv")
-
-
-def test_a_row_with_more_cells_than_names_is_refused_with_its_line(tmp_path):
-    text = export(CHANNELS, Options(end="\n"))
-    (tmp_path / "run.csv").write_text(text + "39.2\t1\t2\t3\t4\t5\t6\t7\t8\n")
-    with pytest.raises(RecordingError, match=rf"line {text.count(chr(10)) + 1} has 9 cells, the header has 7"):
-        survey(tmp_path / "run.csv")
-
-
-def test_a_table_with_a_column_called_name_is_no_export(tmp_path):
-    (tmp_path / "run.csv").write_text("Name,a,b\n" + "".join(f"{i},{i / 2},{i * 2}\n" for i in range(20)))
-    assert choose_format(tmp_path / "run.csv").name == "csv"
 
 
 def test_pinned_lines_are_those_of_a_table(tmp_path, machine):

@@ -34,17 +34,6 @@ def test_contacts_are_found_by_path_or_by_file_name(tmp_path):
     assert labels.contacts[labels.name_of("free.csv")] == () and labels.name_of("03.csv") is None
 
 
-def test_every_contact_has_its_line_in_the_order_of_time(tmp_path):
-    labels = read_labels(write(tmp_path, "recording,start_s,end_s\na.csv,3,4\nfree.csv,,\na.csv,1,2\n"))
-    assert [line.rpartition("/")[2] for line in labels.lines["a.csv"]] == ["labels.csv line 4", "labels.csv line 2"]
-    assert labels.lines["free.csv"][0].endswith("line 3")
-
-
-def test_a_byte_order_mark_and_spaces_in_the_header_do_not_matter(tmp_path):
-    labels = read_labels(write(tmp_path, "\ufeffrecording, start_s, end_s\na.csv,1,2\n"))
-    assert labels.contacts["a.csv"][0].start == 1.0
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -124,11 +113,6 @@ def test_a_label_is_as_uncertain_as_its_log_or_its_last_digit(tmp_path, text, un
     signal = Signal(time, np.zeros((1000, 1)), np.zeros((1000, 1), dtype=np.uint8), "N")
     matching = match(Verdict("alarm", (early,), crossings=(early,)), [contact], signal)
     assert (matching.matches[0].outcome, matching.matches[0].latency, matching.false_alarms) == ("detected", 0.0, ())
-
-
-def test_a_label_without_the_zeros_at_its_end_is_as_uncertain_as_the_others(tmp_path):
-    labels = read_labels(write(tmp_path, "recording,start_s,end_s\n01.csv,2,\n02.csv,1.953,\n"))
-    assert labels.contacts["01.csv"][0].resolution == pytest.approx(0.001)
 
 
 ON_SOURCE = {

@@ -31,11 +31,6 @@ def test_without_a_detector_the_file_name_is_used(tmp_path):
     assert list(read(tmp_path, "recording,time_s,detector\na.csv,1, \n").rows) == ["plc"]
 
 
-def test_byte_order_mark_blanks_and_windows_paths_do_not_matter(tmp_path):
-    given = read(tmp_path, "\ufefftime_s, recording\r\n 1.5 , .\\stiff\\01.csv \r\n")
-    assert given.rows["plc"] == {"stiff/01.csv": Triggered([1.5])}
-
-
 def test_a_recording_is_named_by_its_path_or_by_a_file_name_that_is_unique(tmp_path):
     given = read(tmp_path, "recording,time_s\nstiff/01.csv,1\n02.csv,2\nsoft/02.csv,3\nother.csv,4\nfree/02.csv,5\n")
     said, strangers = given.assigned({"stiff/01.csv", "soft/02.csv"})
@@ -77,8 +72,3 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, said):
     with pytest.raises(ConfigurationError, match=said) as fault:
         read(tmp_path, text)
     assert "plc.csv" in fault.value.message and fault.value.hint
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"none\.csv"):
-        read_triggers(tmp_path / "none.csv")

@@ -91,36 +91,6 @@ def test_without_any_checksum_nothing_is_recovered_unless_requested(tmp_path):
     assert fact_of(findings[0]) == ("unverified", {"count": 24, "messages": 24})
 
 
-def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path):
-    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
-    sent = small_file(source, use_chunking=False, enable_data_crcs=True)
-    assert recover(source, output).whole
-    assert read(output)[2].unverified == 0
-    source.write_bytes(source.read_bytes().replace(sent[5][2], sent[6][2]))
-    with pytest.raises(RecordingError, match="has a checksum"):
-        recover(source, output, force=True)
-    done = recover(source, output, unverified=True, force=True)
-    assert not done.whole
-    assert "the checksum of the data section does not match" in provenance_of(output)["lost"]
-    assert read(output)[2].unverified == len(sent)
-
-
-def test_verified_messages_keep_a_checksum_after_unverified_ones(tmp_path):
-    """Channels are defined in a chunk without a checksum, and again in one with a checksum."""
-    source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
-    sent = small_file(source)
-    whole = bytearray(source.read_bytes())
-    first = min(Log(source).summary.chunks)
-    whole[first + 33 : first + 37] = bytes(4)  # the first chunk's CRC: 0, no checksum
-    source.write_bytes(whole)
-    unverified = read(source)[2].unverified
-    assert 0 < unverified < len(sent)
-    recover(source, output, unverified=True)
-    messages, _, log = read(output)
-    assert messages == sent
-    assert log.unverified == unverified
-
-
 def test_attachments_and_metadata_are_recovered(tmp_path):
     from mcap.writer import Writer
 
@@ -139,15 +109,6 @@ def test_attachments_and_metadata_are_recovered(tmp_path):
         assert (attachment.name, attachment.data, attachment.log_time) == ("note.bin", b"\x00\x01" * 700_000, 2)
         assert {record.name: record.metadata for record in reader.iter_metadata()}["machine"] == {"name": "gate"}
     assert [opcode for opcode, _, _ in read(output)[2].section.extras].count(Opcode.ATTACHMENT) == 1
-
-
-def test_the_same_file_gives_the_same_bytes(tmp_path):
-    source = tmp_path / "log.mcap"
-    small_file(source, "zstd")
-    outputs = [tmp_path / "1.mcap", tmp_path / "2.mcap"]
-    for output in outputs:
-        recover(source, output)
-    assert outputs[0].read_bytes() == outputs[1].read_bytes()
 
 
 def test_wrong_names_are_one_clear_error(tmp_path):

@@ -5,11 +5,9 @@ from __future__ import annotations
 import struct
 
 import pytest
-from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from cdtool.base.errors import RecordingError
-from cdtool.commands.convert.recovering import recover
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.mcap import Mcap
 from tests.base.findings.facts import fact_of
@@ -91,11 +89,6 @@ def test_backward_stamps_are_reported_with_the_message(tmp_path, late, severity,
     )
 
 
-def test_stamps_in_order_are_not_reported(tmp_path):
-    path = write(tmp_path / "log.mcap", [(0, (5 + i // 2) * MS, cdr(float(i), 0.0)) for i in range(50)])
-    assert not facts_above_notes(Mcap().columns(path))
-
-
 def test_two_channels_of_a_topic_are_reported(tmp_path):
     messages = [(i % 2, i * MS, cdr(float(i), 0.0)) for i in range(20)]
     path = write(tmp_path / "log.mcap", messages, channels=2)
@@ -117,12 +110,6 @@ def test_a_message_longer_than_its_definition_is_not_read(tmp_path, every):
     assert source.columns["/a force"].values.tolist() == [float(i) for i in range(30) if i % every]
     fact = facts_above_notes(source)[0]
     assert fact.kind == "undecodable_messages" and (fact.numbers["count"], fact.numbers["messages"]) == (10, 30)
-
-
-def test_up_to_three_bytes_of_padding_are_ignored(tmp_path):
-    payloads = [cdr(float(i), 1.0) + bytes(i % 4) for i in range(30)]
-    path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i, payload in enumerate(payloads)])
-    assert Mcap().columns(path, wanted(("/a", "force"))).columns["/a force"].values.tolist() == list(range(30))
 
 
 @pytest.mark.parametrize("head", ["0101", "8001", "0003", "0007"])
@@ -155,12 +142,6 @@ def test_different_numbers_of_names_and_elements_are_refused(tmp_path):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("b", "a")))
 
 
-def test_an_index_with_non_ascii_digits_is_a_name(tmp_path):
-    path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["a"], [1.0])) for i in range(3)], encoding="json")
-    with pytest.raises(RecordingError, match="no message names this joint"):
-        Mcap().columns(path, wanted(("/a", "position[\u00b2]")))
-
-
 def test_a_file_appended_to_a_log_is_reported_and_not_as_a_false_summary(tmp_path):
     first, second = tmp_path / "a.mcap", tmp_path / "b.mcap"
     small_file(first)
@@ -177,11 +158,3 @@ def test_a_file_appended_to_a_log_is_reported_and_not_as_a_false_summary(tmp_pat
             "read_before": None,
         },
     )
-
-
-def test_a_recovered_file_has_the_profile_of_its_source(tmp_path):
-    path = write(tmp_path / "log.mcap", [(0, i * MS, cdr(float(i), 0.0)) for i in range(50)])
-    path.write_bytes(path.read_bytes()[:-100])
-    recover(path, tmp_path / "clean.mcap")
-    with (tmp_path / "clean.mcap").open("rb") as file:
-        assert make_reader(file).get_header().profile == "ros2"

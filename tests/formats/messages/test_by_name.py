@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from functools import cache
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -14,7 +13,6 @@ from cdtool.base.errors import RecordingError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.messages.decoded_batch import ABSENT, OTHER_JOINTS, PRESENT
 from cdtool.formats.messages.decoders import decoder_for
-from cdtool.formats.messages.fields import element_names
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 from tests.formats.messages import test_cdr, test_ros1
 from tests.formats.messages.batches import assert_follows_field_language, batch_of, fields_of, same
@@ -158,17 +156,6 @@ def item(x):
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-def test_an_element_is_found_at_any_position_and_its_absence_differs_from_an_empty_array(encoding):
-    messages = [states(["a", "b"]), states(["b", "a"]), states(["a"]), states(["b"], pose=[]), states(["a", "b", "b"])]
-    decoder, payloads = encode(encoding, messages)
-    number, whole = decoder.decode(batch_of(payloads), fields_of("pose[b].x", "pose[b].q[:]")).fields
-    assert same(number.values, [98.0, 98.0, np.nan, np.nan, 98.0])
-    assert number.state.tolist() == whole.state.tolist() == [PRESENT, PRESENT, OTHER_JOINTS, PRESENT, PRESENT]
-    assert same(whole.values, [[98, 99], [98, 99], [np.nan] * 2, [np.nan] * 2, [98, 99]])
-    assert whole.count[whole.state == PRESENT].tolist() == [2, 2, 0, 2]
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
 def test_an_element_beyond_the_end_of_an_array_in_a_named_element_is_a_fault_of_its_message(encoding):
     messages = [states(["b"]), states(["a", "b"]), states(["a"])]
     decoder, payloads = encode(encoding, messages)
@@ -192,22 +179,6 @@ def test_a_field_that_the_schema_does_not_have_is_absent_with_the_reason(encodin
     decoder, payloads = encode(encoding, [states(["a", "b"])])
     (field_values,) = decoder.decode(batch_of(payloads), fields_of(text)).fields
     assert field_values.state.tolist() == [ABSENT] and problem in field_values.fault.problem
-
-
-def test_an_array_without_names_next_to_it_is_an_error_as_in_json():
-    text = f"test_msgs/Item[] pose\n{RULE}\nMSG: test_msgs/Item\nstring name\nfloat64 x\n"
-    message = {"pose": [{"name": "b", "x": 1.0}]}
-    (field_values,) = test_cdr.read(text, [test_cdr.encode(text, message)], fields_of("pose[b].x")).fields
-    decoder = decoder_for("json", "", "", b"")
-    (expected,) = decoder.decode(batch_of([json.dumps(message).encode()]), fields_of("pose[b].x")).fields
-    assert field_values.fault.problem == expected.fault.problem == "there is no 'name'"
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS[1:])
-def test_the_names_are_those_next_to_the_array(encoding):
-    decoder, payloads = encode(encoding, [states(["b", "a"]), states(["c"])])
-    contents = decoder.contents(batch_of(payloads))
-    assert [element_names(content) for content in contents] == [["b", "a"], ["c"]]
 
 
 def test_damage_that_only_one_field_reveals_applies_to_all_fields_of_the_message():

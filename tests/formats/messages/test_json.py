@@ -77,34 +77,6 @@ def test_random_objects_decode_as_the_field_language_defines(objects, order):
     }
 
 
-ALIKE = st.fixed_dictionaries(
-    {
-        "header": st.fixed_dictionaries(
-            {"stamp": st.fixed_dictionaries({"sec": st.integers(0, 2**31), "nsec": st.integers(0, 10**9 - 1)})}
-        ),
-        "a": NUMBERS,
-        "b": st.fixed_dictionaries({"c": NUMBERS, "q": st.lists(NUMBERS, min_size=2, max_size=2), "name": ORDERS}),
-        "name": st.sampled_from([["x", "y"]] * 9 + [["y", "x"], ["x"], "x"]),
-        "q": st.lists(st.floats(), min_size=2, max_size=2),
-    }
-)
-
-
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(st.lists(ALIKE, min_size=1, max_size=6), st.one_of(st.none(), OBJECTS, TEXTS), st.integers(0, 6))
-def test_each_field_of_messages_alike_and_of_one_that_is_not(alike, other, place):
-    if other is not None:
-        alike.insert(place, other)
-    payloads = [json.dumps(value).encode() + b" \n" * (place > 3) for value in alike]
-    for field in ("a", "b.c", "q[:]", "q[1]", "q[x]", "b.q[:]", "name[0]"):
-        for joints in ((), JOINTS):
-            assert_equals_python(payloads, (field,), joints)
-    decoded = new_decoder().decode(batch_of(payloads), fields_of("q[0]"), stamps=True)
-    expected = [header_stamp(value) for value in alike]
-    found = zip(decoded.stamps.tolist(), decoded.has_stamp, strict=True)
-    assert [stamp if has else None for stamp, has in found] == expected
-
-
 @settings(max_examples=300, deadline=None)
 @given(st.text(alphabet='{}[]",:\\0123456789.eE+-truefalsn aNIfy\x01é', max_size=30))
 @example('{"a":1}x')
@@ -156,13 +128,6 @@ def test_numbers_equal_pythons_floats_to_the_bit():
     assert same(values, expected)
 
 
-def test_messages_of_many_shapes_decode_to_the_same_values():
-    payloads = [json.dumps({"q": list(range(i % 90)), f"k{i % 7}": {"c": i}, "a": i}).encode() for i in range(300)]
-    decoder = new_decoder()
-    for _ in range(2):
-        assert_equals_python(payloads, ("a", "q[:]", "k3.c", "q[5]"), decoder=decoder)
-
-
 @pytest.mark.parametrize("depth", [60, 900, 100_000])
 def test_deep_nesting_neither_crashes_nor_hangs(depth):
     payload = b'{"a":1,"x":' + b"[" * depth + b"]" * depth + b"}"
@@ -179,13 +144,6 @@ def test_header_stamps_are_read_in_all_spellings():
     decoded = new_decoder().decode(batch_of([json.dumps(each).encode() for each in objects]), [], stamps=True)
     expected = [header_stamp(each) for each in objects[:-1]] + [None]
     assert [s if t else None for s, t in zip(decoded.stamps.tolist(), decoded.has_stamp, strict=True)] == expected
-
-
-def test_a_damaged_message_has_a_reason():
-    decoded = new_decoder().decode(batch_of([b'{"a":1}', b'{"a":', b"[1]"]), fields_of("a"))
-    assert decoded.status.tolist() == [0, 1, 1]
-    assert decoded.reason.startswith("JSONDecodeError: Expecting value")
-    assert new_decoder().decode(batch_of([b"[1]"]), []).reason == "ValueError: the JSON is not an object"
 
 
 def test_more_fields_than_any_recorder_writes_are_refused_with_the_reason(by_hand):  # noqa: F811

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import pytest
 
-from cdtool.formats.messages.decoded_batch import UndecodableError
 from cdtool.formats.messages.decoders import decoder_for
 from cdtool.formats.messages.layout import TEXT, SchemaError
 from cdtool.formats.messages.ros_definitions import parse_definitions
@@ -33,12 +32,6 @@ def test_types_arrays_defaults_constants_and_comments_are_distinguished():
     ]
 
 
-def test_nested_types_are_found_by_their_full_and_short_names():
-    text = f"Inner a\ntest_msgs/Inner b\ntest_msgs/msg/Inner[] c\n{RULE}\nMSG: test_msgs/msg/Inner\nint8 x"
-    assert [member.kind.name for member in members(text)] == ["test_msgs/Inner"] * 3
-    assert members("builtin_interfaces/Time stamp")[0].kind.name == "builtin_interfaces/Time"
-
-
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
@@ -61,20 +54,6 @@ def test_nested_types_are_found_by_their_full_and_short_names():
 def test_a_text_that_is_not_a_message_definition_is_refused_with_the_reason(text, problem):
     with pytest.raises(SchemaError, match=problem.replace("?", r"\?")):
         parse_definitions("test_msgs/msg/Thing", text.encode(errors="surrogateescape"), 2)
-
-
-@pytest.mark.parametrize(
-    ("message", "schema", "text"),
-    [
-        ("cdr", "ros2idl", "schema encoding 'ros2idl' is not supported"),
-        ("protobuf", "", "no schema is not supported"),
-        ("flatbuffer", "flatbuffer", "message encoding 'flatbuffer'"),
-        ("cdr", "ros1msg", "message encoding 'cdr' with schema encoding 'ros1msg'"),
-    ],
-)
-def test_other_encodings_are_refused_by_name(message, schema, text):
-    with pytest.raises(UndecodableError, match=text):
-        decoder_for(message, schema, "a/b", b"")
 
 
 def test_a_survey_lists_every_number_except_the_header_stamp():

@@ -81,17 +81,6 @@ def test_random_messages_decode_as_with_the_package(case, data):
     assert not decoded.status.any()
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(st.data())
-def test_the_parts_of_a_message_are_merged_and_the_last_value_is_used(data):
-    """Concatenated messages are one message (protobuf.dev, "Encoding", "Last One Wins")."""
-    decoder, kind = CASES[data.draw(st.sampled_from(sorted(CASES)))]
-    parts = data.draw(st.lists(contents(False), min_size=2, max_size=3))
-    payload = b"".join(kind(**part).SerializeToString() for part in parts)
-    decoded, _ = assert_equals_package(decoder, kind, [payload, payload], (*decoder.fields(None), *MORE))
-    assert not decoded.status.any()
-
-
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_a_message_cut_at_any_byte_is_damaged_or_decodes_as_with_the_package(data):
@@ -114,18 +103,6 @@ def test_a_message_with_changed_bytes_is_damaged_or_decodes_as_with_the_package(
     assert_equals_package(decoder, kind, [bytes(payload)], (*decoder.fields(None), *MORE))
 
 
-def test_an_omitted_number_is_zero_without_presence_tracking_and_otherwise_nan():
-    decoder, kind = CASES["proto3"]
-    payloads = [kind(inner={}).SerializeToString(), b"", kind(maybe=0.0, left=0.0).SerializeToString()]
-    wanted = fields_of("one_double", "inner.one_double", "maybe", "left", "right.x")
-    values = [field_values.values for field_values in decoder.decode(batch_of(payloads), wanted).fields]
-    nan = math.nan
-    table = [[0, 0, 0], [0, nan, nan], [nan, nan, 0], [nan, nan, 0], [nan] * 3]
-    assert all(same(column, expected) for column, expected in zip(values, table, strict=True))
-    old, kind = CASES["proto2"]
-    assert np.isnan(old.decode(batch_of([b""]), fields_of("one_double")).fields[0].values).all()
-
-
 @pytest.mark.parametrize(
     ("payload", "reason"),
     [
@@ -145,15 +122,6 @@ def test_damage_has_a_reason(payload, reason):
     assert decoded.status.tolist() == [1]
     assert reason in decoded.reason
     assert np.isnan(decoded.fields[0].values).all()
-
-
-def test_elements_interleaved_with_those_of_another_field_stay_in_order():
-    decoder, _ = CASES["proto3"]
-    payload = b"".join(
-        b"\xa1\x01" + np.float64(i).tobytes() + b"\xad\x01" + np.float32(-i).tobytes() for i in range(200)
-    )
-    first, second = decoder.decode(batch_of([payload] * 3), fields_of("many_double[:]", "many_float[:]")).fields
-    assert (first.values == np.arange(200)).all() and (second.values == -np.arange(200)).all()
 
 
 def test_elements_are_found_by_their_names_even_if_these_change():

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import struct
-from io import BytesIO
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cdtool.formats.messages.decoders import decoder_for
-from cdtool.formats.messages.ros_definitions import parse_definitions
 from tests.formats.messages.batches import assert_follows_field_language, batch_of, fields_of
 from tests.formats.messages.ros_messages import definitions
 
@@ -89,17 +87,3 @@ def test_time_and_duration_are_two_numbers_and_the_header_has_a_stamp():
     assert decoder.fields(None) == ["header.seq", "x"]
     moved = decoder_of("duration d").decode(batch_of([struct.pack("<ii", -1, -5)]), fields_of("d.secs", "d.nsecs"))
     assert [field_values.values.tolist() for field_values in moved.fields] == [[-1], [-5]]
-
-
-def test_byte_is_signed_and_char_is_not():
-    text = b"byte a\nchar b\nHeader[] c\n====\nMSG: std_msgs/Header\nint8 x"
-    signed, unsigned, header = (member.kind for member in parse_definitions(NAME, text, 1).members)
-    assert (signed, unsigned, header.name) == ("i1", "u1", "std_msgs/Header")
-
-
-def test_messages_without_members_take_no_bytes_in_any_number():
-    text = f"Nothing[] a\nfloat64 b\n{'=' * 80}\nMSG: test_msgs/Nothing\n"
-    payload = struct.pack("<Id", 2**32 - 1, 2.5)
-    assert decoder_of(text).decode(batch_of([payload]), fields_of("b")).fields[0].values.tolist() == [2.5]
-    with BytesIO(payload) as file:
-        assert decoder_of(text).decode(batch_of([file.read(11)]), fields_of("b")).status.tolist() == [1]

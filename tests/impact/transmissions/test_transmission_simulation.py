@@ -105,13 +105,6 @@ def test_a_value_without_meaning_is_named(make, message):
         make()
 
 
-def test_a_bounce_that_never_ends_is_an_error_and_no_endless_loop(monkeypatch):
-    monkeypatch.setattr("cdtool.impact.transmissions.transmission_simulation._MOST_CONTACTS", 20)
-    frictionless = RigidTransmission(1e-4, 0.0, 0.01)
-    with pytest.raises(UsageError, match="more than 20 contacts"):
-        simulate_impact(frictionless, ConstantTorque(1.0), HuntCrossley(1e9, 0.0), Start(gap=1e-3), duration=100.0)
-
-
 def test_a_torque_limit_bounds_the_torque_and_its_integrator_does_not_wind_up():
     limited = replace(example.SPEED_LOOP, torque_limit=0.6)
     start = Start(gap=0.0, load_speed=0.25)

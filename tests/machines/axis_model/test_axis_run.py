@@ -41,13 +41,6 @@ def test_channels_with_own_jittered_clocks_come_to_the_slower_one() -> None:
     assert run.known("torque", "speed").mean() > 0.99
 
 
-def test_samples_on_one_clock_are_kept_as_they_are() -> None:
-    clock = np.arange(300) * 1e-3
-    run = axis_run(Log(clock, clock).recording())
-    assert len(run) == 300
-    np.testing.assert_allclose(run.torque, 3.0 * clock, atol=1e-12)
-
-
 def test_nothing_is_interpolated_across_a_gap() -> None:
     clock = np.arange(1000) * 1e-3
     run = axis_run(Log(np.delete(clock, slice(300, 350)), clock).recording())

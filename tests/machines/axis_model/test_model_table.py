@@ -104,16 +104,3 @@ stiffness = 8e4
     file = read(tmp_path, text)
     drive = axis_model(file.machine, file.model).drive  # type: ignore[arg-type]
     assert (drive.motor_mass, drive.load_mass) == (534.0, 620.0)
-
-
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ("[model.controller]\nspeed_gain = 4300", "model.controller.period is missing"),
-        ("[model.drive]\nmotor_mass = 100", "are both given"),
-    ],
-)
-def test_values_that_make_no_model_are_refused(tmp_path: Path, more: str, message: str) -> None:
-    file = read(tmp_path, f"{GATE}\n{more}\n")
-    with pytest.raises(ConfigurationError, match=message):
-        axis_model(file.machine, file.model)  # type: ignore[arg-type]

@@ -40,15 +40,6 @@ def swing(amplitude: float) -> tuple[FloatArray, FloatArray]:
     return amplitude * np.cos(0.8 * TIME), amplitude / 0.8 * np.sin(0.8 * TIME)
 
 
-def test_right_channels_agree_with_the_size():
-    checks = list(derivatives([stroke()]))
-    assert [(item.channel, item.numbers["answer"]) for item in checks] == [
-        ("speed", "agrees"),
-        ("acceleration", "agrees"),
-    ]
-    assert [item.numbers["value"] for item in checks] == [pytest.approx(1.0, abs=0.01), pytest.approx(1.0, abs=0.05)]
-
-
 @pytest.mark.parametrize(
     ("factors", "channel", "found", "size", "units"),
     [

@@ -97,13 +97,3 @@ def test_a_reversed_force_is_found_where_starts_show_its_sign(axes, directions):
         found = check_channels([recording(values, "m", sign)], axes["m"])
         (friction,) = [item for item in found if item.numbers["check"] == "friction"]
         assert (friction.numbers["answer"], friction.numbers["found"]) == (answer, "friction")
-
-
-def test_starts_that_a_low_pass_flattens_do_not_contradict_the_inertia(tmp_path):
-    path = tmp_path / "machine.toml"
-    path.write_text('[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 100.0\n', encoding="utf-8")
-    one = np.interp(np.arange(0.0, 4.0, 1.0 / RATE), [0.5, 0.6, 3.4, 3.5], [0.0, 0.3, 0.3, 0.0])
-    position, speed, force = machine(np.concatenate([one, -one, one, -one, one, -one]))
-    filtered = np.convolve(force, np.full(101, 1.0 / 101.0))[: len(force)]
-    found = check_channels([recording([position, speed, filtered], "m")], read_machine_file(path).machine)
-    assert not [str(item) for item in found if item.severity == "loss"]

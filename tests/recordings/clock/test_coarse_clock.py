@@ -77,14 +77,6 @@ def test_no_time_depends_on_stamps_beyond_the_next_changes():
         np.testing.assert_array_equal(clean_time(stamps[:end]).time, whole[:end])
 
 
-def test_a_clock_that_drifts_against_the_samples_is_followed():
-    i = np.arange(300_000)
-    true = np.cumsum(1e-3 * (1.0 + 1e-3 * np.sin(i / 2e4)))
-    clean = clean_time(floor_to_step(true, 0.01))
-    assert clean.keep.all()
-    assert np.abs(clean.time - true).max() < 2e-3
-
-
 def test_samples_of_a_stopped_clock_are_dropped_and_reported_as_a_loss():
     stamps = np.minimum(floor_to_step(np.arange(4000) * 1e-3, 0.01), 2.0)
     clean = clean_time(stamps, first_row=2)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import cdtool
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
-from cdtool.recordings.clock import clean_time, epoch_start
+from cdtool.recordings.clock import clean_time
 from cdtool.recordings.clock.stamps import ClockCleaner
 
 COUNT = 6106
@@ -54,12 +54,6 @@ def test_samples_after_a_pause_are_kept_and_a_stamp_that_runs_backward_is_droppe
     assert clean_time(paused).keep.all()
     paused[4000] -= 0.5
     assert np.flatnonzero(~clean_time(paused).keep).tolist() == [4000]
-
-
-def test_an_epoch_begins_with_the_first_stamp_that_is_not_stray():
-    assert epoch_start(np.array([1e306, *(1.7e12 + np.arange(20.0))]), 1e-3) == 1.7e12
-    assert epoch_start(np.array([0.0, *(1.7e12 + np.arange(20.0))]), 1e-3) == 1.7e12
-    assert epoch_start(np.array([1.7e12, *np.arange(20.0)]), 1e-3) == 0.0
 
 
 @settings(deadline=None, max_examples=60)

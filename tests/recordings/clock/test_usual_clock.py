@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
 from cdtool.detectors.base import missing_after_first
-from cdtool.recordings.clock import EPOCH, clean_time, epoch_start, integrate, previous_value, stamps
+from cdtool.recordings.clock import EPOCH, clean_time, previous_value, stamps
 from cdtool.recordings.clock.coarse_clock import recent_medians
 from cdtool.recordings.clock.held_samples import hold_last
 from cdtool.recordings.recording import Series
@@ -47,13 +47,6 @@ def test_a_clock_without_faults_is_cleaned_as_by_the_search_for_faults(times):
         stamps._is_clean = is_clean
 
 
-@given(clocks(), st.sampled_from([1.0, 1e-3, 1e-9, -1.0]))
-def test_a_clock_counts_from_an_epoch_only_if_a_stamp_is_that_late(times, factor):
-    finite = times[np.isfinite(times)]
-    first = finite[stamps.count_leading_strays(finite, EPOCH / factor) :][:1]
-    assert epoch_start(times, factor) == (float(first[0]) if len(first) and first[0] * factor > EPOCH else 0.0)
-
-
 @st.composite
 def series_and_times(draw):
     steps = draw(st.lists(st.floats(0.01, 2.0), min_size=1, max_size=25))
@@ -76,17 +69,6 @@ def test_the_value_held_depends_on_no_later_time(drawn):
     is_missing = (at < 0) | (clock - series.time[newest] > 5.0 * period[newest])
     expected = np.where(is_missing[:, np.newaxis], np.nan, series.values[newest])
     assert previous_value(series, clock).tobytes() == expected.tobytes()
-
-
-@given(series_and_times())
-def test_the_integral_holds_the_last_speed_over_missing_ones(drawn):
-    series, _ = drawn
-    held, travel, expected = 0.0, 0.0, [0.0]
-    filled = [held := value if math.isfinite(value) else held for value in series.values[:, 0].tolist()]
-    for step, before, after in zip(np.diff(series.time).tolist(), filled, filled[1:], strict=False):
-        travel += step * 0.5 * (after + before)
-        expected.append(travel)
-    assert integrate(series, "m").values[:, 0].tolist() == expected
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=12))

@@ -38,12 +38,6 @@ def at(recording: Recording, seconds: float) -> int:
     return int(np.searchsorted(recording["speed"].time, seconds))
 
 
-def test_a_run_of_its_class_is_judged_from_end_to_end():
-    for seed in range(10):
-        recording = log((0.3, 3.0), (0.0, 1.5), seed=seed)
-        assert judges(recording, FAST).all()
-
-
 def test_while_two_classes_fit_both_judge_and_then_the_one_that_still_fits():
     recording = log((0.3, 3.0), (0.0, 1.5), seed=1)
     found = judges(recording, SLOW, FAST)
@@ -69,21 +63,6 @@ def test_an_axis_that_a_contact_stops_is_judged_for_the_matching_window_and_no_l
     found = judges(recording, FAST)[:, 0]
     assert found[: at(recording, 2.5 + HOLD)].all()
     assert not found[at(recording, 2.7 + HOLD) :].any()
-
-
-def test_motion_that_fits_no_class_is_judged_again_once_one_fits():
-    recording = log((0.25, 3.0), (0.2, 3.0), seed=4)
-    found = judges(recording, SLOW)[:, 0]
-    assert not found[at(recording, 2.2 + HOLD) : at(recording, 3.4)].any()
-    assert found[at(recording, 3.7) :].all()
-
-
-def test_motion_backward_is_of_another_class_at_once_where_one_was_learned():
-    recording = log((-0.3, 3.0), (0.0, 1.5), seed=5)
-    found = judges(recording, FAST, BACK)
-    moving = slice(at(recording, 0.7), None)
-    assert found[moving, 1].all() and not found[moving, 0].any()
-    assert found[: at(recording, 0.5)].all()
 
 
 def test_without_a_speed_for_the_matching_window_nothing_judges():
@@ -119,24 +98,6 @@ def test_a_contact_during_acceleration_or_just_behind_it_is_judged(place):
         "stopped", "made up", ("axis",), {"speed": Series(time, speed, "m/s"), "position": Series(time, position, "m")}
     )
     assert judges(stopped, FAST)[: hit + 900].all()
-
-
-def test_strokes_are_cut_where_the_log_so_far_shows_it():
-    recording = log((0.3, 2.0), (0.0, 1.5), (-0.3, 2.0), (0.0, 1.5), (0.3, 2.0), noise=0.002, seed=11)
-    whole = strokes_so_far(recording, "motion", [FAST, BACK])
-    assert len(whole) >= 3
-    for end in (1.0, 2.9, 3.6, 5.0, 7.0):
-        part = strokes_so_far(recording.between(-np.inf, end), "motion", [FAST, BACK])
-        assert part == [item for item in whole if item.applies <= end]
-    assert all(item.start <= item.applies for item in whole)
-
-
-def test_strokes_there_and_back_are_judged_each_by_its_class():
-    recording = log((0.3, 3.0), (0.0, 1.5), (-0.3, 3.0), (0.0, 1.5), seed=12)
-    found = judges(recording, FAST, BACK, how="motion")
-    forward, backward = slice(at(recording, 1.5), at(recording, 3.4)), slice(at(recording, 5.5), at(recording, 7.9))
-    assert found[forward, 0].all() and not found[forward, 1].any()
-    assert found[backward, 1].all() and not found[backward, 0].any()
 
 
 def test_a_contact_that_throws_the_axis_back_is_still_judged_by_the_class_that_it_hit():

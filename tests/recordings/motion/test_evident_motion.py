@@ -30,11 +30,6 @@ def test_a_motion_ten_times_its_noise_is_seen_after_the_averaging_time(rate):
     assert np.mean(found[:n] != 0.0) < 0.02
 
 
-def test_a_speed_of_exactly_zero_is_rest_and_a_constant_speed_is_motion():
-    found = evident_speed(speed_of(np.repeat([0.0, 0.25], 50)))[:, 0]
-    assert not found[:50].any() and np.all(found[62:] == 0.25)
-
-
 @given(st.integers(1, 60), st.integers(0, 2**32 - 1))
 def test_a_later_sample_never_changes_it(cut, seed):
     rng = np.random.default_rng(seed)
@@ -42,11 +37,3 @@ def test_a_later_sample_never_changes_it(cut, seed):
     time = np.cumsum(rng.uniform(0.001, 0.1, 60))
     whole = evident_speed(speed_of(values, time=time))
     np.testing.assert_array_equal(evident_speed(speed_of(values[:cut], time=time[:cut])), whole[:cut])
-
-
-def test_missing_samples_are_no_motion_and_an_empty_speed_has_none():
-    values = np.full(40, 0.5)
-    values[10:40] = np.nan
-    found = evident_speed(speed_of(values))[:, 0]
-    assert np.all(found[5:10] == 0.5) and not found[20:].any()
-    assert evident_speed(speed_of([])).shape == (0, 1)

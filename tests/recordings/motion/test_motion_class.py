@@ -15,25 +15,6 @@ from cdtool.thresholds.common_class import common_class
 from tests.recordings.motion.speed_logs import log
 
 
-def jittered(speed: float, rate: float, seed: int) -> Recording:
-    """A stroke of which the position is logged at jittering stamps and the speed derived from it."""
-    rng = np.random.default_rng(seed)
-    true_time = np.cumsum(rng.uniform(0.6, 1.4, round(8.0 * rate)) / rate)
-    stamps = true_time + rng.uniform(-0.25, 0.25, len(true_time)) / rate
-    stamps = np.maximum.accumulate(stamps) + 1e-6 * np.arange(len(stamps))
-    moving = np.clip(true_time - 1.0, 0.0, 5.0)
-    position = speed * np.maximum(moving - 0.25, 0.5 * np.minimum(moving, 0.5) ** 2 / 0.5)
-    rates = np.diff(position, prepend=position[0]) / np.diff(stamps, prepend=stamps[0] - 1.0 / rate)
-    channels = {"speed": Series(stamps, rates, "rad/s"), "position": Series(stamps, position, "rad")}
-    return Recording(f"jittered{seed}", "made up", ("axis",), channels)
-
-
-@pytest.mark.parametrize("rate", [25.0, 50.0, 125.0])
-def test_a_speed_derived_from_jittering_stamps_is_not_overestimated(rate):
-    for seed in range(5):
-        assert measured_class(jittered(0.0698, rate, seed)).nominal_speed == pytest.approx(0.0698, rel=0.05)
-
-
 def test_the_reference_names_a_run_and_the_measured_speed_is_what_is_learned():
     recording = log((0.05, 2.0))
     time = recording["speed"].time
@@ -84,10 +65,3 @@ def test_classes_that_lie_close_are_learned_and_no_class_is_refused_whole():
     for group in classes:
         common_class([item.recording for item in group])
     assert sum(map(len, classes)) + len(odd) == len(runs)
-
-
-def test_the_class_of_a_speed_is_found_once():
-    recording = log((0.2, 2.0))
-    first = motion_class(recording)
-    assert motion_class(replace(recording, name="renamed")) is first
-    assert motion_class(log((0.2, 2.0), seed=1)) is not first

@@ -3,22 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from cdtool.base.errors import RecordingError
-from cdtool.recordings.motion.progress import RUNNING_SHARE, START_SHARE, progress
+from cdtool.recordings.motion.progress import progress
 from cdtool.recordings.recording import Recording, Series
-
-
-def test_a_recording_that_runs_needs_a_position_and_one_at_rest_does_not():
-    time = np.arange(100) * 1e-3
-    for speed, needs in ((1.0, True), (0.0, False)):
-        recording = Recording("run", "", ("x",), {"speed": Series(time, np.full(100, speed), "m/s")})
-        if needs:
-            with pytest.raises(RecordingError, match="no channel 'position'"):
-                progress(recording, time, 1, START_SHARE, RUNNING_SHARE, 0)
-        else:
-            assert np.isnan(progress(recording, time, 1, START_SHARE, RUNNING_SHARE, 0).elapsed).all()
 
 
 def test_it_is_computed_once_on_each_clock_of_the_recording():

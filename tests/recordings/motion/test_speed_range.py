@@ -89,28 +89,6 @@ def test_a_contact_that_slows_the_axis_changes_nothing_before_it_is_as_old_as_th
         assert np.nanmin(found[departed]) > 0.295
 
 
-def test_another_speed_in_the_range_is_learned_again_once_it_has_lasted():
-    time, fits, found = found_in(log((0.3, 1.4), (0.2, 2.6)))
-    later = (time > 1.9 + 0.3 + FORGET + GUARD + KNOWN) & (time < 4.0)
-    assert fits[later].all()
-    assert found[later] == pytest.approx(0.2, rel=0.03)
-
-
-@settings(max_examples=15, deadline=None)
-@given(st.floats(0.2, 0.3), st.integers(0, 2**31), st.floats(0.6, 3.5))
-def test_nothing_depends_on_later_samples(speed, seed, end):
-    rng = np.random.default_rng(seed)
-    recording = log((speed, 0.9 / speed), (0.0, 1.0), seed=seed)
-    count = int(np.searchsorted(recording["speed"].time, end))
-    channels = {}
-    for name, series in recording.channels.items():
-        values = series.values.copy()
-        values[count:] = rng.normal(size=values[count:].shape)
-        channels[name] = Series(series.time, values, series.unit)
-    for ours, theirs in zip(found_in(recording), found_in(replace(recording, channels=channels)), strict=True):
-        assert np.array_equal(ours[:count], theirs[:count], equal_nan=True)
-
-
 def test_it_is_the_speed_of_the_joint_that_leads():
     recording = log((0.25, 3.6), (0.0, 1.0))
     channels = {

@@ -37,25 +37,6 @@ def test_a_click_on_a_cell_shows_the_trigger_plot_of_its_worst_contact(shown: An
     assert page.execute_script("return performance.getEntriesByType('resource').length") == 0
 
 
-def test_a_cell_is_opened_with_the_keyboard(shown: Any) -> None:  # noqa: F811
-    page = shown(coverage_html(coverage_case()))
-    cell_of(page, "quick: 1 m, 10 N/mm").send_keys("\n")
-    assert texts(page, "#cell-title") == ["quick: 1 m, 10 N/mm"]
-    assert page.switch_to.active_element.get_attribute("id") == "cell-title"
-    assert texts(page, "td.open button") == [cell_of(page, "quick: 1 m, 10 N/mm").text.replace("\n", "")]
-
-
-def test_a_row_and_the_next_button_show_other_trigger_plots(shown: Any) -> None:  # noqa: F811
-    page = shown(coverage_html(coverage_case()))
-    page.execute_script("arguments[0].click()", cell_of(page, "slow: 0.5 m, 10 N/mm"))
-    page.execute_script("arguments[0].click()", all_of(page, "#cell-table tr.opens")[1])
-    assert texts(page, "#viewer-title") == ["10000_0.5_0.csv"]
-    assert texts(page, "#cell-table tr.open > :first-child") == ["▸ 10000_0.5_0.csv"]
-    page.execute_script("arguments[0].click()", all_of(page, '[data-do="after"]')[0])
-    (recording,) = texts(page, "#viewer-title")
-    assert f"▸ {recording}" in texts(page, "#cell-table tr.open > :first-child")
-
-
 def test_without_trigger_plots_a_cell_lists_its_contacts(shown: Any) -> None:  # noqa: F811
     from dataclasses import replace
 
@@ -63,8 +44,3 @@ def test_without_trigger_plots_a_cell_lists_its_contacts(shown: Any) -> None:  #
     page.execute_script("arguments[0].click()", cell_of(page, "slow: 0.5 m, 10 N/mm"))
     assert texts(page, "#cell-table tbody tr > :first-child") == ["10000_0.5_1.csv", "10000_0.5_0.csv"]
     assert page.get_log("browser") == []
-
-
-def test_a_narrow_page_does_not_scroll_sideways(shown: Any) -> None:  # noqa: F811
-    page = shown(coverage_html(coverage_case()), width=400)
-    assert page.execute_script("return document.documentElement.scrollWidth") <= 400

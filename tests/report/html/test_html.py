@@ -9,7 +9,6 @@ import math
 import re
 from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,8 @@ from hypothesis import strategies as st
 
 from cdtool.base.plain_text import plain
 from cdtool.report.html.page import to_html
-from cdtool.report.html.plots import css_colour
-from cdtool.report.html.self_contained import page_part
 from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
 from cdtool.report.number_text import number, percent, with_interval
-from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
-from cdtool.report.table import interval_cell
 from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.results import ContactResult, RecordingResult, Results
@@ -182,13 +177,6 @@ def test_hostile_names_are_text_and_nothing_else(page, kind):
     assert found.tables["results-table"][1][0].split(" (")[0].strip() == plain(f"{hostile}quick").strip()
 
 
-def test_a_name_that_is_empty_can_still_be_seen():
-    evaluated, _ = case()
-    results = replace(evaluated.results, recordings=(RecordingResult("", "stiff", "", 1.0, 1, 0),))
-    found = parsed(to_html(Report(evaluate(results))))
-    assert found.tables["recordings-table"][1][0] == "(no name)"
-
-
 def test_every_value_of_the_summaries_is_in_the_table(made, page):
     evaluated, _ = made
     rows = page.tables["results-table"][1:]
@@ -213,33 +201,6 @@ def test_every_value_of_the_summaries_is_in_the_table(made, page):
         assert per_hour.endswith(f"at most {number(item.at_most_per_hour)}")
 
 
-def test_below_ten_contacts_the_table_shows_median_and_range_and_the_plots_no_interval():
-    evaluated, traces = case(contacts=7)
-    results = evaluated.results
-    alone = tuple(replace(item, campaign=None) for item in results.recordings)
-    evaluated = evaluate(replace(results, recordings=alone))
-    found = parsed(to_html(Report(evaluated, traces)))
-    head, *rows = found.tables["results-table"]
-    assert head[2:5] == ["median [ms]", "range [ms]", "contacts detected"]
-    for row, item in zip(rows, evaluated.summaries, strict=True):
-        if item.contacts:
-            assert row[2] == with_interval(item.median)
-            assert row[3] == f"{number(item.min_ms)} to {number(item.max_ms)}"
-    quick = found.data["latency"][0]["rows"][0]
-    assert len(quick["median"]) == 1 and "(" in quick["words"]
-    assert "low" not in found.data["survival"][0]["rows"][0]
-    assert "Fewer than 10 contacts detected: median and range, no mean, std or P95." in found.text
-    many, _ = case()
-    unnamed = replace(many.results, recordings=tuple(replace(item, campaign=None) for item in many.results.recordings))
-    page = parsed(to_html(Report(evaluate(unnamed))))
-    assert len(page.data["latency"][0]["rows"][0]["median"]) == 3 and "low" in page.data["survival"][0]["rows"][0]
-
-
-def test_an_interval_without_an_upper_end_takes_two_lines():
-    assert interval_cell(Interval(33.5, 31.0, 40.0)).lines == ("33.5", "(31.0 to 40.0)")
-    assert interval_cell(Interval(33.5, 31.0, math.inf)).lines == ("33.5", "(31.0", "to not reached)")
-
-
 def test_a_detector_that_assessed_nothing_has_no_count_of_false_alarms():
     evaluated, _ = case(limits=False)
     quick, *others = evaluated.results.detectors
@@ -260,21 +221,6 @@ def test_a_detector_that_assessed_nothing_has_no_count_of_false_alarms():
     assert "0 false alarms" not in text
 
 
-def test_pairs_without_a_difference_say_whether_there_were_enough_recordings_for_one():
-    for contacts in (4, 12):
-        evaluated, _ = case(contacts=contacts, limits=False)
-        same = tuple(
-            replace(item, latency_ms=40.0 + (-1) ** (i // 2 + i), outcome="detected", reason=None)
-            for i, item in enumerate(evaluated.results.contacts)
-        )
-        recordings = tuple(replace(item, campaign="") for item in evaluated.results.recordings)
-        found = parsed(to_html(Report(evaluate(replace(evaluated.results, contacts=same, recordings=recordings)))))
-        few = "No difference can be shown between 2 pairs of detectors: there are too few recordings" in found.text
-        assert few == (contacts == 4) == ("comparisons-table" not in found.tables)
-        if not few:
-            assert {row[3] for row in found.tables["comparisons-table"][1:]} == {"no difference shown"}
-
-
 def test_a_row_of_latencies_includes_missed_and_not_assessable_contacts(page):
     slow = next(row for row in page.tables["results-table"] if row[:2] == ["slow", "stiff"])
     assert slow[6:9] == ["10 of 12", "1 of 11 at most 36 %", "1"]
@@ -293,42 +239,11 @@ def test_the_verdict_names_violated_limits_first_and_folds_those_that_are_met(ma
     assert "not a certificate" in page.text
 
 
-def test_without_limits_the_verdict_says_what_was_found():
-    evaluated, traces = case(limits=False)
-    found = parsed(to_html(Report(evaluated, traces)))
-    assert "limits are set 24 contacts with 2 detectors: 44 detected, 2 missed, 2 not assessable" in found.text
-    assert "not-met-table" not in found.tables
-
-
 def test_a_report_without_scored_recordings_states_this_and_has_no_plots():
     found = parsed(to_html(Report(evaluate(Results({}, (), (), (), (), ())))))
     assert "Nothing was scored." in found.text
     assert "svg" not in found.tags
     assert not found.tables
-
-
-def test_colours_are_those_of_the_figures(page):
-    looks = [(item["colour"], item["marker"]) for item in page.data["detectors"]]
-    assert looks == [(css_colour(look_of(name).colour), look_of(name).marker) for name in ("quick", "slow")]
-    for name, colour in (("band", BAND), ("limit", LIMIT), ("not-assessed", NOT_ASSESSED)):
-        assert f"--{name}: {css_colour(colour).lower()};" in page.styles[0]
-
-
-def test_survival_ends_at_the_share_that_was_missed(page):
-    group = page.data["survival"][0]
-    quick, slow = group["rows"]
-    assert quick["share"][0] == 1 and quick["share"][-1] == 0
-    assert slow["share"][-1] == pytest.approx(1 / 11, rel=1e-5)
-    assert slow["until"] == 1000
-    assert quick["times"] == sorted(quick["times"])
-
-
-def test_the_curve_against_false_alarms_marks_the_factor_in_use_and_bounds_zero(page):
-    row = page.data["amoc"][0]["rows"][0]
-    assert row["chosen"] == 1
-    assert row["alarms"] == [30, 2, 0]
-    assert row["median"] == [20, 40, None]
-    assert row["none"] == {"operation": "0.0999", "hour": "5.99"}
 
 
 def test_a_force_curve_has_the_verdict_of_its_contact(page):
@@ -348,12 +263,6 @@ def test_every_recording_has_a_row_without_script_and_opens_its_own_trace(made, 
     table = next(item for item in page.data["tables"] if item["name"] == "recordings-table")
     assert table["opens"] == {"0": [0], "1": [1], "23": [2], "24": [3]}
     assert table["marks"]["with a missed contact"] == [0, 12]
-
-
-def test_a_hash_sign_in_a_logs_own_name_is_no_operation():
-    _, traces = case()
-    assert replace(traces[0], recording="run#2").log == "run#2"
-    assert replace(traces[0], recording="run#2#3", operation=3).log == "run#2"
 
 
 def test_what_was_left_out_and_the_provenance_are_shown(page):
@@ -440,59 +349,7 @@ def test_the_first_section_names_the_failed_recordings_and_contains_the_viewer(m
     assert others[-1][0] == "free.csv", "a false alarm only"
 
 
-def test_the_page_opens_on_the_worst_recording_that_has_a_trace():
-    evaluated, traces = case()
-    worst = next(i for i, trace in enumerate(traces) if trace.recording == "soft/12.csv")
-    contacts = tuple(
-        replace(item, outcome="missed", latency_ms=None) if item.recording == "soft/12.csv" else item
-        for item in evaluated.results.contacts
-    )
-    found = parsed(to_html(Report(evaluate(replace(evaluated.results, contacts=contacts)), traces)))
-    assert found.data["failed"][0] == worst
-
-
-def test_a_report_without_anything_failed_has_no_such_section():
-    evaluated, traces = case(limits=False)
-    contacts = tuple(
-        replace(item, outcome="detected", latency_ms=40.0, reason=None) for item in evaluated.results.contacts
-    )
-    good = replace(evaluated.results, contacts=contacts, forces=(), points=(), false_alarms=(), skipped=(), findings=())
-    provenance = {key: value for key, value in good.provenance.items() if key != "force_profiles"}
-    text = to_html(Report(evaluate(replace(good, provenance=provenance)), traces[:2]))
-    assert 'id="attention"' not in text and 'id="printed"' not in text
-    assert text.index('id="recordings"') < text.index('id="viewer"')
-
-
 def test_failed_recordings_without_a_trigger_plot_are_counted(made):
     evaluated, traces = case()
     text = to_html(Report(evaluated, traces[:1]))
     assert "1 of 25 failed recordings have trigger plots. The others are listed above" in text
-
-
-def luminance(colour: str) -> float:
-    parts = [int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
-    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-
-def contrast(first: str, second: str) -> float:
-    low, high = sorted((luminance(first), luminance(second)))
-    return (high + 0.05) / (low + 0.05)
-
-
-@pytest.mark.parametrize("dark", [False, True])
-def test_texts_and_marks_have_enough_contrast(dark):
-    blocks = re.findall(r":root\s*{(.*?)}", page_part("report.css"), re.DOTALL)
-    colours = dict(re.findall(r"--([\w-]+):\s*(#\w{6})", blocks[0]))
-    colours |= dict(re.findall(r"--([\w-]+):\s*(#\w{6})", blocks[1])) if dark else {}
-    for name in ("ink", "soft", "good", "bad", "unknown", "link", "worst"):
-        for ground in ("page", "raised", "band"):
-            assert contrast(colours[name], colours[ground]) >= 4.5, (name, ground)
-    assert contrast(colours["limit"], colours["page"]) >= 3.0
-    assert all(contrast(colours["not-assessed"], colours[ground]) >= 3.0 for ground in ("page", "band"))
-
-
-def test_headings_descend_one_level_at_a_time(made):
-    levels = [int(level) for level in re.findall(r"<h([1-6])", made[1])]
-    assert levels[0] == 1 and levels.count(1) == 1
-    assert all(after <= before + 1 for before, after in pairwise(levels))

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +13,9 @@ from cdtool.base.plain_text import plain
 from cdtool.report import many
 from cdtool.report.html.page import to_html
 from cdtool.report.writers.base import Report
-from cdtool.results.evaluated import evaluate
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
 from tests.report.many import LIMITS, report_of_many
-from tests.synthetic.builds import build_results
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -160,19 +156,6 @@ def test_dragging_keys_and_buttons_change_the_range_that_is_drawn(shown):
     assert drawn_range(browser) == pytest.approx((0.0, 4.0))
 
 
-def test_the_wheel_zooms_only_a_plot_that_has_the_focus(shown):
-    browser = shown(to_html(Report(*case())))
-    turn = "arguments[0].dispatchEvent(new WheelEvent('wheel', { deltaY: -100, clientX: 700, cancelable: true }))"
-    plot = all_of(browser, "#viewer-plot")[0]
-    home = drawn_range(browser)
-    browser.execute_script(turn, plot)
-    assert drawn_range(browser) == home
-    browser.execute_script("arguments[0].focus()", plot)
-    browser.execute_script(turn, plot)
-    low, high = drawn_range(browser)
-    assert high - low < home[1] - home[0]
-
-
 def test_the_first_table_sorts_by_a_click_on_its_heading(shown):
     browser = shown(to_html(Report(*case(limits=False))))
     rows = "#results-table tbody tr td:nth-child(5)"
@@ -230,59 +213,6 @@ def test_of_many_recordings_the_failed_cases_are_found_by_filters_and_shown_with
     assert "missed" in texts(browser, "#viewer-plot text")
 
 
-def test_a_bar_of_a_histogram_says_how_many_contacts_it_has(shown, monkeypatch):
-    from selenium.webdriver.common.action_chains import ActionChains
-
-    for name, value in LIMITS.items():
-        monkeypatch.setattr(many, name, value)
-    browser = shown(to_html(report_of_many()))
-    plot = all_of(browser, '[data-plot="latency"]')[0]
-    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
-    ActionChains(browser, duration=20).move_to_element(plot).perform()
-    name, words = texts(browser, "#tooltip")[0].split("\n")
-    assert name in ("momentum", "pure_inertia") and re.fullmatch(r"\d+ contacts? after [\d.]+ to [\d.]+ ms", words)
-
-
-def test_a_detectors_curve_is_hidden_by_its_name(shown):
-    browser = shown(to_html(Report(*case())))
-    assert len(all_of(browser, '[data-plot="survival"] path.line')) == 4
-    button = all_of(browser, '.legend[data-for="survival"] button')[0]
-    browser.execute_script("arguments[0].click()", button)
-    assert button.get_attribute("aria-pressed") == "false"
-    assert len(all_of(browser, '[data-plot="survival"] path.line')) == 2
-
-
-def test_a_tooltip_shows_the_values_under_the_pointer(shown):
-    from selenium.webdriver.common.action_chains import ActionChains
-
-    browser = shown(to_html(Report(*case())))
-    plot = all_of(browser, '[data-plot="survival"]')[0]
-    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
-    ActionChains(browser, duration=20).move_to_element(plot).perform()
-    lines = texts(browser, "#tooltip")[0].split("\n")
-    assert lines[0].endswith("ms after the onset, undetected:")
-    assert lines[1].startswith("quick: ") and lines[2].startswith("slow: ")
-    assert all_of(browser, "#tooltip")[0].is_displayed()
-
-
-def test_past_the_last_alarm_a_survival_curve_says_how_many_are_undetected(shown):
-    from selenium.webdriver.common.action_chains import ActionChains
-
-    browser = shown(to_html(Report(evaluate(build_results({("momentum", "stiff"): [40.0] * 10 + [80.0]})))))
-    plot = all_of(browser, '[data-plot="survival"]')[0]
-    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
-    right = plot.size["width"] // 2 - 20
-    ActionChains(browser, duration=20).move_to_element_with_offset(plot, right, 0).perform()
-    assert texts(browser, "#tooltip")[0].split("\n")[1].startswith("momentum: 0.0 % ")
-
-
-@pytest.mark.parametrize("width", [400, 1400])
-def test_nothing_makes_the_page_scroll_sideways(shown, width):
-    for named in (str, lambda name: HOSTILE["long"] + name):
-        browser = shown(to_html(Report(*case(named))), width)
-        assert browser.execute_script("return document.documentElement.scrollWidth") <= width
-
-
 @pytest.mark.parametrize("kind", ["script", "right to left", "markdown", "not a character", "empty"])
 def test_hostile_names_stay_text(shown, kind):
     from selenium.common.exceptions import NoAlertPresentException
@@ -315,34 +245,6 @@ def test_paper_shows_every_failed_recording_all_rows_and_headings(shown):
     assert browser.get_log("browser") == []
 
 
-def test_a_plot_on_paper_has_all_detectors_that_failed_and_at_most_five_others(shown):
-    evaluated, traces = case()
-    trace = traces[0]
-    quick, slow = trace.panels
-    names = [f"missed {i}" for i in range(6)] + [f"detected {i}" for i in range(3)]
-    panels = tuple(replace(slow if name[0] == "m" else quick, detector=name) for name in names)
-    rows = [replace(item, detector=name) for name in names for item in evaluated.results.contacts[:2]]
-    results = replace(evaluated.results, detectors=tuple(names), contacts=tuple(rows), limits=())
-    browser = shown(to_html(Report(evaluate(results), (replace(trace, panels=panels),))))
-    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
-    assert texts(browser, "#printed-plots h3") == ["stiff/01.csv, part 1 of 2", "stiff/01.csv, part 2 of 2"]
-    words = " ".join(texts(browser, "#printed-plots text"))
-    assert all(f"missed {i} " in words for i in range(6)) and "detected 0" not in words
-    assert all("3 other detectors left out" in note for note in texts(browser, "#printed-plots .note"))
-
-
-def test_an_interval_without_an_upper_end_is_written_and_not_drawn_across_the_plot(shown):
-    evaluated, traces = case()
-    contacts = tuple(
-        replace(item, outcome="missed", latency_ms=None) if item.recording > f"{item.group}/05.csv" else item
-        for item in evaluated.results.contacts
-    )
-    browser = shown(to_html(Report(evaluate(replace(evaluated.results, contacts=contacts)), traces)))
-    words = texts(browser, 'svg[data-plot="latency"] text')
-    assert any(re.fullmatch(r"≥ \d+\.?\d* \(n = 12\)", word) for word in words)
-    assert not all_of(browser, 'svg[data-plot="latency"] path.cross')
-
-
 def test_without_script_every_table_is_there_and_the_plots_say_what_they_need(shown, browser):
     browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
@@ -353,42 +255,3 @@ def test_without_script_every_table_is_there_and_the_plots_say_what_they_need(sh
         assert not any(item.is_displayed() for item in all_of(browser, "svg.plot"))
     finally:
         browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
-
-
-def report_of_failures(count: int) -> str:
-    """Return a report with so many failed recordings that have a trigger plot; one detector, the worst first."""
-    evaluated, traces = case()
-    results = evaluated.results
-    missed = next(item for item in results.contacts if item.outcome == "missed")
-    logs = [f"soft/{i:03}.csv" for i in range(count)]
-    contacts = tuple(replace(missed, recording=log, peak_force_n=1000.0 - i) for i, log in enumerate(logs))
-    trace = next(item for item in traces if item.group == missed.group and item.contacts)
-    recordings = tuple(replace(results.recordings[0], recording=log, group=missed.group) for log in logs)
-    few = replace(results, contacts=contacts, recordings=recordings, false_alarms=(), forces=(), points=(), limits=())
-    return to_html(Report(evaluate(few), tuple(replace(trace, recording=log) for log in logs)))
-
-
-@pytest.mark.parametrize(("ending", "pages"), [("", 20), ("#print-pages=3", 3), ("#print-pages=all", 45)])
-def test_of_many_failed_recordings_the_worst_are_printed_and_the_others_counted(shown, ending, pages):
-    browser = shown(report_of_failures(45))
-    browser.get(f"{browser.current_url.partition('#')[0]}{ending}")
-    browser.refresh()
-    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
-    assert texts(browser, "#printed-plots h3") == [f"soft/{i:03}.csv" for i in range(pages)]
-    words = texts(browser, "#printed-cut")[0]
-    if pages < 45:
-        assert (
-            f"The {pages} worst of 45 trigger plots are printed here. The other {45 - pages} are on the screen" in words
-        )
-    else:
-        assert not words
-
-
-def test_a_reader_chooses_on_how_many_pages_plots_are_printed(shown):
-    browser = shown(report_of_failures(45))
-    choice = ".controls[data-for=print] option"
-    assert texts(browser, choice) == ["at most 20", "at most 50", "at most 100", "all"]
-    all_of(browser, choice)[-1].click()
-    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
-    assert len(all_of(browser, "#printed-plots h3")) == 45
-    assert not all_of(shown(report_of_failures(4)), choice)

@@ -8,7 +8,6 @@ import pytest
 
 from cdtool.commands.scoring.force_rows import force_rows
 from cdtool.report.plots.folder_figures import write_figures
-from cdtool.report.plots.trigger_plot import most_informative
 from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import Evaluated, evaluate
 from cdtool.results.results import RecordingResult, Results
@@ -70,39 +69,6 @@ def test_all_figures_are_written_and_named_with_a_caption(results, bench, simula
     assert f"{hit.recording}: all detectors" == images[4].caption
 
 
-def test_a_figure_without_content_is_not_written(results, tmp_path):
-    images = write_figures(Report(evaluate(replace(results, contacts=())), ()), tmp_path)
-    assert [image.name for image in images] == written(tmp_path) == ["latency.png"]
-
-
-def test_force_verdicts_without_a_stored_curve_are_not_drawn(results, bench, simulated, hit, tmp_path):
-    full = with_forces(results, bench, simulated, "another log")
-    images = write_figures(Report(evaluate(full), (hit,)), tmp_path)
-    assert "forces.png" not in [image.name for image in images]
-
-
-def test_a_caption_states_how_many_of_the_contacts_with_a_verdict_are_drawn(results, bench, simulated, hit, tmp_path):
-    full = with_forces(results, bench, simulated, hit.recording, "another log", "a third")
-    images = write_figures(Report(evaluate(full), (hit,)), tmp_path)
-    caption = next(image.caption for image in images if image.name == "forces.png")
-    assert "the 1 of 3 contacts with stored curves" in caption
-    assert "mass" not in caption
-    heavy = replace(full, provenance={**full.provenance, "mass_before_cell_kg": 4.0})
-    images = write_figures(Report(evaluate(heavy), (hit,)), tmp_path)
-    assert "corrected for the mass" in next(image.caption for image in images if image.name == "forces.png")
-
-
-def test_each_of_several_profiles_has_a_figure_of_its_own(results, bench, simulated, hit, tmp_path):
-    other = replace(hit, recording="another log")
-    full = with_forces(results, bench, simulated, hit.recording)
-    full = with_forces(full, bench, simulated, "another log", profile="../wide gap")
-    write_figures(Report(evaluate(full), (hit, other)), tmp_path)
-    assert [name for name in written(tmp_path) if name.startswith("forces")] == [
-        "forces_gap.png",
-        "forces_wide-gap.png",
-    ]
-
-
 def test_groups_with_similar_names_or_a_path_get_safe_and_different_file_names(evaluated: Evaluated, hit, tmp_path):
     groups = ("a b", "A/B", "../../etc/passwd", *HOSTILE.values())
     results = replace(evaluated.results, groups=groups)
@@ -117,11 +83,3 @@ def test_groups_with_similar_names_or_a_path_get_safe_and_different_file_names(e
         "triggers_a-b-2.png",
         "triggers_etc-passwd.png",
     ]
-
-
-def test_the_most_informative_trace_has_a_contact_and_most_detectors_that_could_assess_it(hit, free):
-    fewer = replace(hit, panels=hit.panels[:1])
-    blind = replace(hit, panels=(replace(hit.panels[0], verdict="not_assessable"), hit.panels[1]))
-    assert most_informative([free, fewer, blind, hit, replace(hit, recording="later")]) is hit
-    assert most_informative([free, fewer]) is fewer
-    assert most_informative([free]) is free

@@ -15,8 +15,6 @@ from cdtool.results.results import Results
 from tests.report.bench import contacts_of
 from tests.report.plots.svg import joined, texts
 
-FOUR = ("friction_ekf", "momentum", "direct", "pure_torque")
-
 
 def of(latencies: Mapping[str, Sequence[float | str | None]], group: str = "stiff") -> Evaluated:
     """Detectors with their latencies in one group."""
@@ -52,37 +50,11 @@ def test_a_missed_contact_is_an_open_mark_at_the_end_of_its_monitoring():
     assert figure.axes[0].get_xlim()[1] >= 1000.0
 
 
-def test_few_curves_have_bands_and_many_have_none(tmp_path):
-    few, many = ({name: [20.0 + i for i in range(10)] for name in FOUR[:count]} for count in (3, 4))
-    assert len(drawn(of(few)).axes[0].collections) == 3
-    assert len(drawn(of(many)).axes[0].collections) == 0
-    save(survival_figure(of(few)), tmp_path / "few.svg")
-    save(survival_figure(of(many)), tmp_path / "many.svg")
-    assert "band: 95 % at each time" in joined(tmp_path / "few.svg")
-    assert "band" not in joined(tmp_path / "many.svg")
-
-
 def test_below_ten_contacts_a_curve_has_no_band_and_the_figure_states_this(tmp_path):
     nine = {"momentum": [20.0 + i for i in range(9)], "direct": [20.0 + i for i in range(10)]}
     assert len(drawn(of(nine)).axes[0].collections) == 1
     save(survival_figure(of(nine)), tmp_path / "a.svg")
     assert "band: 95 % at each time; no band with fewer than 10 contacts" in joined(tmp_path / "a.svg")
-
-
-def test_counts_are_listed_next_to_the_curves_the_fastest_first(evaluated, tmp_path):
-    save(survival_figure(evaluated), tmp_path / "a.svg")
-    shown = texts(tmp_path / "a.svg")
-    for expected in ("stiff", "soft", "3 of 4", "2 of 3", "30 of 30", "missed", "34.0", "still undetected"):
-        assert expected in shown
-    assert shown.index("friction_ekf") < shown.index("momentum")
-    assert "open mark: missed" in joined(tmp_path / "a.svg")
-
-
-def test_each_group_with_contacts_has_a_panel_all_on_one_axis(evaluated):
-    first, second = drawn(evaluated).axes
-    assert (first.get_title(loc="left"), second.get_title(loc="left")) == ("stiff", "soft")
-    assert first.get_xlim() == second.get_xlim()
-    assert first.get_position().x0 == second.get_position().x0
 
 
 def test_everything_missed_nothing_assessable_one_contact_and_none_are_drawn_too(evaluated, tmp_path):

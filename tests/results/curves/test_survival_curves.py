@@ -18,14 +18,6 @@ def of(*contacts: ContactResult) -> Results:
     return Results({}, ("direct", "momentum"), ("stiff", "holdout"), contacts, (), ())
 
 
-def test_with_all_detected_the_curve_reaches_zero_at_the_last_latency():
-    (curve,) = survival_curves(of(*(row("direct", late) for late in (30.0, 10.0, 20.0, 40.0))))
-    assert curve.curve.times.tolist() == [0.0, 10.0, 20.0, 30.0, 40.0]
-    assert curve.curve.share.tolist() == pytest.approx([1.0, 0.75, 0.5, 0.25, 0.0])
-    assert (curve.contacts, curve.detected, curve.end) == (4, 4, 40.0)
-    assert len(curve.missed) == 0
-
-
 def test_a_missed_contact_keeps_the_curve_above_zero_until_its_censoring():
     contacts = [row("direct", 10.0), row("direct", 20.0), row("direct", None, "missed", 300.0)]
     (curve,) = survival_curves(of(*contacts))

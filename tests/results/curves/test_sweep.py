@@ -42,11 +42,6 @@ def test_above_the_critical_factor_there_is_no_alarm_and_below_it_there_is_one(s
     assert detection(seed, critical * 0.999999).verdict.outcome == "alarm"
 
 
-def test_too_few_assessable_samples_have_no_critical_factor():
-    blind = replace(detection(0), threshold=None, judgement=None)
-    assert critical_factor(blind, ACTIVATION) == -np.inf
-
-
 @pytest.mark.parametrize(
     ("text", "rate", "per", "shown"),
     [
@@ -62,12 +57,6 @@ def test_budgets_are_read(text, rate, per, shown):
     assert (budget.rate, budget.per, str(budget)) == (pytest.approx(rate), per, shown)
 
 
-@pytest.mark.parametrize("text", ["", "1000", "1/0op", "-1/op", "1/1000 runs", "1/nan op", "inf/h"])
-def test_an_invalid_budget_is_refused_with_an_example(text):
-    with pytest.raises(UsageError, match="1/1000op"):
-        Budget.parse(text)
-
-
 def test_the_factor_is_the_smallest_that_meets_the_budget_per_operation():
     runs = [detection(seed) for seed in range(20)]
     made = set_factor(Budget(0.1, "operation"), "d", runs, ACTIVATION)
@@ -75,18 +64,6 @@ def test_the_factor_is_the_smallest_that_meets_the_budget_per_operation():
     assert made.factor == pytest.approx(critical[1], rel=1e-8) and made.alarms == 1
     alarming = [detection(seed, made.factor).verdict.outcome == "alarm" for seed in range(20)]
     assert sum(alarming) == 1 and made.operations == 20
-
-
-def test_the_budget_is_met_on_average_by_independent_operations():
-    pool = np.array([critical_factor(detection(seed), ACTIVATION) for seed in range(120)])
-    rng = np.random.default_rng(4)
-    broken = []
-    for _ in range(400):
-        order = rng.permutation(len(pool))
-        runs, others = pool[order[:20]], pool[order[20:]]
-        factor = np.sort(runs)[::-1][1] * (1.0 + 1e-9)  # the result of set_factor for 1/10op on 20 operations
-        broken.append(np.mean(others > factor))
-    assert np.mean(broken) == pytest.approx(2 / 21, abs=0.01)
 
 
 def test_the_factor_meets_a_budget_per_hour_and_a_smaller_one_violates_it():
@@ -99,11 +76,6 @@ def test_the_factor_meets_a_budget_per_hour_and_a_smaller_one_violates_it():
         return sum(len(detection(seed, factor).verdict.alarms) for seed in range(20))
 
     assert alarms(made.factor) == made.alarms <= 3 < alarms(made.factor * 2.0 ** (-1.5 / 32))
-
-
-def test_too_small_an_exposure_is_refused_with_the_missing_amount():
-    with pytest.raises(UsageError, match=r"1/1000op needs 999 impact-free operations.*20 were assessable.*add 979"):
-        set_factor(Budget(1e-3, "operation"), "d", [detection(seed) for seed in range(20)], ACTIVATION)
 
 
 def test_limits_without_spread_cannot_be_set():

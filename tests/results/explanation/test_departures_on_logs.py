@@ -23,7 +23,7 @@ from cdtool.results.explanation.departure import departures
 from cdtool.results.explanation.explanation import Explainer, Explanation
 from cdtool.results.explanation.glitch import glitches
 from cdtool.thresholds.limit import Limit
-from cdtool.thresholds.normal_motion import Absence, NormalMotion, NormalMotions
+from cdtool.thresholds.normal_motion import NormalMotion, NormalMotions
 from tests.bits import every_value
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
@@ -176,32 +176,3 @@ def test_in_impact_free_runs_glitches_and_departures_are_hardly_ever_named(gate)
             looks, departed = looks + len(found), departed + sum(not math.isnan(each.time) for each in found)
             named += len(glitches(recording, tuple(recording.channels), (), float(at) - 0.3, float(at)))
     assert looks > 250 and departed == 0 and named <= 2
-
-
-@pytest.mark.parametrize(
-    ("absent", "told"),
-    [
-        (Absence.BY_HAND, "limits set by hand are not learned"),
-        (Absence.OLDER_FILE, "relearn it with cdtool learn-signature"),
-        (Absence.FEW_RUNS, "too few impact-free runs"),
-    ],
-)
-def test_without_impact_free_runs_the_comparison_and_its_reason_are_stated(absent, told):
-    item = explained("gate", log("gate", "stiff/03.csv"), NormalMotions((), absent), 300.0)
-    assert item.absent is absent and item.runs == 0
-    text = " ".join(words(item))
-    assert "No impact-free runs to compare with: " in text and "this log's own past" in text and told in text
-    # Nothing was learned, so nothing is called normal, and the next step is given.
-    assert "normal" not in text and "learn" in text.partition("No impact-free runs to compare with")[2]
-
-
-def test_a_stroke_at_another_speed_is_not_compared_with_a_learned_class(gate):
-    (operation,) = operations_of(log("gate", "stiff/03.csv"))
-    motion = replace(operation.motion, nominal_speed=0.5)
-    assert gate.of(operation.recording, motion) is Absence.NO_CLASS
-
-
-def test_a_torque_that_is_off_from_the_start_is_named_as_such(gate):
-    clean = changed(log("gate", "holdout/03.csv"), "torque", lambda _, values: values + 150.0)
-    item = explained("gate", glitch(clean, -0.05), gate, 500.0, activation=Activation(2))
-    assert any(line.startswith("Outside since before: torque (farthest ") for line in words(item))

@@ -90,20 +90,6 @@ def test_an_alarm_is_traced_to_the_last_exit_from_the_band():
     assert (found.debounce, found.skipped) == (9, 0)
 
 
-def test_missing_samples_are_skipped_as_the_activation_skips_them():
-    status = np.zeros(len(TIME))
-    status[[3022, 3025]] = Status.GAP
-    item = detection(pulse(3020, 200), status=status)
-    (alarm,) = item.verdict.alarms
-    found = Explainer(item, NINE).alarm(alarm)
-    assert (found.left, found.skipped) == (pytest.approx(3.020), 2)
-    assert alarm.time == pytest.approx(3.030)
-    status[3025] = Status.NOT_APPLICABLE  # interrupts the sequence
-    item = detection(pulse(3020, 200), status=status)
-    found = Explainer(item, NINE).alarm(item.verdict.alarms[0])
-    assert (found.left, found.skipped) == (pytest.approx(3.026), 0)
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_between_leaving_the_band_and_any_alarm_lie_just_the_debounced_samples(seed):
     rng = np.random.default_rng(seed)
@@ -120,17 +106,6 @@ def test_between_leaving_the_band_and_any_alarm_lie_just_the_debounced_samples(s
         assert (np.abs(values[inside][marks == Status.VALID]) > 1.0).all()
 
 
-def test_the_margin_is_given_at_fixed_times_before_the_alarm_and_at_the_onset():
-    item = detection(0.205 + np.clip(TIME - 3.0, 0.0, None) * 10.0)  # the first sample above 1 is at 3.080 s
-    (alarm,) = item.verdict.alarms
-    found = Explainer(item, NINE).alarm(alarm, CONTACT)
-    after = [round(1e3 * (moment.time - alarm.time)) for moment in found.moments]
-    assert after == [-100, -88, -50, -20, -10, -5, 0]
-    margins = [0.795, 0.795, 0.415, 0.115, 0.015, -0.035, -0.085]
-    assert [moment.margin for moment in found.moments] == pytest.approx(margins)
-    assert [moment.share for moment in found.moments] == pytest.approx([1.0 - margin for margin in margins])
-
-
 def test_a_miss_states_its_closest_approach_with_duration_and_time():
     values = pulse(3040, 5)
     values[3060:3080] = 0.9
@@ -144,18 +119,6 @@ def test_a_miss_states_its_closest_approach_with_duration_and_time():
     assert near.held == pytest.approx(0.9)
     assert math.isnan(near.latched_from)
     assert any("5 consecutive samples outside; 9 are required" in line for line in words(found))
-
-
-def test_a_limit_just_below_the_share_that_was_held_would_have_alarmed_and_one_above_not():
-    rng = np.random.default_rng(3)
-    values = np.convolve(rng.normal(size=len(TIME) + 29), np.ones(30) / 30.0, "valid")
-    status = rng.choice([0, 0, 0, 0, 3], len(TIME))
-    values[TIME < 3.0] = values[TIME > 4.0] = 0.0
-    item = detection(values, (2.0,), status=status)
-    (found,) = explain(item, matching(item, CONTACT), NINE)
-    held = found.approaches[0].held
-    assert detection(values, (2.0 * held * (1.0 - 1e-9),), status=status).verdict.alarms
-    assert not detection(values, (2.0 * held * (1.0 + 1e-9),), status=status).verdict.alarms
 
 
 def test_the_nearest_joint_is_listed_first_and_one_without_a_limit_is_omitted():
@@ -180,21 +143,6 @@ def test_a_statistic_outside_since_before_the_contact_is_reported():
     assert missed.approaches[0].latched_from == pytest.approx(2.9)
     assert missed.approaches[0].longest == 0
     assert any("already outside the band since 2.900 s" in line for line in words(missed))
-
-
-def test_unassessable_samples_are_given_by_share_and_an_unassessable_contact_by_reason():
-    status = np.zeros(len(TIME))
-    status[3000:3250] = Status.START_UP
-    item = detection(np.full(len(TIME), 0.2), status=status)
-    (missed,) = explain(item, matching(item, CONTACT), NINE)
-    assert missed.not_judged == {"start-up": pytest.approx(250 / 1001)}
-    assert any("start-up 25 %" in line for line in words(missed))
-    status[2999:] = Status.GAP
-    item = detection(np.full(len(TIME), 0.2), status=status)
-    (blind,) = explain(item, matching(item, CONTACT), NINE)
-    assert blind.role == "not_assessable"
-    assert (blind.approaches, blind.moments) == ((), ())
-    assert words(blind)[0] == "contact at 3.000 s (load cell) not assessable: missing samples 100 %"
 
 
 def test_every_alarm_and_every_miss_is_explained_once_in_order_of_time_with_its_role():

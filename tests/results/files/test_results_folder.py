@@ -60,18 +60,6 @@ def test_each_group_and_detector_has_a_file_with_the_columns_of_its_recordings(t
         assert results.contacts[row["row"]].latency_ms == row["latency_ms"]
 
 
-def test_an_alarm_in_an_operation_has_the_columns_of_its_recording(tmp_path):
-    evaluated, _ = case()
-    target = written(evaluated.results, tmp_path)
-    (row,) = pq.read_table(target / "false_alarms").to_pylist()
-    assert (row["recording"], row["operation"], row["machine"]) == ("free.csv", 2, "gate")
-
-
-def test_columns_say_what_they_mean(tmp_path):
-    schema = pq.read_schema(next((written(FULL, tmp_path) / "contacts").iterdir()))
-    assert all(field.metadata[b"meaning"] for field in schema if field.name not in ("campaign", "point", "machine"))
-
-
 def test_report_and_compare_read_the_folder_and_its_traces(tmp_path):
     evaluated, traces = case()
     target = tmp_path / "results.parquet"

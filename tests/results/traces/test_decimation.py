@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.results.traces.decimation import decimate, kept_samples
+from cdtool.results.traces.decimation import decimate
 
 numbers = st.one_of(st.floats(-1e6, 1e6), st.just(float("nan")))
 series = st.integers(1, 600).flatmap(lambda n: arrays(np.float64, n, elements=numbers, fill=st.floats(-1.0, 1.0)))
@@ -36,15 +36,6 @@ def test_least_largest_first_and_last_value_stay_and_the_size_is_bounded(values,
         assert np.nanmax(kept) == present.max()
     else:
         assert np.isnan(kept).all()
-
-
-@given(series, pixels)
-def test_kept_values_are_samples_and_a_gap_stays_a_gap(values, pixels):
-    time = clock(values)
-    kept = kept_samples(time, values, pixels)
-    assert np.all(np.diff(kept) > 0)
-    if np.isnan(values).any():
-        assert np.isnan(values[kept]).any()
 
 
 @given(series)

@@ -14,7 +14,6 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.truth.force.curve import force_at, force_time_curve
-from cdtool.truth.onset import OnsetRule, find_contacts
 
 MASS, STIFFNESS, SPEED, ONSET = 620.0, 500e3, 0.2, 2.0
 RATE = float(np.sqrt(STIFFNESS / MASS))
@@ -62,15 +61,6 @@ def test_the_force_curve_of_a_rigid_leaf_is_a_half_sine_of_known_peak():
 def test_offset_and_sign_of_the_cell_do_not_change_the_curve(offset, sign):
     curve = force_time_curve(recording(offset + sign * half_sine(TIME)), CONTACT)
     np.testing.assert_allclose(curve.force, half_sine(curve.time + ONSET), atol=1e-6)
-
-
-def test_the_reading_at_rest_is_the_one_of_the_onset_rule():
-    noisy = 30.0 + half_sine(TIME) + np.random.default_rng(2).normal(0.0, 2.0, len(TIME))
-    (contact,) = find_contacts(recording(noisy), OnsetRule(20.0, 8.0))
-    assert contact.rest == pytest.approx(30.0, abs=0.5)
-    curve = force_time_curve(recording(noisy), contact)
-    assert curve.peak == pytest.approx(contact.peak_force, abs=1e-9)
-    assert curve.force[0] == pytest.approx(noisy[round(contact.start * 1e3)] - contact.rest)
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])

@@ -11,8 +11,6 @@ import pytest
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.truth.force.limits import ForceStep, PressureLimit, profile_of, read_force_limits
 
-ROOT = Path(__file__).parents[3]
-PAGE = ROOT / "docs" / "force-limits.md"
 ISO_QUASI_STATIC = {
     "skull_and_forehead": 130,
     "face": 65,
@@ -183,34 +181,11 @@ def test_a_fault_names_file_and_key_and_what_is_allowed(tmp_path, old, new, key,
     assert hint in str(fault.value)
 
 
-@pytest.mark.parametrize("steps", ["", "steps = []", "steps = 3", "steps = [400.0]"])
-def test_a_profile_without_steps_is_refused(tmp_path, steps):
-    text = f'[door]\ntitle = "t"\nsource = "s"\n{steps}\n'
-    with pytest.raises(ConfigurationError, match=r"door\.?.*steps") as fault:
-        read_force_limits(written(tmp_path, text))
-    assert "from_s" in str(fault.value) or "at 0" in str(fault.value)
-
-
 def test_an_unknown_profile_is_answered_with_the_nearest():
     with pytest.raises(UsageError, match="en_12453_reducing") as fault:
         profile_of(read_force_limits(), "en_12453_reducing")
     assert "did you mean en_12453_reducing_gap" in fault.value.hint
     assert profile_of(read_force_limits(), "iso_ts_15066_face").title == "ISO/TS 15066: face"
-
-
-def test_the_page_shows_a_valid_file_and_every_shipped_profile_with_its_forces(tmp_path):
-    text = PAGE.read_text(encoding="utf-8")
-    (example,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
-    assert read_force_limits(written(tmp_path, example))
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("| `")]
-    shown = {row[0].strip("`"): row[2:] for row in rows if row[0].startswith(("`en_", "`iso_"))}
-    shipped = read_force_limits()
-    assert set(shown) == set(shipped)
-    for name, cells in shown.items():
-        stated = [re.fullmatch(r"(\d+) N(?: from ([\d.]+) s)?", cell) for cell in cells if cell not in ("", "–")]
-        assert all(stated), name
-        found = [(float(item[2] or 0.0), float(item[1])) for item in stated if item]
-        assert found == [(step.from_s, step.at_most_n) for step in shipped[name].steps], name
 
 
 def test_a_file_without_profiles_or_none_at_all_is_refused(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from cdtool.commands.scoring.force_rows import force_rows
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Contact, Recording
 from cdtool.results.results import ContactResult, RecordingResult, Results
-from cdtool.results.traced_force import force_profiles, traced_forces
+from cdtool.results.traced_force import traced_forces
 from cdtool.results.traces.trace import Trace, make_trace
 from cdtool.truth.force.curve import force_time_curve
 from cdtool.truth.force.limits import ForceProfile, ForceStep
@@ -74,18 +73,3 @@ def test_a_contact_ends_where_the_next_begins_and_each_has_its_verdict(hit, cont
     first, other = traced_forces(scored(hit, both), [traced(hit, both)])
     assert first.time[-1] < 0.1
     assert (first.contact, other.contact) == (1, 2)
-
-
-def test_traces_without_a_verdict_or_a_load_cell_give_none(hit, contacts):
-    results, trace = scored(hit, contacts), traced(hit, contacts)
-    assert traced_forces(replace(results, forces=()), [trace]) == ()
-    assert traced_forces(results, [replace(trace, group="another")]) == ()
-    assert traced_forces(results, [replace(trace, force_time=np.empty(0), force=np.empty(0))]) == ()
-    assert traced_forces(results, []) == ()
-
-
-def test_profiles_are_read_back_from_the_provenance_of_a_file(hit, contacts):
-    results = scored(hit, contacts)
-    assert force_profiles(results) == {"gap": PROFILE}
-    assert force_profiles(replace(results, provenance=json.loads(json.dumps(results.provenance)))) == {"gap": PROFILE}
-    assert force_profiles(replace(results, provenance={})) == {}

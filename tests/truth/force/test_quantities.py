@@ -62,14 +62,3 @@ def test_a_higher_level_is_never_exceeded_for_longer_and_scaling_both_changes_no
     assert high <= low + 1e-9
     scaled = time_above(curve(scale * force, time), scale * level).length
     assert scaled == pytest.approx(low, abs=1e-6) or min(np.abs(force - level)) < 1e-6
-
-
-def test_two_peaks_are_one_time_with_the_pause_between_them():
-    force = np.where((TIME < 0.2) | ((TIME > 0.5) & (TIME < 0.6)), 300.0, 0.0)
-    assert time_above(curve(force), 150.0).length == pytest.approx(0.6, abs=2.0 * STEP)
-
-
-def test_a_ringing_force_is_above_until_its_last_crossing():
-    force = 400.0 * np.exp(-TIME / 0.3) * np.cos(2.0 * np.pi * 10.0 * TIME)
-    last = TIME[np.flatnonzero(force > 150.0)[-1]]
-    assert time_above(curve(force), 150.0).end == pytest.approx(float(last), abs=2.0 * STEP)

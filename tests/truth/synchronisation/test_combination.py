@@ -14,13 +14,6 @@ def events(times, delays, errors=1e-4):
     return [EventDelay(float(t), float(d), float(e), 0.99) for t, d, e in zip(times, delays, each, strict=True)]
 
 
-def test_a_line_without_scatter_is_found_exactly():
-    times = np.array([0.0, 100.0, 300.0, 600.0])
-    line = clock_line(events(times, 5e-3 + 60e-6 * times))
-    assert line.offset.value - 60e-6 * line.at == pytest.approx(5e-3)
-    assert line.drift.value == pytest.approx(60e-6) and line.used == (0, 1, 2, 3)
-
-
 def test_soft_contacts_with_too_small_errors_do_not_turn_the_line():
     """The delays of six stiff contacts are within 0.5 ms; one of six soft ones is wrong by 3.6 standard errors."""
     times = np.array([26, 177, 316, 331, 340, 488, 42, 270, 349, 444, 451, 560], dtype=np.float64)

@@ -33,21 +33,6 @@ class Motion:
         return values + generator.normal(0.0, 1.0, values.shape) * share * span
 
 
-def stroke_motion(
-    generator: Generator,
-    rate: float = 500.0,
-    duration: float = 6.0,
-    travel: float = 0.8,
-    inertia: float = 40.0,
-    friction: float = 25.0,
-    push: float = 150.0,
-) -> Motion:
-    """Return strokes of one axis, out and back with pauses, with one push near the end."""
-    time = _stamps(rate, duration)
-    reference = _moves(time, np.array([0.0, 1.0, 0.15, 0.9, 0.0]) * travel, 0.7)[:, np.newaxis]
-    return _follow(generator, time, reference, [inertia], [friction], [0.0], push)
-
-
 def arm_motion(
     generator: Generator,
     joints: int = 6,

@@ -25,13 +25,6 @@ def test_an_unstated_clock_unit_is_guessed_with_those_of_position_and_speed(tmp_
     assert "ms with mm, mm/s" in draft.said("time") and "s with m, mm/s fit as well" in draft.said("time")
 
 
-def test_a_clock_in_minutes_is_recognised_by_the_ratio_and_marked(tmp_path):
-    run = stroke()
-    draft = drafted_columns(tmp_path, {"time": run.time / 60.0, "pos": run.travel, "vel": run.speed})
-    assert draft.channels["time"]["unit"] == "min" and draft.checked("time")
-    assert draft.unit("position") == "m"
-
-
 def test_a_counter_gets_a_rate_and_a_mark_not_a_unit_of_time(tmp_path):
     run = stroke()
     ticks = np.arange(len(run.time)) * 10.0
@@ -60,21 +53,6 @@ def test_a_clock_whose_name_contradicts_the_ratio_is_marked(tmp_path):
     run = stroke(0.05, 40.0)
     draft = drafted_columns(tmp_path, {"time_ms": run.time, "pos [m]": run.travel, "vel [m/s]": run.speed})
     assert draft.checked("time") and "ms" in draft.said("time")
-
-
-def test_header_units_on_both_sides_of_a_gear_are_kept_and_give_the_ratio(tmp_path):
-    run = stroke()
-    draft = drafted_columns(
-        tmp_path,
-        {
-            "t [s]": run.time, "Drehzahl Motor [1/min]": run.speed / LEAD * RPM, "Drehmoment [Nm]": run.torque,
-            "Position [mm]": run.travel * 1e3, "Kraftmessdose [N]": run.force,
-        },
-    )  # fmt: skip
-    assert draft.machine["type"] == "linear_axis" and draft.machine["coordinates"] == "motor"
-    assert draft.machine["transmission_ratio"] == pytest.approx(LEAD, rel=2e-3)
-    assert draft.checked("transmission_ratio")
-    assert [draft.unit(name) for name in ("speed", "torque", "position", "force")] == ["1/min", "Nm", "mm", "N"]
 
 
 def test_names_on_both_sides_of_a_gear_give_the_ratio_with_a_mark(tmp_path):
@@ -165,14 +143,6 @@ def test_a_ratio_of_units_of_any_size_is_not_certain(tmp_path, names, factors):
     columns = {"t [s]": run.time, names[0]: factors[0] * run.travel, names[1]: factors[1] * run.speed}
     draft = drafted_columns(tmp_path, columns)
     assert draft.checked("position") and draft.checked("speed")
-
-
-def test_units_in_names_that_fit_the_ratio_are_not_marked(tmp_path):
-    run = stroke()
-    columns = {"time_s": run.time, "velocity_mps": run.speed, "position_m": run.travel, "force_kg": run.force}
-    draft = drafted_columns(tmp_path, columns)
-    assert not draft.checked("position") and not draft.checked("speed")
-    assert draft.unit("force") == "kgf" and "only from its name" in draft.said("force")
 
 
 @needs_data("ur3e/L1L2.csv")

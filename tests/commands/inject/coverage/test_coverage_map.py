@@ -65,14 +65,6 @@ def test_a_cell_misses_most_if_more_than_half_of_its_assessable_contacts_are_mis
     assert math.isnan(only.latency_ms)
 
 
-def test_partly_missed_cells_tell_most_then_the_least_certain() -> None:
-    names = {"a": (NEAR, "k"), "b": (NEAR, "k"), "c": (FAR, "k"), "d": (FAR, "k")}
-    rows = [row("a", 50.0), row("b", None, "missed"), row("c", 50.0), row("d", 150.0)]
-    rows += [row(name, value, detector="pt") for name, value in zip("abcd", (50.0, 51.0, 60.0, 64.0), strict=True)]
-    telling = made(rows, names).most_telling(3)
-    assert [(item.detector, item.key) for item in telling] == [("gm", NEAR), ("gm", FAR), ("pt", FAR)]
-
-
 @pytest.mark.parametrize(
     ("limit", "reason"),
     [(75.0, TellingReason.NEAR_LIMIT), (80.0, TellingReason.SCATTER), (40.0, TellingReason.SCATTER)],

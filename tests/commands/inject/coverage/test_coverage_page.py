@@ -35,29 +35,6 @@ def cells_of(text: str) -> dict[int, tuple[str, str]]:
     return {int(number): (style, re.sub(r"<[^>]*>", "|", words)) for style, number, words in found}
 
 
-def test_the_maps_are_tables_that_need_no_script() -> None:
-    text = coverage_html(coverage_case())
-    cells = cells_of(text)
-    words = {item["title"]: cells[number] for number, item in enumerate(data_of(text)["cells"])}
-    style, shown = words["quick: 0.5 m, 100 N/mm"]
-    assert (style, shown) == ("level-0", "21|± 2.0||210 N|")
-    assert words["slow: 0.5 m, 10 N/mm"] == ("level-9 misses-some", "1 of 2 missed|200||2000 N|")
-    assert words["slow: 1 m, 10 N/mm"] == ("misses-most", "2 of 2 missed")
-
-
-def test_misses_are_named_first() -> None:
-    text = coverage_html(coverage_case())
-    assert "<strong>Contacts are missed by slow</strong>" in text
-    assert "quick: 0 of 8 missed; slow: 3 of 8 missed" in text
-    missed = text[text.index('id="missed-table"') : text.index('id="maps"')]
-    assert re.findall(r"<t[dh][^>]*>(\d of \d|slow|quick|1\.00|0\.500)</t[dh]>", missed) == [
-        "slow",
-        "1.00",
-        "slow",
-        "0.500",
-    ]
-
-
 def test_a_cell_opens_its_worst_contact_that_has_a_trigger_plot() -> None:
     text = coverage_html(coverage_case())
     data, traces = data_of(text), traces_of(text)

@@ -12,7 +12,6 @@ import pytest
 from cdtool.commands.protocol.assessment.assessment import Repetition, assess_point, judge
 from cdtool.commands.protocol.assessment.plan import MachineParticulars
 from cdtool.commands.protocol.assessment.protocol import Protocol
-from cdtool.commands.protocol.document.blocks import HeadedTable
 from cdtool.commands.protocol.document.document import protocol_document
 from cdtool.commands.protocol.document.html import to_html
 from cdtool.commands.protocol.document.words import words_of
@@ -56,27 +55,6 @@ def with_profile(protocol: Protocol, profile: ForceProfile) -> Protocol:
     ]
     points = (assess_point(point.point, profile, repetitions),)
     return replace(protocol, points=points, verdict=judge(protocol.plan, points, "protocol.toml"))
-
-
-def forces(protocol: Protocol) -> list[HeadedTable]:
-    """Return the tables of forces."""
-    blocks = protocol_document(protocol).blocks
-    return [item for item in blocks if isinstance(item, HeadedTable) and item.columns[:2] == ("No.", "Recording")]
-
-
-@pytest.mark.parametrize(("count", "tables"), [(1, 1), (2, 1), (4, 1), (9, 2)])
-def test_every_step_of_a_profile_has_its_column(count, tables, protocols):
-    steps = tuple(ForceStep(0.5 * number, 400.0 - number, f"step {number}") for number in range(count))
-    profile = ForceProfile("own", "own", "own", True, steps)
-    shown = forces(with_profile(protocols["pass"], profile))
-    columns = [name for grid in shown for name in grid.columns]
-    assert len(shown) == tables and [name for name in columns if name.startswith("step")] == [
-        f"step {number} [N]" for number in range(count)
-    ]
-    assert ("t_dyn [ms]" in columns) == (count > 1)
-    for number in range(count):
-        grid = next(item for item in shown if f"step {number} [N]" in item.columns)
-        assert grid.rows[-1][grid.columns.index(f"step {number} [N]")] == f"{400 - number}"
 
 
 def test_a_mean_just_above_its_limit_is_above_it_in_table_and_reason(protocols):

@@ -46,27 +46,6 @@ def test_it_is_a_tagged_pdf_a_with_its_language_and_title(name, documents, pypdf
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_every_font_is_embedded(name, documents, pypdf):
-    reader = pypdf.PdfReader(io.BytesIO(to_pdf(documents[name])))
-    fonts = [font for page in reader.pages for font in _fonts(page["/Resources"])]
-    assert len(fonts) > 3
-    for font in fonts:
-        inner = font["/DescendantFonts"][0].get_object() if "/DescendantFonts" in font else font
-        descriptor = inner["/FontDescriptor"]
-        assert {"/FontFile", "/FontFile2", "/FontFile3"} & set(descriptor), font["/BaseFont"]
-
-
-def _fonts(resources: Any) -> list[Any]:
-    """Return the fonts of a page and of the drawings on it."""
-    resources = resources.get_object()
-    found = [font.get_object() for font in resources.get("/Font", {}).values()]
-    for drawing in resources.get("/XObject", {}).values():
-        if "/Resources" in drawing.get_object():
-            found += _fonts(drawing.get_object()["/Resources"])
-    return found
-
-
-@pytest.mark.parametrize("name", CASES)
 def test_every_page_has_the_hash_of_the_data_and_its_number(name, documents, protocols, pypdf):
     document = documents[name]
     pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages]

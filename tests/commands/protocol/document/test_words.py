@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import datetime as dt
 import string
 import typing
 
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 
 from cdtool.commands.protocol.assessment.reasons import Reason
 from cdtool.commands.protocol.document.words import LANGUAGES, words_of
-from cdtool.truth.force.limits import read_force_limits
 from cdtool.truth.force.verdict import CauseKind, StepCause
 from tests.project.pages import ROOT
 
@@ -61,23 +59,6 @@ def test_every_reason_and_every_cause_has_a_sentence(language):
     assert {key: placeholders(text) for key, text in causes.items()} == {
         key: placeholders(text) for key, text in of_pressure.items()
     }
-
-
-def test_numbers_and_dates_are_as_usual_in_the_language():
-    english, german = words_of("en"), words_of("de")
-    assert (english.number(1234.56), german.number(12.345)) == ("1235", "12,35")
-    assert (english.number(123456.0), german.number(-0.5), german.number(None)) == ("123456", "−0,5", "–")
-    day = dt.date(2026, 3, 1)
-    assert (english.value(day), german.value(day)) == ("1 March 2026", "01.03.2026")
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
-    names = {step.name for profile in read_force_limits().values() for step in profile.steps}
-    assert names == set(words_of(language).texts["step"])
-    assert words_of(language).name("step", "my step") == "my step"
-    areas = {item.area for profile in read_force_limits().values() for item in profile.pressures}
-    assert areas == set(words_of(language).texts["area"])
 
 
 def test_no_value_of_a_reason_is_rounded_across_its_limit():

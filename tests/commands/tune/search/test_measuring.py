@@ -76,13 +76,6 @@ def test_the_free_runs_of_a_fold_neither_teach_nor_limit_what_assesses_it(record
     assert len(usual.ratios) == 4 and (other.ratios > 1.0).all() and usual.ratios.max() < other.ratios.min()
 
 
-def test_disturbed_runs_of_other_folds_do_change_it(recordings, gate):
-    choice = Choice(CANDIDATE, 0, 2)
-    usual = measuring(recordings, gate)(choice)
-    other = measuring(disturbed(recordings, 1), gate)(choice)
-    assert not np.array_equal(usual.latency, other.latency, equal_nan=True)
-
-
 def test_a_rule_that_cannot_learn_is_unusable_with_its_reason(recordings, gate):
     def fails(rule, pairs):
         raise SignatureError("nothing can be learned", "hint")
@@ -91,9 +84,3 @@ def test_a_rule_that_cannot_learn_is_unusable_with_its_reason(recordings, gate):
     of_all = "nothing can be learned (of 20 impact-free runs, those outside {} of 5 parts)"
     assert made(CANDIDATE).reason == of_all.format(1)
     assert made(Choice(CANDIDATE, 0, 1)).reason == of_all.format(2)
-
-
-def test_a_budget_that_the_subsets_cannot_support_is_a_reason(recordings, gate):
-    assert (
-        "needs 19 impact-free operations to be set, 16 were" in measuring(recordings, gate, "1/20op")(CANDIDATE).reason
-    )

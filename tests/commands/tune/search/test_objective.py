@@ -24,13 +24,6 @@ def test_the_score_is_the_mean_of_the_logarithms_of_the_groups():
     assert math.exp(objective.score(costs)) == pytest.approx(0.03)
 
 
-def test_a_missed_contact_counts_as_its_window():
-    values = latencies(0.01, 0.09)
-    values[0] = np.nan
-    costs = Objective(Goal.LATENCY, RECORDINGS).costs(measured(RECORDINGS, values), 0, 0)
-    assert costs[0] == pytest.approx((4 * 0.01 + 1.0) / 5)
-
-
 def test_no_group_may_get_much_worse_than_by_default():
     objective = Objective(Goal.LATENCY, RECORDINGS)
     default = np.array([0.03, 0.07])
