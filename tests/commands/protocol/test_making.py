@@ -263,7 +263,7 @@ def test_a_measurement_that_was_exported_again_is_no_repetition(name, tmp_path):
         ({"more": "obstacle = 3"}, "protocol.point[1].obstacle"),
         (
             {"more": '[[protocol.deviation]]\npoint = "x"\ntext = "a"\nreason = "b"'},
-            "deviation: names the measuring point 'x'",
+            "deviation[1].point: names the measuring point 'x'",
         ),
         ({"logs": 'group = "edge"\nlogs = ["a"]'}, "is given with logs"),
         ({"more": '[[protocol.point]]\nname = "b"\nprofile = "en_1"'}, "unknown force profile 'en_1'"),
@@ -319,10 +319,11 @@ def test_a_draft_takes_the_test_points_of_the_benchmark_and_names_logs_relative_
 
 def test_every_entry_is_explained_in_the_draft(tmp_path):
     draft = draft_protocol(None, tmp_path / "empty.toml").path.read_text(encoding="utf-8")
+    words = " ".join(draft.replace("#", " ").split())
     own_comment = {"quantity", "logs", "range_n_per_cm2"}
     for kind in (MachineParticulars, TestParticulars, Instrument, MeasuringPoint):
         for item in (item for item in fields(kind) if item.name not in own_comment):
-            assert re.search(rf"^(# )?{item.name} = .*# .*{re.escape(item.metadata['meaning'])}$", draft, re.MULTILINE)
+            assert re.search(rf"^(# )?{item.name} =", draft, re.MULTILINE) and item.metadata["meaning"] in words
 
 
 def test_before_anything_is_recorded_a_plan_can_be_drafted_and_checked(tmp_path):
