@@ -113,7 +113,7 @@ def test_its_gains_can_be_set_in_the_machine_file_under_either_name(command, tmp
     assert alarms[0] == alarms[1] != plain["alarms"]
     for more, words in (
         ("[detectors.tr]\ncut = 5.0\n", "detectors.tr.cut: unknown key (did you mean cutoff?"),
-        ("[detectors.tr]\ncutoff = -1\n", "detectors.tr: gain cutoff is -1"),
+        ("[detectors.tr]\ncutoff = -1\n", "detectors.tr.cutoff: is -1"),
         ("[detectors.tr]\n[detectors.torque_rate]\n", "torque_rate: repeats torque_rate"),
     ):
         wrong = command(

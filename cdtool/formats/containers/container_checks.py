@@ -60,7 +60,7 @@ def open_hdf5(path: Path, kind: str) -> Iterator[tuple[Any, Any]]:
         # HDF5 itself refuses a shorter file only.
         more = path.stat().st_size - int.from_bytes(head[20:28] if head[0] > 1 else head[32:], "little")
         if more > 0:
-            hint = "copy it again; if its writer was killed, h5clear --increment=0 keeps what was flushed before"
+            hint = "copy it again; if its writer was killed, h5clear of HDF5 keeps what was flushed before"
             raise RecordingError(f"damaged: {more} bytes longer than it states", hint)
         yield h5py, file
 

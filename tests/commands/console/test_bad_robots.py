@@ -64,7 +64,12 @@ def test_a_joint_missing_from_the_urdf_is_named_with_the_nearest(log, tmp_path):
 
 
 def test_joints_of_the_urdf_that_are_not_logged_must_be_locked(log, tmp_path):
-    told = refused(log, described(tmp_path, joints=JOINTS[:5]))
+    path = described(tmp_path, joints=JOINTS[:5])
+    text = path.read_text()
+    for column in (', "f5"', ', "v5"', ', "q5"'):
+        text = text.replace(column, "")
+    path.write_text(text)
+    told = refused(log, path)
     assert "tool" in told and "locked" in told
 
 

@@ -259,7 +259,9 @@ def check_damaged(bench: Path, folder: Path, traces: bytes) -> None:
 def robot(folder: Path, urdf: str) -> Path:
     written(folder / "six.urdf", urdf)
     joints = ", ".join(f'"{name}"' for name in JOINTS)
-    channel = 'torque = { columns = ["f0", "f1", "f2", "f3", "f4", "f5"], unit = "SI" }'
+    channel = (
+        'time = { column = "t", unit = "s" }\ntorque = { columns = ["f0", "f1", "f2", "f3", "f4", "f5"], unit = "SI" }'
+    )
     text = f'[machine]\ntype = "urdf_robot"\nurdf = "six.urdf"\njoints = [{joints}]\n[channels]\n{channel}\n'
     return written(folder / "machine.toml", text)
 
@@ -383,10 +385,15 @@ def test_a_debounce_with_many_digits_is_one_line(value):
 
 
 def test_an_unknown_option_and_a_missing_argument_are_one_line_with_the_help_that_explains():
-    for arguments, word in ((("detect", "--nope"), "--nope"), (("compare",), "OLD"), (("benchmar",), "benchmar")):
+    cases = (
+        (("detect", "--nope"), "--nope", "--help)"),
+        (("compare",), "OLD", "--help)"),
+        (("benchmar",), "benchmar", "did you mean benchmark"),
+    )
+    for arguments, word, next_step in cases:
         done = cdtool(*arguments)
         assert done.status == 2 and done.out == "" and done.err.count("\n") == 1, done.err
-        assert done.err.startswith("error: ") and word in done.err and "--help)" in done.err
+        assert done.err.startswith("error: ") and word in done.err and next_step in done.err
 
 
 def test_names_that_are_no_utf_8_are_shown_and_refused_in_one_line(tmp_path):

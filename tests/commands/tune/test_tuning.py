@@ -50,7 +50,7 @@ def gate(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def quick(gate: Path) -> BenchmarkFile:
     """Few runs and a threshold that is learned and assessed in no time."""
     setup = read_benchmark_file(gate / "benchmark.toml")
-    return replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    return replace(setup, learn=setup.learn[:12], rule=Limit())
 
 
 @pytest.fixture(scope="module")
@@ -211,7 +211,7 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
     inject += "[inject.obstacles.hard]\nstiffness_n_per_mm = 500\n"
     (gate / "both.toml").write_text(text + inject, encoding="utf-8")
     both = read_benchmark_file(gate / "both.toml")
-    both = replace(both, learn=both.learn[:12], threshold="limit", rule=Limit())
+    both = replace(both, learn=both.learn[:12], rule=Limit())
     with pytest.raises(UsageError, match=r"has real contacts \(stiff, soft\) and injected ones"):
         tune(both, QUICK)
     made = tune(both, replace(QUICK, impacts="injected"))
@@ -257,7 +257,7 @@ def test_the_force_is_not_minimised_where_none_is_known(quick, tmp_path):
     written = written.replace("[onset]", '[onset]\nlabels = "labels.csv"')
     (quick.path.parent / "labelled.toml").write_text(written, encoding="utf-8")
     setup = read_benchmark_file(quick.path.parent / "labelled.toml")
-    setup = replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    setup = replace(setup, learn=setup.learn[:12], rule=Limit())
     with pytest.raises(UsageError, match="no log has the force of its contact"):
         tune(setup, QUICK, objective=Goal.FORCE)
     made = tune(setup, QUICK)
