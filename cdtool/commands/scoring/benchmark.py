@@ -108,7 +108,7 @@ def benchmark(  # the public function: a keyword for each setting
     [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
     work = BenchmarkWork.of(file, detectors, false_alarm_budget, settings)
-    workers, store = work.executed_by(workers or Workers(jobs), store)
+    workers = (workers or Workers(jobs)).limited_by(work.setup.execution)
     work = replace(work, setup=work.setup.with_made(workers))
     if store is not None:
         store.create()
@@ -143,14 +143,6 @@ class BenchmarkWork:
         setup = replace(setup, budget=Budget.parse(budget)) if budget is not None else setup
         refuse_limits_by_hand(setup)
         return cls(setup, limits, list(detectors) == ["all"])
-
-    def executed_by(self, workers: Workers, store: Store | None) -> tuple[Workers, Store | None]:
-        """Return workers and store with what [execution] sets of them."""
-        how = self.setup.execution
-        if store is not None:
-            trust, again = store.trust_times or how.trust_mtime, store.retry_failed or how.retry_failed
-            store = replace(store, trust_times=trust, retry_failed=again)
-        return workers.limited_by(how), store
 
 
 def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> BenchmarkResult:

@@ -32,7 +32,6 @@ from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, resolve_all, shown_path
 from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.commands.judging.settings_table import (
-    ExecutionTable,
     ForceTable,
     JudgingTable,
     LearnPart,
@@ -43,7 +42,7 @@ from cdtool.commands.judging.settings_table import (
 )
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
-from cdtool.execution.workers import Workers
+from cdtool.execution.workers import Execution, Workers
 from cdtool.formats.channels.channel_map import ChannelMap, TimeSource
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.labels import Labels
@@ -250,7 +249,7 @@ class BenchmarkFile:
     settings: Mapping[str, Any] = field(default_factory=dict)
     tune: Any = None
     triggers: TriggersTable = field(default_factory=TriggersTable)
-    execution: ExecutionTable = field(default_factory=ExecutionTable)
+    execution: Execution = field(default_factory=Execution)
 
     def with_made(self, workers: Workers) -> BenchmarkFile:
         """Return the benchmark with the groups that a command makes for it; unchanged without one."""

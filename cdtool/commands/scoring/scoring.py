@@ -63,7 +63,7 @@ class LogRows:
 
     `recording` is None if it was left out. `unchecked`: names of logs assumed to be free of impacts, with the ground
     truth that is missing from them. `beside`: name and SHA-256 of each file beside the log with a channel. `strokes`:
-    of a log that is not cut. `unread`: it could not be read.
+    of a log that is not cut.
     """
 
     recording: RecordingResult | None
@@ -74,7 +74,6 @@ class LogRows:
     unchecked: tuple[tuple[str, Finding], ...] = ()
     beside: tuple[tuple[str, str], ...] = ()
     strokes: int = 0
-    unread: bool = False
 
 
 class Detections(NamedTuple):
@@ -183,7 +182,7 @@ def score_runs(
 
 def _unread(setup: BenchmarkFile, path: Path, fault: CdtoolError, seconds: float) -> ScoredLog:
     left_out = unread(path, setup.path.parent, fault)
-    return ScoredLog(LogRows(None, skipped=(left_out,), unread=True), lasts=is_lasting(fault), reading=seconds)
+    return ScoredLog(LogRows(None, skipped=(left_out,)), lasts=is_lasting(fault), reading=seconds)
 
 
 def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[CutLog | Skipped]:
