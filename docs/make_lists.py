@@ -24,10 +24,10 @@ from cdtool.base.settings import keys_of, kind_in_words
 from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
 from cdtool.commands.judging.named_logs import OnsetTable
 from cdtool.commands.judging.settings_table import ForceTable, TriggersTable
-from cdtool.execution.workers import Execution
 from cdtool.commands.simulate.simulation_table import SimulationTable
 from cdtool.commands.tune.options import TuneTable
 from cdtool.detectors import DETECTORS
+from cdtool.execution.workers import Execution
 from cdtool.formats import FORMATS
 from cdtool.machines.joint_machine import JointTable
 from cdtool.machines.linear_axis import LinearAxisTable

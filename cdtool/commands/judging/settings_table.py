@@ -170,11 +170,8 @@ class DetectorTable:
     def rules(self, place: Place, **others: float) -> ScoringRules:
         """Return the rules for logs that no benchmark file names, the label file read; raises ConfigurationError."""
         onset, below = self.onset, place.below("onset")
-        if onset.synchronisation == "measured":
-            problem = "is 'measured', which needs the logs of a benchmark file"
-            raise below.fault("synchronisation", problem, "give onset.synchronisation_s")
         labels = read_label_file(onset, below, Path())
-        return ScoringRules(onset.rule, labels=labels, synchronisation=onset.synchronisation_s or 0.0, **others)
+        return ScoringRules(onset.rule, labels=labels, synchronisation=onset.synchronisation_s, **others)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,7 +30,6 @@ from cdtool.commands.scoring.gathering import recordings_in, results_before, res
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
-from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
 from cdtool.commands.scoring.pieces import PieceScoring
 from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import ScoredLog, detect_with, score_runs
@@ -147,7 +146,7 @@ class BenchmarkWork:
 
 def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> BenchmarkResult:
     begin = perf_counter()
-    setup, measured = with_synchronisation(work.setup, workers)
+    setup = work.setup
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
     learned, runs = learned_with_store(store, teaching) if store else (teaching.learned, {})
     setup = with_only(setup, learned.about.detectors)
@@ -165,7 +164,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> Benchmar
         _provenance(setup, used, learned),
         setup.detectors,
         (*setup.not_made, *learned.about.skipped, *refused),
-        (*measured, *learned.about.findings, *of_limits),
+        (*learned.about.findings, *of_limits),
     )
     logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     scoring = scoring_of(setup, learned, teaching, factors)

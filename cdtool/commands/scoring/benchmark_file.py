@@ -208,8 +208,7 @@ class BenchmarkFile:
 
     `impacts` are the scored groups: those of impacts, the hold-out, then those of changed conditions.
 
-    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock, or
-    not known before the logs are audited if `measures_synchronisation`.
+    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock.
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `sections` are the parts of scored logs
     that are used, `learned_sections` those of the logs learned from, which end `guard` [s] before
     their first contact; None: they have no contact. `split`: which runs stay together where runs set a limit for
@@ -242,7 +241,6 @@ class BenchmarkFile:
     learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
     split: Split = Split.RECORDING
-    measures_synchronisation: bool = False
     made: MadeGroups | None = None
     not_made: tuple[Skipped, ...] = ()
     force_limits: Path | None = None
@@ -273,7 +271,7 @@ class BenchmarkFile:
             "watched_joints": ", ".join(self.watched) or None,
             "label_file": self.labels.source if self.labels else None,
             **({"not_contacts": list(self.labels.not_contacts)} if self.labels and self.labels.not_contacts else {}),
-            "synchronisation_s": "measured" if self.measures_synchronisation else self.synchronisation,
+            "synchronisation_s": self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {
                 name: profile.described for name in self.groups_of_impacts if (profile := self.impacts[name].force)
@@ -496,8 +494,7 @@ def _resolved(
         rule=rule,
         activation=table.activation,
         labels=labels,
-        synchronisation=table.onset.synchronisation_s or 0.0,
-        measures_synchronisation=table.onset.synchronisation == "measured",
+        synchronisation=table.onset.synchronisation_s,
         onset=table.onset.rule,
         mass_before_cell=table.force.mass_before_cell_kg,
         learn=tuple(learn),

@@ -16,7 +16,6 @@ from cdtool.formats.channels.run_reading import read_runs
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import RunCut
 from cdtool.results.files.results_file import to_json
-from cdtool.truth.synchronisation import latency
 from tests.command import FEW, one_line
 from tests.command import cdtool as command
 
@@ -332,21 +331,6 @@ def test_runs_are_learned_from_until_their_onset_and_scored_without_their_own_pa
     assert other.provenance["scored_without_own_part"] == list(patterns)
     cut.write_text(named.replace('"all.csv#stiff_*", "all.csv#soft_*", "all.csv#free_*"', '"all.csv#[fs]*"'))
     assert figures(cdtool.benchmark(cut).results) == figures(one), "other patterns name the same runs"
-
-
-def test_the_synchronisation_is_measured_on_runs_as_on_files(folder, monkeypatch):
-    monkeypatch.setattr(latency, "LEAST_CONTACTS", 2)  # the folder has no more
-    monkeypatch.setattr(latency, "_WIDEST_OFFSET", 1.0)
-    plain, cut = both_ways(folder, ("above_n = 20.0", 'above_n = 20.0\nsynchronisation = "measured"'))
-    assert figures(cut) == figures(plain)
-    early = 'to = "3s"\nlogs = '
-    with pytest.raises(ConfigurationError, match="measured, but not assessable"):
-        both_ways(
-            folder,
-            ("above_n = 20.0", 'above_n = 20.0\nsynchronisation = "measured"'),
-            ("[impacts.stiff]\nlogs = ", f"[impacts.stiff]\n{early}"),
-            ("[impacts.soft]\nlogs = ", f"[impacts.soft]\n{early}"),
-        )
 
 
 def test_a_load_cell_in_a_file_of_its_own_cannot_be_divided_into_runs(folder):
