@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from cdtool.base.arrays import FloatArray
 from cdtool.commands.signature.deviation import Axis
 from cdtool.recordings.motion import MotionClass
 from cdtool.statistics.trends import ChangeOverRuns
@@ -44,19 +41,16 @@ class Shown:
 
 @dataclass(frozen=True)
 class JointDrift:
-    """One joint over the season: runs, deviation (runs, locations), and changes of the whole stroke and of a location.
+    """One joint over the season: runs, and changes of the whole stroke and of a location along `axis`, in its `unit`.
 
-    `course` is the change of the runs' `overall`; `overall` and `local` are None if no change is shown. `deviation` is
-    in spreads, at the `places` along `axis`, in its `unit`.
+    `course` is the change of the runs' `overall`; `overall` and `local` are None if no change is shown.
     """
 
     joint: str
     two_sided: bool
     axis: Axis
     unit: str
-    places: FloatArray
     runs: tuple[AuditedRun, ...]
-    deviation: FloatArray
     course: ChangeOverRuns
     overall: Shown | None
     local: Shown | None
@@ -66,17 +60,12 @@ class JointDrift:
         """The changes shown, a location first: it must be inspected before anything is learned."""
         return tuple(item for item in (self.local, self.overall) if item is not None)
 
-    def at_place(self, place: float) -> FloatArray:
-        """Return the runs' deviation (runs,) at the nearest location."""
-        column: FloatArray = self.deviation[:, int(np.argmin(np.abs(self.places - place)))]
-        return column
-
 
 @dataclass(frozen=True)
 class DriftAudit:
     """Runs of one class of motion in order of time, compared with one signature, which does not change meanwhile.
 
-    `places` (m,) along `axis`, in its `unit`: m or rad of travel, or s since the motion began. `not_assessable`: runs
+    Locations are along `axis`, in its `unit`: m or rad of travel, or s since the motion began. `not_assessable`: runs
     that were nowhere assessable, and why; they are in no row.
     """
 
@@ -84,7 +73,6 @@ class DriftAudit:
     safety_factor: float
     axis: Axis
     unit: str
-    places: FloatArray
     joints: tuple[JointDrift, ...]
     not_assessable: tuple[tuple[str, str], ...]
 

@@ -80,7 +80,6 @@ def audit_drift(
         signature.safety_factor,
         found.axis,
         unit,
-        found.places,
         tuple(item.drift() for item in audited),
         tuple(refused),
     )
@@ -104,9 +103,7 @@ class _JointAudit:
             two_sided=not self.signature.watched,
             axis=self.found.axis,
             unit=self.unit,
-            places=self.found.places,
             runs=tuple(self._run(i) for i in range(len(self.detections))),
-            deviation=self.found.pooled[:, :, self.joint],
             course=course,
             overall=self._shown(course, None) if course.kind != "steady" else None,
             local=self._local(course),

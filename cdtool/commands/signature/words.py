@@ -1,4 +1,4 @@
-"""The result of an audit of a season, in plain sentences for the screen and for figures."""
+"""The result of an audit of a season, in plain sentences for the screen."""
 
 from __future__ import annotations
 
