@@ -11,7 +11,6 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
 from cdtool.commands.console.options import (
     BudgetOption,
@@ -43,7 +42,6 @@ def benchmark(
             parser=location,
             help="Benchmark file; see docs/benchmark-file.md.",
             metavar="FILE",
-            autocompletion=completions.files(".toml"),
         ),
     ],
     output: OutputOption = None,

@@ -9,15 +9,14 @@ import typer
 
 from cdtool.base.exit_status import Fact, statuses_words
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
-from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import (
     ClusterOption,
     JobsOption,
     JsonOption,
     MachineOption,
     QuietOption,
+    logs_argument,
     set_option,
 )
 from cdtool.commands.console.place import Place, location
@@ -41,7 +40,6 @@ FileArgument = Annotated[
         parser=location,
         help="Signature file from cdtool learn-signature.",
         metavar="SIGNATURE",
-        autocompletion=completions.files(".json"),
     ),
 ]
 UpkeepOption = Annotated[list[str] | None, set_option("onset.above_n=20", "UpkeepTable")]

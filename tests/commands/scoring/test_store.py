@@ -12,7 +12,7 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import OutputError, RecordingError
-from cdtool.commands.scoring import pieces
+from cdtool.commands.scoring import benchmark, pieces
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.store.determinants import Determinants
@@ -242,15 +242,15 @@ def test_an_error_of_the_system_is_not_stored(gate, tmp_path, monkeypatch):
 def test_a_log_that_changes_while_it_is_read_is_left_out_with_that_reason(gate, tmp_path, monkeypatch, with_store):
     log = gate / "stiff" / "03.csv"
     before = log.read_bytes()
-    state = pieces.state_of
+    score = benchmark.score_runs
 
-    def changing(files):
-        found = state(files)
-        if files == [log]:
+    def changing(setup, group, path, *others):
+        found = score(setup, group, path, *others)
+        if path == log:
             log.write_bytes(before + b"\n")
         return found
 
-    monkeypatch.setattr(pieces, "state_of", changing)
+    monkeypatch.setattr(benchmark, "score_runs", changing)
     use = Store(tmp_path / "s") if with_store else None
     done = cdtool.benchmark(gate / "b.toml", store=use)
     assert [(item.recording, item.reason) for item in done.results.skipped] == [
