@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from cdtool.base.arrays import FloatArray
@@ -145,12 +144,10 @@ class BenchmarkWork:
 
 
 def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> BenchmarkResult:
-    begin = perf_counter()
     setup = work.setup
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
     learned, runs = learned_with_store(store, teaching) if store else (teaching.learned, {})
     setup = with_only(setup, learned.about.detectors)
-    seconds = perf_counter() - begin
     factors = sweep_factors(setup, learned.thresholds)
     used = [setup.machine_file.detector(name) for name in setup.detectors]
     refused = [
@@ -178,8 +175,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> Benchmar
         findings=(*results.findings, *scored.left_out),
     )
     report = StoreReport(len(logs) - scored.stored, scored.stored) if store else None
-    times = {"reading": learned.seconds + scored.reading, "detecting": seconds - learned.seconds + scored.detecting}
-    return BenchmarkResult(evaluate(results, setup.limits), scored.traces, setup.inputs, times, report)
+    return BenchmarkResult(evaluate(results, setup.limits), scored.traces, setup.inputs, report)
 
 
 @dataclass(frozen=True)
