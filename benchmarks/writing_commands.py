@@ -139,6 +139,11 @@ def cases(inputs: Path) -> list[Case]:
         ),
         Case("detect, folder", ("detect", *stiff, *machine, "--signature", b, "--plot", "{out}/plots")),
         Case(
+            "explain",
+            _plot("explain", stiff[1], *machine, "--signature", b),
+            _plot("explain", stiff[0], *machine, "--signature", b),
+        ),
+        Case(
             "convert, recover",
             ("convert", f"{inputs}/2.mcap", "{out}/r.mcap", "--recover", "verified", "--force"),
             ("convert", f"{inputs}/1.mcap", "{out}/r.mcap", "--recover", "verified", "--force"),

@@ -55,6 +55,10 @@ def gate(work: Path) -> None:
     write_figures(Report(done.evaluated, done.traces), work)
     for name in ("latency.png", "triggers_soft.png"):
         shutil.copyfile(work / name, IMAGES / name)
+    torque = work / "gate.pt.json"
+    cdtool("learn-signature", *free, "-m", "machine.toml", "-d", "pt", "-o", torque, folder=logs)
+    image = IMAGES / "explain_stiff_pt.png"
+    cdtool("explain", "stiff/03.csv", "-m", "machine.toml", "-s", torque, "--plot", image, folder=logs)
 
 
 def budget(work: Path) -> None:

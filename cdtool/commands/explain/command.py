@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cdtool.base.log_names import log_stem
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import (
     leave,
     number,
+    plain,
     print_json,
     print_line,
     print_not_assessable,
@@ -21,9 +25,11 @@ from cdtool.commands.console.console import (
 from cdtool.commands.console.options import (
     BenchmarkOption,
     DetectorOption,
+    ForceOption,
     JsonOption,
     MachineUnlessBenchmarkOption,
     SignatureOption,
+    figure_name,
     one_detector,
     set_option,
 )
@@ -34,7 +40,7 @@ if TYPE_CHECKING:
     from cdtool.results.explanation.explanation import Explanation
     from cdtool.results.explanation.margin import Moment
 
-# Events that are printed; --json has all.
+# Events that are printed and drawn; --json has all.
 _SHOWN = 20
 # Its reason already names the speeds.
 _BLIND = "not_assessable"
@@ -47,19 +53,25 @@ def explain(
     signature: SignatureOption = None,
     detectors: DetectorOption = None,
     settings: Annotated[list[str] | None, set_option("threshold.name=baseline", "DetectionTable")] = None,
+    plot: Annotated[
+        Place | None,
+        typer.Option("--plot", parser=location, help="Figure of the first event; a folder for all."),
+    ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Explain each alarm in a log and why each missed contact was missed.
 
     With --benchmark the results match those of `cdtool benchmark`.
 
-    Example: cdtool explain stiff/03.csv --machine machine.toml --signature gate.feekf.json
+    Example: cdtool explain stiff/03.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
     from cdtool.commands.detecting.prepared import prepared
     from cdtool.commands.explain.explaining import explain_log
     from cdtool.commands.judging.runs import lost
     from cdtool.commands.judging.settings_table import given_settings
 
+    drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
     ready = prepared(
         machine,
         benchmark=benchmark,
@@ -81,7 +93,24 @@ def explain(
     else:
         for _, run in runs:
             _show_explained(run)
+    for path in _draw(explained.runs, drawn, log_stem(log), force=force):
+        if not as_json:
+            print_line(f"plot written to {plain(path)}")
     leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))
+
+
+def _draw(runs: Sequence[ExplainedRun], plot: Path | None, stem: str, *, force: bool) -> list[Path]:
+    """Draw the first event into a file, or each event into a folder; return the files written."""
+    if plot is None:
+        return []
+    from cdtool.commands.explain.margin_plot import plot_explanation
+
+    events = [event for run in runs for event in run.events][: _SHOWN if plot.is_dir() else 1]
+    paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
+    paths = [figure_name(path, force=force) for path in paths]
+    for (detection, item), path in zip(events, paths, strict=True):
+        plot_explanation(detection, item, path)
+    return paths
 
 
 def _show_explained(explained: ExplainedRun) -> None:

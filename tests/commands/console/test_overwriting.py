@@ -144,6 +144,7 @@ def test_plots_are_drawn_again_over_figures_of_cdtool_only(folder):
     log = (folder / "stiff" / "01.csv", "-m", folder / "machine.toml", "--signature", signature)
     commands = (
         ("detect", *log, "--plot", plot),
+        ("explain", *log, "--plot", plot),
         ("study", "sensors", "-m", folder / "machine.toml", "--set", "impact.speed=0.2", "-o", plot),
     )
     for words in commands:

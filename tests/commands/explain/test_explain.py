@@ -46,8 +46,9 @@ def test_the_help_contains_an_example():
     assert done.status == 0 and "Example: cdtool explain" in one_line(done.out)
 
 
-def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_mover(explain, feekf_signature):
-    done = explain("stiff/01.csv", "-s", feekf_signature)
+def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_mover(explain, feekf_signature, tmp_path):
+    plot = tmp_path / "why.svg"
+    done = explain("stiff/01.csv", "-s", feekf_signature, "--plot", plot)
     assert done.status == 0 and done.err == ""
     told = " ".join(done.out.split())
     assert "ms after the contact (onset at" in told and "load cell)" in told
@@ -62,6 +63,7 @@ def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_move
         assert margin == pytest.approx(limit - signal, abs=1.1)  # both are printed with four digits
         assert (margin < 0.0) == (share > 100.0)
     assert max(map(len, done.out.splitlines())) <= 100
+    assert f"plot written to {plot}" in done.out and plot.read_text().count("<svg") == 1
 
 
 def test_a_missed_contact_is_explained_with_its_closest_approach(explain):
@@ -83,9 +85,10 @@ def test_a_low_limit_gives_a_false_alarm_that_points_to_the_command(explain):
     assert "from onset" not in told and "to alarm" in told
 
 
-def test_a_log_without_events_states_that_there_is_nothing_to_explain(explain, feekf_signature):
-    done = explain("holdout/01.csv", "-s", feekf_signature)
+def test_a_log_without_events_states_that_there_is_nothing_to_explain(explain, feekf_signature, tmp_path):
+    done = explain("holdout/01.csv", "-s", feekf_signature, "--plot", tmp_path / "why.png")
     assert done.status == 0 and "no alarm and no missed contact" in " ".join(done.out.split())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_json_is_strict_and_contains_every_number(explain):
@@ -160,6 +163,13 @@ def test_the_given_debounce_is_the_one_shown(explain):
         assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(1e-3 * (debounce - 1))
 
 
+def test_a_folder_gets_a_figure_of_every_event(explain, tmp_path):
+    done = explain("stiff/01.csv", "-d", "gm", "--set=threshold.limits=100", "--plot", tmp_path)
+    events = done.out.count(", momentum: ")
+    assert events >= 2
+    assert [path.name for path in sorted(tmp_path.iterdir())] == [f"{i:03d}_01.png" for i in range(1, events + 1)]
+
+
 def test_an_arm_is_explained_joint_by_joint():
     arm = GATE.parent / "arm" / "trial_1"
     command = ("explain", arm / "stiff" / "01.csv", "-m", arm / "machine.toml", "-d", "gm")
@@ -178,9 +188,12 @@ def test_an_arm_is_explained_joint_by_joint():
         ("stiff/01.csv", f"-d gm,pi {LIMIT}3", ("give one name",)),
         ("stiff/01.csv", f"-d gm {LIMIT}many", ("--set threshold.limits: is 'many'",)),
         ("stiff/01.csv", f"-d gmm {LIMIT}3", ("gmm", "did you mean gm")),
+        ("stiff/01.csv", f"-d gm {LIMIT}3 --plot why.gif", ("why.gif", ".svg")),
         ("stiff/01.csv", f"-d gm {LIMIT}3 --set=activation.debounce=0", ("activation.debounce", "from 1 to 1e+09")),
         ("stiff/01.csv", f"-d gm {LIMIT}3 --set=joints=elbow", ("elbow", "gate")),
         ("stiff/none.csv", f"-d gm {LIMIT}3", ("none.csv", "no such file")),
+        # The figure's folder is checked before the log.
+        ("stiff/none.csv", f"-d gm {LIMIT}3 --plot absent/why.png", ("no folder absent", "create")),
         ("stiff/01.csv", f"-d gm {LIMIT}inf", ("--set threshold: limits are [inf", "no joint is monitored")),
         ("stiff/01.csv", f"-d gm {LIMIT}inf,inf", ("--set threshold: limits are [inf", "no joint is monitored")),
         ("machine.toml", f"-d gm {LIMIT}3", ("machine.toml",)),
@@ -228,7 +241,7 @@ def test_the_examples_on_the_page_are_what_the_commands_print(tmp_path, monkeypa
             words = [[*sorted(Path().glob(word))] if "*" in word else [word] for word in shlex.split(line)]
             done = cdtool(*itertools.chain(*words[1:]))
             assert done.status == 0, done.err
-        printed = [line.rstrip() for line in done.out.rstrip().splitlines()]
+        printed = [line.rstrip() for line in done.out.split("\nplot written")[0].rstrip().splitlines()]
         assert printed == shown.splitlines()
 
 
