@@ -91,7 +91,7 @@ def cases(inputs: Path) -> list[Case]:
     machine = ("-m", f"{gate}/machine.toml")
     free = [f"{gate}/free/0{number}.csv" for number in (1, 2, 3, 4)]
     stiff = [f"{gate}/stiff/0{number}.csv" for number in (1, 2)]
-    a, b = f"{inputs}/a.json", f"{inputs}/b.json"
+    b = f"{inputs}/b.json"
     every = [
         word
         for suffix in ("json", "html", "md", "xml", "csv", "png", "svg", "pdf")
@@ -111,11 +111,6 @@ def cases(inputs: Path) -> list[Case]:
             "signature update",
             ("signature", "update", "{out}/s.json", free[3], *machine, "--reserve", "30"),
             ("learn-signature", *free[:3], *machine, *learn),
-        ),
-        Case(
-            "signature check",
-            _plot("signature", "check", a, *free, *machine),
-            _plot("signature", "check", a, *free[:3], *machine),
         ),
         Case("benchmark", (*benchmark, "gm", *every), (*benchmark, "pt", *every)),
         Case("benchmark, protocol", _protocol(inputs, "b"), _protocol(inputs, "a")),

@@ -79,34 +79,6 @@ def coverage(work: Path) -> None:
     cdtool("inject", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
 
 
-def season(work: Path) -> None:
-    """Friction that rises from month to month, as docs/signature.md has it."""
-    cdtool(
-        "simulate",
-        "gate",
-        "-o",
-        "gate",
-        "--set",
-        "free=14",
-        "--set",
-        "holdout=40",
-        "--set",
-        "stiff=0",
-        "--set",
-        "soft=0",
-        folder=work,
-    )
-    free = ("--set", "free=15", "--set", "holdout=0", "--set", "stiff=0", "--set", "soft=0")
-    for month, friction in enumerate((1.0, 1.05, 1.1, 1.15), 1):
-        changed = ("--set", f"friction={friction}", "--seed", 20 + month)
-        cdtool("simulate", "gate", *free, *changed, "-o", f"month{month}", folder=work)
-    taught = sorted(path.relative_to(work) for name in ("free", "holdout") for path in (work / "gate" / name).iterdir())
-    machine = ("-m", "gate/machine.toml")
-    cdtool("learn-signature", *taught, *machine, "-d", "gm", "-o", "season.json", folder=work)
-    runs = sorted(path.relative_to(work) for path in work.glob("month*/free/*"))
-    cdtool("signature", "check", "season.json", *runs, *machine, "--plot", IMAGES / "season.png", folder=work)
-
-
 def emps(work: Path) -> None:
     """The momentum observer on the recording with force pulses."""
     logs, machine, signature = DATA / "emps", EXAMPLES / "emps.toml", work / "emps.json"
@@ -138,7 +110,7 @@ def main() -> int:
     """Make all images that can be made; 1 where one is too large."""
     IMAGES.mkdir(exist_ok=True)
     samples = ROOT / "sample_logs" / "gate"
-    sources = dict.fromkeys((gate, budget, season, coverage), samples)
+    sources = dict.fromkeys((gate, budget, coverage), samples)
     sources |= {emps: DATA / "emps", ur10e: UR10E, ur10e_momentum: UR10E}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for make, needed in sources.items():

@@ -23,10 +23,11 @@ from cdtool.alarms.activation import Activation
 from cdtool.base.settings import keys_of, kind_in_words
 from cdtool.commands.inject.inject_section import InjectTable, ObstacleTable
 from cdtool.commands.judging.named_logs import OnsetTable
-from cdtool.commands.judging.settings_table import ExecutionTable, ForceTable, TriggersTable
+from cdtool.commands.judging.settings_table import ForceTable, TriggersTable
 from cdtool.commands.simulate.simulation_table import SimulationTable
 from cdtool.commands.tune.options import TuneTable
 from cdtool.detectors import DETECTORS
+from cdtool.execution.workers import Execution
 from cdtool.formats import FORMATS
 from cdtool.machines.joint_machine import JointTable
 from cdtool.machines.linear_axis import LinearAxisTable
@@ -55,7 +56,7 @@ _KEYS = "| key | type | default | meaning |\n|---|---|---|---|\n"
 _MODELS: Mapping[str, Any] = {
     "activation": Activation,
     "axis": LinearAxisTable,
-    "execution": ExecutionTable,
+    "execution": Execution,
     "force": ForceTable,
     "inject": InjectTable,
     "machine": JointTable,

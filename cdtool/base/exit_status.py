@@ -102,8 +102,6 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "protocol init": _ALWAYS,
     "protocol write": _ALWAYS | {ExitStatus.VIOLATED, ExitStatus.INCONCLUSIVE},
     "protocol check": _ALWAYS | {ExitStatus.INCONCLUSIVE},
-    "store status": _ALWAYS,
-    "store gc": _ALWAYS,
     "simulate": _ALWAYS,
     "study sensors": _ALWAYS,
     "study figures": _ALWAYS,

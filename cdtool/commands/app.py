@@ -54,7 +54,6 @@ _GROUPS: Mapping[str, Mapping[str, tuple[str, str]]] = {
     },
     "files": {
         "convert": ("cdtool.commands.convert.command:convert", "Convert a log, or recover a damaged one."),
-        "store": ("cdtool.commands.store.command:store", "Show and clear a store of benchmark outcomes."),
         "list": ("cdtool.commands.list_known.command:list_known", "List detectors, thresholds, machines, formats."),
         "schema": ("cdtool.commands.schema.command:schema", "Print the JSON schema of a file for editors."),
     },

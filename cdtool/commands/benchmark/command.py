@@ -11,7 +11,6 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
 from cdtool.commands.console.options import (
     BudgetOption,
@@ -43,7 +42,6 @@ def benchmark(
             parser=location,
             help="Benchmark file; see docs/benchmark-file.md.",
             metavar="FILE",
-            autocompletion=completions.files(".toml"),
         ),
     ],
     output: OutputOption = None,
@@ -70,7 +68,7 @@ def benchmark(
             help="Folder of outcomes: only changes are computed.",
         ),
     ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list what would be computed.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only check the file and its recordings.")] = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -94,7 +92,6 @@ def benchmark(
         "detectors": _named(detectors),
         "false_alarm_budget": false_alarm_budget,
         "settings": given_settings(settings or ()),
-        "store": None if store is None else Store(store),
     }
     if dry_run:
         _show_dry_run(file, {**given, "workers": Workers(jobs, cluster=cluster)}, as_json=as_json)
@@ -103,7 +100,8 @@ def benchmark(
     check_outputs(documents.reports, force=force)
     documents.check()
     with progress("benchmark", quiet=quiet) as advance:
-        done = run(file, **given, workers=Workers(jobs, cluster=cluster, progress=advance))
+        kept = None if store is None else Store(store)
+        done = run(file, **given, workers=Workers(jobs, cluster=cluster, progress=advance), store=kept)
     evaluated: Evaluated = done.evaluated
     try:
         command = _command(file, protocol, output or [], detectors, false_alarm_budget, settings or [])
@@ -151,32 +149,20 @@ def _stored(outcomes: StoreReport | None) -> list[str]:
 
 
 def _show_dry_run(file: Path, given: Mapping[str, Any], *, as_json: bool) -> None:
-    """Print which recordings would be computed, their size, and how long that takes."""
-    from rich.filesize import decimal
-
+    """Print which recordings would be computed, and which cannot be used."""
     from cdtool.commands.scoring.dry_run import dry_run
 
     found = dry_run(file, **given)
     if as_json:
-        print_json(asdict(found) | {"bytes": found.bytes})
-        leave(found.skipped)
-        return
-    for item in found.logs:
-        print_line(f"{plain(item.recording)}: {', '.join(item.detectors)}, {decimal(item.bytes)}")
-    time = "" if found.seconds is None else f", about {_duration(found.seconds)}"
-    total = counted(found.total, "recording")
-    print_line(f"{len(found.logs)} of {total} would be computed: {decimal(found.bytes)}{time}")
-    if found.to_inject:
-        print_line(f"{counted(found.to_inject, 'contact')} of [inject] would be made first, and computed too")
-    print_skipped(found.skipped)
+        print_json(asdict(found))
+    else:
+        for group, logs in found.logs.items():
+            print_line(f"{plain(group)}: {counted(len(logs), 'recording')}")
+        print_line(f"learned from: {counted(found.learned, 'recording')}; nothing was computed")
+        if found.to_inject:
+            print_line(f"{counted(found.to_inject, 'contact')} of [inject] would be made first, and computed too")
+        print_skipped(found.skipped)
     leave(found.skipped)
-
-
-def _duration(seconds: float) -> str:
-    """Return a rough time in words."""
-    if seconds < 120.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def _named(detectors: str | None) -> tuple[str, ...]:

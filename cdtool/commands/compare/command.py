@@ -10,7 +10,6 @@ import typer
 
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import shorten
-from cdtool.commands.console import completions
 from cdtool.commands.console.colour import coloured, shows_colour
 from cdtool.commands.console.console import columns_to_fill, fits_terminal, leave, plain, table
 from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption
@@ -34,7 +33,6 @@ def compare(
             parser=location,
             help="results.json or results.parquet of the old build.",
             metavar="OLD",
-            autocompletion=completions.files(".json", ".parquet"),
         ),
     ],
     new: Annotated[
@@ -43,7 +41,6 @@ def compare(
             parser=location,
             help="results.json or results.parquet of the new build.",
             metavar="NEW",
-            autocompletion=completions.files(".json", ".parquet"),
         ),
     ],
     level: Annotated[

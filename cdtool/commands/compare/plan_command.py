@@ -23,7 +23,6 @@ def plan(
         typer.Option(
             "--std-ms",
             help="Standard deviation of the paired differences [ms]; or results.json of an earlier test.",
-            autocompletion=completions.files(".json", ".parquet"),
         ),
     ] = None,
     detectors: Annotated[

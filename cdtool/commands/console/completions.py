@@ -1,8 +1,7 @@
-"""The values that a shell completes with the Tab key, after `cdtool --install-completion`."""
+"""The values that a shell completes with the Tab key, after `cdtool --install-completion`; files are its own."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
 from importlib import import_module
 
@@ -10,9 +9,6 @@ import typer
 
 Complete = Callable[[str], list[str]]
 CompleteIn = Callable[[typer.Context, str], list[str]]
-
-# So many folders, each the only entry of the one above, are entered at once.
-_DEEPEST = 20
 
 
 def detectors(incomplete: str) -> list[str]:
@@ -81,40 +77,6 @@ def _words_by_key(model: object, prefix: str) -> Iterable[tuple[str, Iterable[st
 def one_of(known: Iterable[str]) -> Complete:
     """Return the completion of one of the known values."""
     return lambda incomplete: _beginning(incomplete, known)
-
-
-def files(*suffixes: str) -> Complete:
-    """Return the completion of files with these suffixes and of folders; a folder without a choice is entered.
-
-    Nothing for an address such as s3://: a network is not asked while a key is pressed. Without a match a shell
-    completes any file.
-    """
-    return lambda incomplete: [] if "://" in incomplete else _paths(incomplete, suffixes)
-
-
-def _paths(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
-    for _ in range(_DEEPEST):
-        folder, separator, typed = incomplete.rpartition("/")
-        base = f"{folder}{separator}"
-        try:
-            with os.scandir(base or ".") as entries:
-                found = [
-                    f"{base}{entry.name}{'/' * _is_folder(entry, suffixes)}"
-                    for entry in entries
-                    if entry.name.startswith(typed) and (typed.startswith(".") or not entry.name.startswith("."))
-                    if entry.name.lower().endswith(suffixes) or entry.is_dir()
-                ]
-        except OSError:
-            return []
-        if len(found) != 1 or not found[0].endswith("/"):
-            return sorted(found)
-        incomplete = found[0]
-    return [incomplete]
-
-
-def _is_folder(entry: os.DirEntry[str], suffixes: tuple[str, ...]) -> bool:
-    """Return whether a folder is entered; results.parquet is named as it is."""
-    return entry.is_dir() and not entry.name.lower().endswith(suffixes)
 
 
 def _last_of_list(incomplete: str, complete: Complete) -> list[str]:

@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options and arguments that several commands share; patterns of URLs name logs, too."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from cdtool.base.errors import UsageError
 from cdtool.commands.console import completions
 from cdtool.commands.console.place import Place, location
 
+# What makes a URL a pattern of several logs.
+_PATTERN = frozenset("*?[")
+
 MachineOption = Annotated[
     Place,
     typer.Option(
@@ -18,7 +21,6 @@ MachineOption = Annotated[
         "-m",
         parser=location,
         help="Machine file; see docs/machine-file.md.",
-        autocompletion=completions.files(".toml"),
     ),
 ]
 DetectorsOption = Annotated[
@@ -37,7 +39,6 @@ MachineUnlessBenchmarkOption = Annotated[
         "-m",
         parser=location,
         help="Machine file; not with --benchmark.",
-        autocompletion=completions.files(".toml"),
     ),
 ]
 SignatureOption = Annotated[
@@ -47,7 +48,6 @@ SignatureOption = Annotated[
         "-s",
         parser=location,
         help="Signature file of learn-signature.",
-        autocompletion=completions.files(".json"),
     ),
 ]
 _DETECTOR = typer.Option(
@@ -62,7 +62,6 @@ BenchmarkOption = Annotated[
         "-b",
         parser=location,
         help="Benchmark file: it has all settings.",
-        autocompletion=completions.files(".toml"),
     ),
 ]
 BudgetOption = Annotated[
@@ -104,6 +103,30 @@ def set_option(example: str, table: str) -> Any:
 
 
 SetOption = Annotated[list[str] | None, set_option("activation.debounce=9", "JudgingTable")]
+
+
+def logs_argument(description: str) -> Any:
+    """Return the argument of one or more logs, with its description in the help."""
+    return typer.Argument(parser=location, callback=_each_log, help=description, metavar="LOG")
+
+
+def _each_log(logs: list[Path]) -> list[Path]:
+    """Return the logs with each pattern of a URL replaced by what matches, as a shell does for local files.
+
+    A pattern without a match stays, and is reported as a missing file.
+    """
+    found: list[Path] = []
+    for log in logs:
+        found += _matching(log) or [log]
+    return found
+
+
+def _matching(log: Path) -> list[Path]:
+    if "://" not in str(log) or not _PATTERN.intersection(str(log)):
+        return []
+    from cdtool.commands.judging.runs import matching_logs
+
+    return matching_logs(Path(), str(log))
 
 
 def one_detector(text: str) -> str:

@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cdtool.commands.console.console import plain, print_line
-from cdtool.commands.console.late_progress import late_progress
+from cdtool.commands.console.console import plain, print_line, progress
 from cdtool.commands.console.summary_table import show_conclusion, show_table
 
 if TYPE_CHECKING:
     from cdtool.report.writers.base import Report
     from cdtool.results.evaluated import Evaluated
-
-# Shorter waits do not need a bar [s].
-AFTER_S = 1.0
 
 
 def write_reports(
@@ -26,7 +22,7 @@ def write_reports(
     """Write all reports and return what to show; a bar until the last figure is written. Raises CdtoolError."""
     from cdtool.report.outputs import write_outputs
 
-    with late_progress("writing reports", AFTER_S, quiet=quiet or not targets) as advance:
+    with progress("writing reports", pulses=True, quiet=quiet or not targets) as advance:
         return write_outputs(report, targets, force=force, inputs=inputs, progress=advance)
 
 

@@ -9,8 +9,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import leave_with, plain, print_json, print_line, with_findings
-from cdtool.commands.console.late_progress import late_progress
+from cdtool.commands.console.console import leave_with, plain, print_json, print_line, progress, with_findings
 from cdtool.commands.console.options import JsonOption
 from cdtool.commands.console.place import Place, location
 
@@ -71,7 +70,7 @@ def convert(
     if recover and (machine or section):
         raise UsageError("--recover copies messages as they are", "recover first, then convert with -m, --from or --to")
     done: Converted | Recovered
-    with late_progress("recovering" if recover else "converting") as advance:
+    with progress("recovering" if recover else "converting", pulses=True) as advance:
         if recover:
             done = write_what_is_left(source, output, recover == "all", force=force, progress=advance)
         else:

@@ -24,7 +24,6 @@ from cdtool.commands.console.console import (
     print_skipped,
     progress,
 )
-from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import (
     BenchmarkOption,
     DetectorOption,
@@ -34,6 +33,7 @@ from cdtool.commands.console.options import (
     QuietOption,
     SignatureOption,
     figure_name,
+    logs_argument,
     one_detector,
     set_option,
 )

@@ -1,13 +1,9 @@
-"""The result of a detector on logs for Python: alarms and contacts as DataFrames, the signal, the figure.
-
-Logs by name: one that is not among the results is answered with the nearest that are.
-"""
+"""The result of a detector on logs for Python: alarms and contacts as DataFrames, the signal, the figure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cached_property
 from os import PathLike
 from pathlib import Path, PurePath
@@ -36,51 +32,6 @@ if TYPE_CHECKING:
     from cdtool.detectors.base import Detector
     from cdtool.formats.machine_file import MachineFile
     from cdtool.formats.signature_file import SignatureFile
-
-
-class UnknownLogError(UsageError, KeyError):
-    """No log of that name is among the results, or `several` are."""
-
-    several = False
-
-
-def number_of(name: str, logs: Sequence[str], left_out: Mapping[str, str] | None = None) -> int:
-    """Return the number of the log of that name, or of the only one whose path ends in it.
-
-    `left_out` are logs without a result, with the reason. Raises UnknownLogError with that reason, with the nearest
-    names, or with those that the name fits.
-
-    Examples
-    --------
-    >>> number_of("03.csv", ["stiff/02.csv", "stiff/03.csv"])
-    1
-    """
-    wanted = PurePath(name).parts
-    exact = [place for place, log in enumerate(logs) if log == name]
-    found = exact or [place for place, log in enumerate(logs) if _ends_in(log, wanted)]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        same = ", ".join(f"{'/'.join(PurePath(logs[place]).parts[-len(wanted) - 1 :])} [{place}]" for place in found)
-        fault = UnknownLogError(f"{len(found)} logs are named '{name}'", f"give more of the path or the number: {same}")
-        fault.several = True
-        raise fault
-    reason = next((reason for log, reason in (left_out or {}).items() if _ends_in(log, wanted)), None)
-    raise UnknownLogError(
-        f"no log '{name}' in these results", f"it was left out: {reason}" if reason else _near(name, logs)
-    )
-
-
-def _ends_in(log: str, wanted: tuple[str, ...]) -> bool:
-    return bool(wanted) and PurePath(log).parts[-len(wanted) :] == wanted
-
-
-def _near(name: str, logs: Sequence[str]) -> str:
-    if not logs:
-        return "they are empty"
-    ends = [PurePath(log).name for log in logs]
-    close = get_close_matches(PurePath(name).name, dict.fromkeys(ends), n=2, cutoff=0.5)
-    return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(dict.fromkeys(ends))}"
 
 
 VERDICTS = ("alarm", "no alarm", "not_assessable")
@@ -118,8 +69,33 @@ class OperationRow:
     reason: str | None
 
 
+class _Frames:
+    """Alarms, contacts and verdicts of one log, or of several, as DataFrames."""
+
+    @property
+    def _each(self) -> Sequence[DetectionResult]:
+        raise NotImplementedError
+
+    @cached_property
+    def alarms(self) -> pd.DataFrame:
+        """A row per alarm: joint, time, side, statistic, limit, and the onset of its contact (NaN: none is known)."""
+        rows = [row for run in self._each for row in _alarms(run)]
+        return rows_as_frame(AlarmRow, rows, {"side": ("above", "below")})
+
+    @cached_property
+    def contacts(self) -> pd.DataFrame:
+        """A row per contact, with the columns of a benchmark's `contacts`."""
+        rows = [row for run in self._each for of_operation in run.detected.contact_rows for row in of_operation]
+        return rows_as_frame(ContactResult, rows, {"outcome": OUTCOMES})
+
+    def summary(self) -> pd.DataFrame:
+        """Return a row per operation with its verdict."""
+        rows = [row for run in self._each for row in _operations(run)]
+        return rows_as_frame(OperationRow, rows, {"verdict": VERDICTS})
+
+
 @dataclass(frozen=True, repr=False)
-class DetectionResult:
+class DetectionResult(_Frames):
     """What a detector says about one log: alarms and contacts as DataFrames, its signal, its figure.
 
     Parameters
@@ -162,19 +138,9 @@ class DetectionResult:
         outcomes = {item.verdict.outcome for item in self.detections}
         return next((outcome for outcome in VERDICTS if outcome in outcomes), "not_assessable")
 
-    @cached_property
-    def alarms(self) -> pd.DataFrame:
-        """A row per alarm: joint, time, side, statistic, limit, and the onset of its contact (NaN: none is known)."""
-        return alarms_frame([self])
-
-    @cached_property
-    def contacts(self) -> pd.DataFrame:
-        """A row per contact, with the columns of a benchmark's `contacts`."""
-        return contacts_frame([self])
-
-    def summary(self) -> pd.DataFrame:
-        """Return a row per operation with its verdict."""
-        return summary_frame([self])
+    @property
+    def _each(self) -> Sequence[DetectionResult]:
+        return [self]
 
     def to_frame(self) -> pd.DataFrame:
         """Return the signal of all operations with its limits as a DataFrame.
@@ -228,10 +194,8 @@ class DetectionResult:
         return notebook_table(caption, self.summary()[_SHOWN])
 
 
-class DetectionResults(Sequence[DetectionResult]):
+class DetectionResults(_Frames, Sequence[DetectionResult]):
     """What a detector says about several logs: a sequence of `DetectionResult`, with the same frames over all of them.
-
-    A log is found by its number or its name: `found[0]`, `found["03.csv"]`.
 
     Parameters
     ----------
@@ -252,8 +216,6 @@ class DetectionResults(Sequence[DetectionResult]):
     DetectionResults(2 logs, momentum: 1 alarm)
     >>> [log.outcome for log in found]
     ['alarm', 'no alarm']
-    >>> found["stiff/03.csv"].outcome
-    'alarm'
     """
 
     def __init__(
@@ -273,59 +235,27 @@ class DetectionResults(Sequence[DetectionResult]):
             runs, [item for log in found for item in log.skipped], [item for log in found for item in log.findings]
         )
 
-    @cached_property
-    def alarms(self) -> pd.DataFrame:
-        """A row per alarm, over all logs."""
-        return alarms_frame(self)
-
-    @cached_property
-    def contacts(self) -> pd.DataFrame:
-        """A row per contact, over all logs."""
-        return contacts_frame(self)
+    @property
+    def _each(self) -> Sequence[DetectionResult]:
+        return self.runs
 
     @cached_property
     def skipped(self) -> pd.DataFrame:
         """A row per log or run that was left out, with the reason."""
         return rows_as_frame(Skipped, self._skipped)
 
-    def summary(self) -> pd.DataFrame:
-        """Return a row per operation with its verdict."""
-        return summary_frame(self)
-
     def __len__(self) -> int:
         return len(self.runs)
 
-    @property
-    def names(self) -> list[str]:
-        """The name of each log: the path it was given by."""
-        return [run.recording.source or run.recording.name for run in self.runs]
-
     @overload
-    def __getitem__(self, number: int | str | PurePath) -> DetectionResult: ...
+    def __getitem__(self, number: int) -> DetectionResult: ...
 
     @overload
     def __getitem__(self, number: slice) -> DetectionResults: ...
 
-    def __getitem__(self, number: int | str | PurePath | slice) -> DetectionResult | DetectionResults:
-        """Return a result by number, or by the name of its log or the end of it; of a slice, several."""
-        if isinstance(number, slice):
-            return DetectionResults(self.runs[number])
-        if isinstance(number, str | PathLike):
-            left_out = {item.recording: item.reason for item in self._skipped}
-            return self.runs[number_of(str(number), self.names, left_out)]
-        return self.runs[number]
-
-    def __contains__(self, item: object) -> bool:
-        if not isinstance(item, str | PathLike):
-            return item in self.runs
-        try:
-            number_of(str(item), self.names)
-        except UnknownLogError as fault:
-            return fault.several
-        return True
-
-    def __iter__(self) -> Iterator[DetectionResult]:
-        return iter(self.runs)
+    def __getitem__(self, number: int | slice) -> DetectionResult | DetectionResults:
+        """Return the result of a log by its number; of a slice, several."""
+        return DetectionResults(self.runs[number]) if isinstance(number, slice) else self.runs[number]
 
     def __repr__(self) -> str:
         alarms = sum(len(item.verdict.alarms) for run in self for item in run.detections)
@@ -341,28 +271,13 @@ class DetectionResults(Sequence[DetectionResult]):
         return notebook_table(repr(self), self.summary()[["recording", *_SHOWN]])
 
 
-def alarms_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
-    """Return a row per alarm of all operations."""
-    rows = []
-    for run in runs:
-        for detection in run.detections:
-            for alarm in detection.verdict.alarms:
-                contact = contact_of(run.detected, alarm)
-                onset = None if contact is None or contact.in_progress else contact.start
-                names = (run.recording.name, detection.operation.name, detection.detector, alarm.joint)
-                rows.append(AlarmRow(*names, alarm.time, alarm.side, alarm.statistic, alarm.limit, onset))
-    return rows_as_frame(AlarmRow, rows, {"side": ("above", "below")})
-
-
-def contacts_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
-    """Return a row per contact of all operations, as `cdtool benchmark` writes them."""
-    rows = [row for run in runs for of_operation in run.detected.contact_rows for row in of_operation]
-    return rows_as_frame(ContactResult, rows, {"outcome": OUTCOMES})
-
-
-def summary_frame(runs: Sequence[DetectionResult]) -> pd.DataFrame:
-    """Return a row per operation."""
-    return rows_as_frame(OperationRow, [row for run in runs for row in _operations(run)], {"verdict": VERDICTS})
+def _alarms(run: DetectionResult) -> Iterator[AlarmRow]:
+    for detection in run.detections:
+        for alarm in detection.verdict.alarms:
+            contact = contact_of(run.detected, alarm)
+            onset = None if contact is None or contact.in_progress else contact.start
+            names = (run.recording.name, detection.operation.name, detection.detector, alarm.joint)
+            yield AlarmRow(*names, alarm.time, alarm.side, alarm.statistic, alarm.limit, onset)
 
 
 def _operations(run: DetectionResult) -> Iterator[OperationRow]:

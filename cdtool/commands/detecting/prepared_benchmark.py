@@ -18,7 +18,6 @@ from cdtool.commands.learning.learning import LearnedSignature, signature_of
 from cdtool.commands.learning.normal_runs import normals_for, normals_of, notes_on
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog, learn_thresholds
-from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
 from cdtool.commands.scoring.scoring import Detect, ScoredLog, detect_with, score_runs
 from cdtool.detectors.detection import WHOLE_MACHINE
 from cdtool.formats.channels.run_reading import split_run
@@ -39,7 +38,7 @@ class PreparedBenchmark:
     `learned` has the hashes of the logs learned from with their names, `runs` their operations, `ranges` the ranges of
     their channels and `normals` their normal motion. `skipped` lists the runs left out in learning, with the reason;
     `losses` lists what is lost of the others. `run` returns how a log is detected: without its own part. `notes`
-    concern a signature file of an earlier version, and a measured synchronisation.
+    concern a signature file of an earlier version.
     """
 
     setup: BenchmarkFile
@@ -161,8 +160,7 @@ def prepare_benchmark(
         refuse_beside_signature(apply_settings({}, settings or {}), place, own)
         place.finish()
     named = (detector,) if detector else ()
-    read = read_benchmark_file(file, detectors=named, settings=settings, command="detect")
-    setup, measured = with_synchronisation(read)
+    setup = read_benchmark_file(file, detectors=named, settings=settings, command="detect")
     machine_file = setup.machine_file
     if signature is not None:
         stored = signature_of(signature)
@@ -184,7 +182,7 @@ def prepare_benchmark(
             run,
             LearnedRanges(stored.plausible) if stored.plausible else None,
             normals_of(stored),
-            (*measured, *notes_on(stored)),
+            tuple(notes_on(stored)),
         )
     setup = with_detectors(setup, [_chosen(setup, detector)])
     instance = machine_file.detector(setup.detectors[0])
@@ -208,7 +206,6 @@ def prepare_benchmark(
         run,
         runs.ranges,
         normals,
-        notes=tuple(measured),
         skipped=(*runs.skipped, *fitted.skipped),
         losses=tuple(item for item in runs.findings if item.is_loss),
         runs=tuple(used),

@@ -13,7 +13,6 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import (
     leave,
     number,
@@ -51,9 +50,7 @@ def identify(
     ],
     machine: Annotated[
         Place,
-        typer.Option(
-            "--machine", "-m", parser=location, help="Machine file.", autocompletion=completions.files(".toml")
-        ),
+        typer.Option("--machine", "-m", parser=location, help="Machine file."),
     ],
     output: Annotated[
         list[Place] | None,

@@ -8,7 +8,6 @@ import typer
 
 from cdtool.base.errors import CdtoolError
 from cdtool.base.exit_status import Fact
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import (
     leave_with,
     number,
@@ -19,8 +18,10 @@ from cdtool.commands.console.console import (
     table,
     with_findings,
 )
-from cdtool.commands.console.logs_argument import logs_argument
-from cdtool.commands.console.options import JsonOption
+from cdtool.commands.console.options import (
+    JsonOption,
+    logs_argument,
+)
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ def info(
             "-m",
             parser=location,
             help="Machine file: map the channels and check them.",
-            autocompletion=completions.files(".toml"),
         ),
     ] = None,
     as_json: JsonOption = False,

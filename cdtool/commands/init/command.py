@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.base.errors import UsageError
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import (
     leave,
     leave_with,
@@ -18,11 +17,13 @@ from cdtool.commands.console.console import (
     print_json,
     print_line,
     print_skipped,
+    progress,
     with_findings,
 )
-from cdtool.commands.console.late_progress import late_progress
-from cdtool.commands.console.logs_argument import logs_argument
-from cdtool.commands.console.options import JsonOption
+from cdtool.commands.console.options import (
+    JsonOption,
+    logs_argument,
+)
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -56,7 +57,6 @@ def init(
             "--urdf",
             parser=location,
             help="URDF of a robot: draft a urdf_robot with its joints.",
-            autocompletion=completions.files(".urdf"),
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
@@ -90,7 +90,7 @@ def init(
         if len(logs) > 1 or machine is not None or free:
             what = "--machine" if machine is not None else "--free" if free else f"{len(logs)} logs"
             raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
-        with late_progress("analysing the log"):
+        with progress("analysing the log", pulses=True):
             drafted = draft(logs[0], output, force=force, csv=csv, urdf=urdf)
         if as_json:
             print_json(with_findings(drafted))
@@ -104,7 +104,7 @@ def init(
         return
     if output.suffix and not output.is_dir():
         raise UsageError(f"--output is {plain(output)}", "give a machine file, NAME.toml, or a folder without a suffix")
-    with late_progress("analysing the logs"):
+    with progress("analysing the logs", pulses=True):
         study = init_study(logs, output, machine=machine, force=force, csv=csv, free=free or (), urdf=urdf)
     if as_json:
         print_json(asdict(study))

@@ -9,7 +9,6 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
 from cdtool.commands.console.options import (
     ClusterOption,
@@ -31,7 +30,6 @@ def inject(
         typer.Argument(
             parser=location,
             help="Benchmark file with a section [inject]; see docs/injection.md.",
-            autocompletion=completions.files(".toml"),
         ),
     ],
     output: Annotated[

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cdtool.base.errors import ConfigurationError, FieldsError
+from cdtool.base.errors import ConfigurationError
 from cdtool.base.findings import Finding
 from cdtool.base.plain_text import first_of
 from cdtool.base.remote.remote_path import is_remote, joined, location
@@ -82,19 +82,11 @@ class OnsetTable(OnsetRule):
     labels_zone: Annotated[str, setting('offset such as "+02:00" of dates without a zone; default: UTC')] = ""
     not_contacts: Annotated[tuple[str, ...], setting("kinds of labels that are not contacts")] = ()
     synchronisation_s: Annotated[
-        NotNegative | None,
-        setting("how far the load cell's clock may be off; part of each latency's resolution; default: 0", unit="s"),
-    ] = None
-    synchronisation: Annotated[
-        Literal["stated", "measured"],
-        setting("measured: in place of synchronisation_s, what the sync audit of all impact logs shows"),
-    ] = "stated"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.synchronisation == "measured" and self.synchronisation_s is not None:
-            fields = ("synchronisation", "synchronisation_s")
-            raise FieldsError(fields, "is measured, but synchronisation_s is stated too", "remove one of the two")
+        NotNegative,
+        setting(
+            "how far the load cell's clock may be off, by cdtool info; part of each latency's resolution", unit="s"
+        ),
+    ] = 0.0
 
     @property
     def rule(self) -> OnsetRule:

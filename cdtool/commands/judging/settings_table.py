@@ -84,14 +84,6 @@ class LearnPart:
         return None if self.until == "end" else GUARD if self.guard_s is None else self.guard_s
 
 
-@dataclass(frozen=True, kw_only=True)
-class ExecutionTable(Execution):
-    """[execution] of a benchmark file: also how a store is used."""
-
-    trust_mtime: Annotated[bool, setting("with a store: a file of the same size and time is the same, unread")] = False
-    retry_failed: Annotated[bool, setting("with a store: read again what could not be read")] = False
-
-
 Window = Annotated[
     Positive,
     setting("an alarm belongs to a contact up to this long after its onset, or until the next contact", unit="s"),
@@ -178,11 +170,8 @@ class DetectorTable:
     def rules(self, place: Place, **others: float) -> ScoringRules:
         """Return the rules for logs that no benchmark file names, the label file read; raises ConfigurationError."""
         onset, below = self.onset, place.below("onset")
-        if onset.synchronisation == "measured":
-            problem = "is 'measured', which needs the logs of a benchmark file"
-            raise below.fault("synchronisation", problem, "give onset.synchronisation_s")
         labels = read_label_file(onset, below, Path())
-        return ScoringRules(onset.rule, labels=labels, synchronisation=onset.synchronisation_s or 0.0, **others)
+        return ScoringRules(onset.rule, labels=labels, synchronisation=onset.synchronisation_s, **others)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +198,7 @@ class JudgingTable(DetectorTable):
     signature: Annotated[Signature, setting("how the normal band is learned")] = field(default_factory=Signature)
     force: Annotated[ForceTable, setting("limits of the contact force")] = field(default_factory=ForceTable)
     triggers: Annotated[TriggersTable, setting("how a trigger file is read")] = field(default_factory=TriggersTable)
-    execution: Annotated[ExecutionTable, setting("how the work is done")] = field(default_factory=ExecutionTable)
+    execution: Annotated[Execution, setting("how the work is done")] = field(default_factory=Execution)
 
 
 @dataclass(frozen=True, kw_only=True)

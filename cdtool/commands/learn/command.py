@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress, table
-from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import (
     BudgetOption,
     ClusterOption,
@@ -18,6 +17,7 @@ from cdtool.commands.console.options import (
     MachineOption,
     QuietOption,
     RequiredDetectorOption,
+    logs_argument,
     one_detector,
     set_option,
 )

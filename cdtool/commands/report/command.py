@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import plain, print_line, print_skipped
 from cdtool.commands.console.options import ForceOption, OutputOption, QuietOption
 from cdtool.commands.console.place import Place, location
@@ -21,7 +20,6 @@ def report(
             parser=location,
             help="results.json or results.parquet of a benchmark.",
             metavar="RESULTS",
-            autocompletion=completions.files(".json", ".parquet"),
         ),
     ],
     output: OutputOption = None,

@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import print_skipped, progress
 from cdtool.commands.console.options import (
     ClusterOption,
@@ -29,7 +28,6 @@ def score(
             parser=location,
             help="CSV with columns recording, time_s and, for several detectors, detector.",
             metavar="TRIGGERS",
-            autocompletion=completions.files(".csv"),
         ),
     ],
     benchmark: Annotated[
@@ -39,7 +37,6 @@ def score(
             "-b",
             parser=location,
             help="Benchmark file: recordings, contacts and rules.",
-            autocompletion=completions.files(".toml"),
         ),
     ],
     output: OutputOption = None,

@@ -22,7 +22,6 @@ from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.commands.scoring.gathering import recordings_in, results_before, results_of
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
-from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
 from cdtool.commands.scoring.pieces import PieceScoring
 from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import Detections, ScoredLog, score_runs
@@ -95,7 +94,6 @@ def score(
 
 def _run(setup: BenchmarkFile, given: TriggerFile, workers: Workers) -> BenchmarkResult:
     names = tuple(given.rows)
-    setup, measured = with_synchronisation(setup, workers)
     base = setup.path.parent
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     runs = setup.has_runs
@@ -110,7 +108,6 @@ def _run(setup: BenchmarkFile, given: TriggerFile, workers: Workers) -> Benchmar
     if strangers:
         note = Finding("rows_not_scored", "", {"names": first_of(strangers), "scored": min(known)})
         findings.append(RecordingFinding.of(str(given.path), note))
-    findings += measured
     if not runs:
         findings += _unlisted(given.path, said, known, setup.triggers.listed_only)
         if setup.triggers.listed_only:

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from cdtool.base.arrays import FloatArray
@@ -30,7 +29,6 @@ from cdtool.commands.scoring.gathering import recordings_in, results_before, res
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.learned_thresholds import ThresholdsByLog
 from cdtool.commands.scoring.log_outcome import LogOutcome, Wanted, outcome_of
-from cdtool.commands.scoring.measured_synchronisation import with_synchronisation
 from cdtool.commands.scoring.pieces import PieceScoring
 from cdtool.commands.scoring.scored_logs import ScoredLogs
 from cdtool.commands.scoring.scoring import ScoredLog, detect_with, score_runs
@@ -108,7 +106,7 @@ def benchmark(  # the public function: a keyword for each setting
     [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
     work = BenchmarkWork.of(file, detectors, false_alarm_budget, settings)
-    workers, store = work.executed_by(workers or Workers(jobs), store)
+    workers = (workers or Workers(jobs)).limited_by(work.setup.execution)
     work = replace(work, setup=work.setup.with_made(workers))
     if store is not None:
         store.create()
@@ -144,22 +142,12 @@ class BenchmarkWork:
         refuse_limits_by_hand(setup)
         return cls(setup, limits, list(detectors) == ["all"])
 
-    def executed_by(self, workers: Workers, store: Store | None) -> tuple[Workers, Store | None]:
-        """Return workers and store with what [execution] sets of them."""
-        how = self.setup.execution
-        if store is not None:
-            trust, again = store.trust_times or how.trust_mtime, store.retry_failed or how.retry_failed
-            store = replace(store, trust_times=trust, retry_failed=again)
-        return workers.limited_by(how), store
-
 
 def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> BenchmarkResult:
-    begin = perf_counter()
-    setup, measured = with_synchronisation(work.setup, workers)
+    setup = work.setup
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
     learned, runs = learned_with_store(store, teaching) if store else (teaching.learned, {})
     setup = with_only(setup, learned.about.detectors)
-    seconds = perf_counter() - begin
     factors = sweep_factors(setup, learned.thresholds)
     used = [setup.machine_file.detector(name) for name in setup.detectors]
     refused = [
@@ -173,7 +161,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> Benchmar
         _provenance(setup, used, learned),
         setup.detectors,
         (*setup.not_made, *learned.about.skipped, *refused),
-        (*measured, *learned.about.findings, *of_limits),
+        (*learned.about.findings, *of_limits),
     )
     logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     scoring = scoring_of(setup, learned, teaching, factors)
@@ -187,8 +175,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: Store | None) -> Benchmar
         findings=(*results.findings, *scored.left_out),
     )
     report = StoreReport(len(logs) - scored.stored, scored.stored) if store else None
-    times = {"reading": learned.seconds + scored.reading, "detecting": seconds - learned.seconds + scored.detecting}
-    return BenchmarkResult(evaluate(results, setup.limits), scored.traces, setup.inputs, times, report)
+    return BenchmarkResult(evaluate(results, setup.limits), scored.traces, setup.inputs, report)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,6 @@ from cdtool.commands.judging.part_to_learn_from import PartToLearnFrom
 from cdtool.commands.judging.runs import RunReading, resolve_all, shown_path
 from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.commands.judging.settings_table import (
-    ExecutionTable,
     ForceTable,
     JudgingTable,
     LearnPart,
@@ -43,7 +42,7 @@ from cdtool.commands.judging.settings_table import (
 )
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
-from cdtool.execution.workers import Workers
+from cdtool.execution.workers import Execution, Workers
 from cdtool.formats.channels.channel_map import ChannelMap, TimeSource
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.labels import Labels
@@ -209,8 +208,7 @@ class BenchmarkFile:
 
     `impacts` are the scored groups: those of impacts, the hold-out, then those of changed conditions.
 
-    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock, or
-    not known before the logs are audited if `measures_synchronisation`.
+    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock.
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `sections` are the parts of scored logs
     that are used, `learned_sections` those of the logs learned from, which end `guard` [s] before
     their first contact; None: they have no contact. `split`: which runs stay together where runs set a limit for
@@ -243,14 +241,13 @@ class BenchmarkFile:
     learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
     split: Split = Split.RECORDING
-    measures_synchronisation: bool = False
     made: MadeGroups | None = None
     not_made: tuple[Skipped, ...] = ()
     force_limits: Path | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     tune: Any = None
     triggers: TriggersTable = field(default_factory=TriggersTable)
-    execution: ExecutionTable = field(default_factory=ExecutionTable)
+    execution: Execution = field(default_factory=Execution)
 
     def with_made(self, workers: Workers) -> BenchmarkFile:
         """Return the benchmark with the groups that a command makes for it; unchanged without one."""
@@ -274,7 +271,7 @@ class BenchmarkFile:
             "watched_joints": ", ".join(self.watched) or None,
             "label_file": self.labels.source if self.labels else None,
             **({"not_contacts": list(self.labels.not_contacts)} if self.labels and self.labels.not_contacts else {}),
-            "synchronisation_s": "measured" if self.measures_synchronisation else self.synchronisation,
+            "synchronisation_s": self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {
                 name: profile.described for name in self.groups_of_impacts if (profile := self.impacts[name].force)
@@ -497,8 +494,7 @@ def _resolved(
         rule=rule,
         activation=table.activation,
         labels=labels,
-        synchronisation=table.onset.synchronisation_s or 0.0,
-        measures_synchronisation=table.onset.synchronisation == "measured",
+        synchronisation=table.onset.synchronisation_s,
         onset=table.onset.rule,
         mass_before_cell=table.force.mass_before_cell_kg,
         learn=tuple(learn),

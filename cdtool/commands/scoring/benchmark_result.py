@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -52,8 +51,6 @@ class BenchmarkResult:
         The curves that were kept.
     inputs : tuple of Path
         The files that were read; they are never overwritten.
-    seconds : mapping of str to float
-        The time of each step [s]; empty for results that were read from a file.
     stored : StoreReport, optional
         How much was in the store; None without one.
 
@@ -72,7 +69,6 @@ class BenchmarkResult:
     evaluated: Evaluated
     traces: tuple[Trace, ...] = ()
     inputs: tuple[Path, ...] = field(default=(), compare=False)
-    seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
     stored: StoreReport | None = field(default=None, compare=False)
 
     @property

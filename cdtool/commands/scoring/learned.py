@@ -10,7 +10,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from time import perf_counter
 from typing import Any
 
 from cdtool.base.files.bounded_loading import parse_own_json
@@ -55,14 +54,13 @@ class AboutLearning:
 class Learned:
     """Thresholds by detector, plausible ranges and normal motions, and what is to be reported about learning.
 
-    `seconds` is the time that reading the runs took; `lasts`: the same runs would give the same again.
+    `lasts`: the same runs would give the same again.
     """
 
     about: AboutLearning
     thresholds: Mapping[str, tuple[FittedThreshold, ...]]
     ranges: LearnedRanges
     normals: NormalMotions
-    seconds: float = 0.0
     lasts: bool = True
 
     def to_text(self, rule: Threshold) -> str:
@@ -139,18 +137,11 @@ class Teaching:
             sources={item.recording.digest: item.whole.name for item in runs.operations},
         )
         normals = normals_for(runs.operations, self.setup.rule)
-        return Learned(about, made.thresholds, runs.ranges, normals, self._read[1], runs.lasts)
-
-    @property
-    def _runs(self) -> Runs:
-        return self._read[0]
+        return Learned(about, made.thresholds, runs.ranges, normals, runs.lasts)
 
     @cached_property
-    def _read(self) -> tuple[Runs, float]:
-        """Return the runs, and the time that it took to read them [s]."""
-        begin = perf_counter()
-        runs = load_runs(self.setup.learn, self.setup.machine_file, self.setup.run_reading(self.workers))
-        return runs, perf_counter() - begin
+    def _runs(self) -> Runs:
+        return load_runs(self.setup.learn, self.setup.machine_file, self.setup.run_reading(self.workers))
 
     @cached_property
     def _detectors(self) -> tuple[list[Any], list[RecordingFinding]]:

@@ -74,15 +74,13 @@ class DetectorOutcome:
 class LogOutcome:
     """The results of one log or run, small enough to be sent from one process to another.
 
-    `traces` has one entry per operation, None where its trace is not wanted; it is empty if none is. `reading`,
-    `detecting` [s]: time taken. `lasts`: the log would have the same outcome again.
+    `traces` has one entry per operation, None where its trace is not wanted; it is empty if none is. `lasts`:
+    the log would have the same outcome again.
     """
 
     rows: LogRows
     detectors: tuple[DetectorOutcome, ...] = ()
     traces: tuple[Trace | None, ...] = ()
-    reading: float = 0.0
-    detecting: float = 0.0
     lasts: bool = True
 
     @property
@@ -198,8 +196,6 @@ def outcome_of(
             )
             for name, failed in detections.failed.items()
         ),
-        reading=scored.reading,
-        detecting=scored.detecting,
         lasts=scored.lasts,
     )
     if wanted is None:

@@ -59,8 +59,8 @@ class ScoredLogs:
             sum(len(setup.impacts[group].logs) for group in setup.groups),
             frozenset(item.group for item in setup.conditions),
         )
-        # Logs of which nothing was computed, and the time that all logs took [s].
-        self.stored, self.reading, self.detecting = 0, 0.0, 0.0
+        # Logs of which nothing was computed.
+        self.stored = 0
 
     def __iter__(self) -> Iterator[tuple[str, LogOutcome]]:
         """Yield the outcomes of all logs, in order."""
@@ -71,8 +71,6 @@ class ScoredLogs:
             self.stored += piece.is_stored
             place = _Place(number, log, piece.sources)
             for outcome in piece.outcomes:
-                self.reading += outcome.reading
-                self.detecting += outcome.detecting
                 place = self._offer(place, outcome)
                 yield log[0], outcome
 

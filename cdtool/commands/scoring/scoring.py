@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Any, NamedTuple
 
 from cdtool.alarms.pipeline import Detection, detect_operations
@@ -63,7 +62,7 @@ class LogRows:
 
     `recording` is None if it was left out. `unchecked`: names of logs assumed to be free of impacts, with the ground
     truth that is missing from them. `beside`: name and SHA-256 of each file beside the log with a channel. `strokes`:
-    of a log that is not cut. `unread`: it could not be read.
+    of a log that is not cut.
     """
 
     recording: RecordingResult | None
@@ -74,7 +73,6 @@ class LogRows:
     unchecked: tuple[tuple[str, Finding], ...] = ()
     beside: tuple[tuple[str, str], ...] = ()
     strokes: int = 0
-    unread: bool = False
 
 
 class Detections(NamedTuple):
@@ -97,7 +95,7 @@ class ScoredLog:
     """One log or run after detection and matching: its rows, and with its samples what the rows are made of.
 
     `recording`, `contacts` and `matched` are absent if the log was left out; `lasts` says whether it would be again: it
-    is not because of a network or a full disk. `reading`, `detecting` [s]: time taken.
+    is not because of a network or a full disk.
     """
 
     rows: LogRows
@@ -106,8 +104,6 @@ class ScoredLog:
     detections: Detections = _NOTHING_DETECTED
     matched: MatchedLog | None = None
     lasts: bool = True
-    reading: float = 0.0
-    detecting: float = 0.0
 
     @property
     def left_out(self) -> list[Skipped]:
@@ -172,18 +168,17 @@ def score_runs(
     A log or detector that fails is left out and reported, and nothing is raised. `factors`: the safety factors of the
     sweep by detector. `group` is empty for a log outside all groups. Values outside the plausible `ranges` are masked.
     """
-    begin = perf_counter()
     try:
         loads, of_log = _loads(setup, group, path, ranges)
     except CdtoolError as fault:
-        return [_unread(setup, path, fault, perf_counter() - begin)]
-    scored = [ScoredLog(of_log, reading=perf_counter() - begin)] if RunCut.of(setup.operations) else []
+        return [_unread(setup, path, fault)]
+    scored = [ScoredLog(of_log)] if RunCut.of(setup.operations) else []
     return [*scored, *(_score(setup, group, path, detect, factors, name, load) for name, load in loads)]
 
 
-def _unread(setup: BenchmarkFile, path: Path, fault: CdtoolError, seconds: float) -> ScoredLog:
+def _unread(setup: BenchmarkFile, path: Path, fault: CdtoolError) -> ScoredLog:
     left_out = unread(path, setup.path.parent, fault)
-    return ScoredLog(LogRows(None, skipped=(left_out,), unread=True), lasts=is_lasting(fault), reading=seconds)
+    return ScoredLog(LogRows(None, skipped=(left_out,)), lasts=is_lasting(fault))
 
 
 def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[CutLog | Skipped]:
@@ -254,13 +249,11 @@ def _score(
 ) -> ScoredLog:
     """Score a log or one of its runs, at `path`; `log` is its path in the benchmark file."""
     rules = setup.rules_of(group)
-    begin = perf_counter()
     try:
         read = _cut_log(setup, group, log, path, load)
     except CdtoolError as fault:
-        return _unread(setup, path, fault, perf_counter() - begin)
+        return _unread(setup, path, fault)
     recording, operations, contacts, unwanted = read.recording, read.operations, read.contacts, read.unwanted
-    reading = perf_counter() - begin
     findings, skipped, unchecked = [*lost(recording)], list[Skipped](), list[tuple[str, Finding]]()
     if setup.is_impact_free(group):
         operations, touched = without_contacts(operations, unwanted)
@@ -269,7 +262,7 @@ def _score(
         if not operations:
             findings += log_warnings(recording, unwanted, setup.onset)
             rows = LogRows(None, (), (), tuple(skipped), tuple(findings), tuple(unchecked), beside=recording.beside)
-            return ScoredLog(rows, recording, tuple(contacts), reading=reading)
+            return ScoredLog(rows, recording, tuple(contacts))
     row = _recording_result(recording, group, log, len(operations), len(contacts), setup)
     found = detect(path, operations)
     matched = match_log(replace(read, operations=operations), found.of_operations, group, rules, setup.activation.wait)
@@ -299,8 +292,7 @@ def _score(
         beside=recording.beside,
         strokes=matched.uncut.strokes,
     )
-    detecting = perf_counter() - begin - reading
-    return ScoredLog(rows, recording, tuple(contacts), found, matched, True, reading, detecting)
+    return ScoredLog(rows, recording, tuple(contacts), found, matched)
 
 
 def _force_not_seen(

@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, statuses_words
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
-from cdtool.commands.console.logs_argument import logs_argument
 from cdtool.commands.console.options import (
     ClusterOption,
-    ForceOption,
     JobsOption,
     JsonOption,
     MachineOption,
     QuietOption,
-    figure_name,
+    logs_argument,
     set_option,
 )
 from cdtool.commands.console.place import Place, location
 from cdtool.commands.signature.shown import checked_as_json, file_as_json, show_class, show_file
-
-if TYPE_CHECKING:
-    from cdtool.commands.signature.audit import DriftAudit
-    from cdtool.commands.signature.upkeep import Checked
 
 signature = typer.Typer(
     help="Show a signature, check it against runs, add runs to it.",
@@ -49,11 +40,9 @@ FileArgument = Annotated[
         parser=location,
         help="Signature file from cdtool learn-signature.",
         metavar="SIGNATURE",
-        autocompletion=completions.files(".json"),
     ),
 ]
 UpkeepOption = Annotated[list[str] | None, set_option("onset.above_n=20", "UpkeepTable")]
-PlotOption = Annotated[Place | None, typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw.")]
 
 
 @signature.command("show", epilog=statuses_words("signature show"))
@@ -82,11 +71,6 @@ def check(
     ],
     machine: MachineOption,
     target: Annotated[float, typer.Option("--target", help="False-alarm probability to demonstrate.")] = 1e-3,
-    plot: Annotated[
-        Place | None,
-        typer.Option("--plot", parser=location, help="Figure of the drift; a folder for classes."),
-    ] = None,
-    force: ForceOption = False,
     settings: UpkeepOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
@@ -98,15 +82,13 @@ def check(
     Runs in the signature are checked against a signature of all the others (leave one out). Other runs are treated as a
     season, in the given order.
 
-    Example: cdtool signature check gate.feekf.json free/*.csv april.mcap -m machine.toml --plot drift.png
+    Example: cdtool signature check gate.feekf.json free/*.csv april.mcap -m machine.toml
     """
     from cdtool.commands.judging.settings_table import given_settings
     from cdtool.commands.learning.normal_runs import notes_on
     from cdtool.commands.signature.upkeep import check_signature
     from cdtool.execution.workers import Workers
 
-    if plot is not None and not plot.is_dir():
-        figure_name(plot, force=force)
     with progress("reading runs", quiet=quiet) as advance:
         checked = check_signature(
             file,
@@ -116,19 +98,12 @@ def check(
             settings=given_settings(settings or ()),
             workers=Workers(jobs, cluster=cluster, progress=advance),
         )
-    names = _plot_names(plot, checked, force=force)
     print_skipped(checked.skipped, [*checked.findings, *notes_on(checked.file)])
     if as_json:
         print_json(checked_as_json(checked))
     else:
         for item in checked.classes:
             show_class(item, quiet=quiet)
-    for path, audit in names:
-        from cdtool.commands.signature.drift_plot import plot_drift
-
-        plot_drift(audit, path)
-        if not as_json:
-            print_line(f"plot written to {plain(path)}")
     nothing = all(item.coverage is None and item.drift is None for item in checked.classes)
     leave(checked.skipped, checked.findings, [Fact.NOTHING_USABLE] if nothing else ())
 
@@ -176,19 +151,3 @@ def update(
         counts = f"{len(done.refused)} refused; {len(done.file.runs)} in total"
         print_line(f"{counted(len(done.added), 'run')} added to {plain(file)}, {counts}")
     leave(done.refused, done.findings, () if done.added else [Fact.NOTHING_USABLE])
-
-
-def _plot_names(plot: Path | None, checked: Checked, *, force: bool) -> list[tuple[Path, DriftAudit]]:
-    """Return the plot file of each class with a season; raises UsageError if --plot does not fit."""
-    audits = [item.drift for item in checked.classes if item.drift]
-    if plot is not None and not audits:
-        raise UsageError(
-            "--plot shows the drift over a season, but no log is new", "give logs that are not in the signature"
-        )
-    if plot is None:
-        return []
-    if plot.is_dir():
-        return [(figure_name(plot / f"drift_{number}.png", force=force), item) for number, item in enumerate(audits, 1)]
-    if len(audits) > 1:
-        raise UsageError(f"--plot names one file for {len(audits)} classes of motion", "give an existing folder")
-    return [(figure_name(plot, force=force), audits[0])]

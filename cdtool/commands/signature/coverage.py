@@ -12,7 +12,7 @@ from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import judge
 from cdtool.base.errors import SignatureError, UsageError
 from cdtool.base.plain_text import counted, digits
-from cdtool.commands.signature.deviation import Axis
+from cdtool.commands.signature.drift import Axis
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.operations import Operation

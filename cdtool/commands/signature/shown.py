@@ -10,8 +10,8 @@ from cdtool.base.plain_text import counted, ordinal
 from cdtool.commands.console.console import number, plain, print_line, say, table
 
 if TYPE_CHECKING:
-    from cdtool.commands.signature.audit import DriftAudit
     from cdtool.commands.signature.coverage import SignatureCoverage
+    from cdtool.commands.signature.drift import DriftAudit
     from cdtool.commands.signature.summary import JointSummary, SignatureSummary
     from cdtool.commands.signature.upkeep import Checked, CheckedClass
     from cdtool.formats.signature_file import SignatureFile

@@ -20,9 +20,8 @@ from cdtool.commands.judging.settings_table import UpkeepTable, read_settings
 from cdtool.commands.learning.fitting import Pair, signals_of
 from cdtool.commands.learning.learning import learned_run
 from cdtool.commands.learning.normal_runs import with_operation
-from cdtool.commands.signature.audit import DriftAudit
 from cdtool.commands.signature.coverage import SignatureCoverage, check_coverage
-from cdtool.commands.signature.drift import audit_drift
+from cdtool.commands.signature.drift import DriftAudit, audit_drift
 from cdtool.commands.signature.words import place_of
 from cdtool.execution.workers import Workers
 from cdtool.formats.machine_file import MachineFile, read_machine_file

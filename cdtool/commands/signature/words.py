@@ -1,11 +1,11 @@
-"""The result of an audit of a season, in plain sentences for the screen and for figures."""
+"""The result of an audit of a season, in plain sentences for the screen."""
 
 from __future__ import annotations
 
 import math
 
 from cdtool.base.plain_text import counted
-from cdtool.commands.signature.audit import JointDrift, Shown
+from cdtool.commands.signature.drift import JointDrift, Shown
 from cdtool.statistics.interval import Interval
 from cdtool.statistics.trends import LEAST_RUNS, Step
 

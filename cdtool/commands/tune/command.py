@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.base.plain_text import counted
-from cdtool.commands.console import completions
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import (
     leave,
@@ -37,7 +36,6 @@ def tune(
         typer.Argument(
             parser=location,
             help="Benchmark file with [learn] and [impacts] or [inject].",
-            autocompletion=completions.files(".toml"),
         ),
     ],
     false_alarm_budget: Annotated[

@@ -55,6 +55,11 @@ def state_of(files: Sequence[Path]) -> State:
     return tuple((item.st_size, item.st_mtime_ns) for item in states)
 
 
+def state_in(sources: Sequence[SourceFile]) -> State:
+    """Return the state of files when their sources were read."""
+    return tuple((item.size, item.modified) for item in sources)
+
+
 def read_sources(files: Sequence[Path]) -> tuple[SourceFile, ...] | None:
     """Return the sources with their digests; None if one of the files cannot be read, or changed meanwhile."""
     before = state_of(files)

@@ -14,54 +14,37 @@ import os
 import secrets
 import time
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from cdtool.base.errors import ConfigurationError, OutputError
 from cdtool.base.files.bounded_loading import parse_json, read_bytes
 from cdtool.base.files.locks import is_temporary
-from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.base.files.writing import write_bytes, write_text
 from cdtool.base.remote.remote_path import is_remote
-from cdtool.execution.store.digest import digest_of
-from cdtool.execution.store.sources import SourceFile, names_of, read_sources, state_of
 
-Kind = Literal["logs", "traces", "learned", "sources"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+Kind = Literal["logs", "traces", "learned"]
 _KIND, _SCHEMA = "cdtool store", 2
 _MARK = "store.json"
 # The time of last use of a file is noted if it is older [s].
 _DAY = 86_400.0
 # Speed counts more than size: half the time of the default.
 _LEVEL = 3
-_Sources = tuple[SourceFile, ...]
 
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a store, and how it is used.
-
-    With `trust_times` a file with the size and the time of last change that the store knows is not hashed again. With
-    `retry_failed` the logs that could not be read are read again. Without `writes` nothing is kept.
-    """
+    """The folder of a store."""
 
     folder: Path
-    trust_times: bool = False
-    retry_failed: bool = False
-    writes: bool = True
 
     @property
     def exists(self) -> bool:
         """Whether the folder exists and is not empty."""
         return self.folder.is_dir() and any(not is_temporary(item.name) for item in self.folder.iterdir())
-
-    @property
-    def is_remote(self) -> bool:
-        """Whether it is at a URL, where each file is a request: there, it keeps no files of recordings by name."""
-        return is_remote(self.folder)
 
     @property
     def mark(self) -> Path:
@@ -98,7 +81,7 @@ class Store:
             content = zlib.decompress(path.read_bytes()).decode("utf-8", "surrogatepass")
         except (OSError, ValueError, zlib.error):
             return None
-        if self.writes and not self.is_remote:
+        if not is_remote(self.folder):
             with suppress(OSError):
                 if path.stat().st_mtime < time.time() - _DAY:
                     os.utime(path)
@@ -106,10 +89,8 @@ class Store:
 
     def keep(self, kind: Kind, key: str, content: str) -> None:
         """Keep the content of a key; when it returns, it outlives this process. Raises OutputError."""
-        if not self.writes:
-            return
         path, packed = self._path(kind, key), zlib.compress(content.encode("utf-8", "surrogatepass"), _LEVEL)
-        if self.is_remote:
+        if is_remote(self.folder):
             write_bytes(path, packed)
             return
         part = path.with_name(f".{secrets.token_hex(8)}")
@@ -124,31 +105,6 @@ class Store:
 
     def _path(self, kind: Kind, key: str) -> Path:
         return self.folder / kind / key[:2] / key[2:]
-
-    def files(self, kind: Kind) -> Iterator[Path]:
-        """Yield the files of a kind, those that were not completed included."""
-        for folder in (self.folder / kind).glob("[0-9a-f][0-9a-f]"):
-            yield from (path for path in folder.glob("*") if path.is_file())
-
-    def last_sources(self, name: str) -> _Sources | None:
-        """Return the files from which a recording was last read; None if it is not known, and at a URL."""
-        text = None if self.is_remote else self.known("sources", digest_of(name))
-        with suppress(ValueError):
-            return None if text is None else decoded(text, _Sources)
-        return None
-
-    def keep_sources(self, name: str, sources: _Sources) -> None:
-        """Keep the files from which a recording was read."""
-        if not self.is_remote and sources != self.last_sources(name):
-            self.keep("sources", digest_of(name), encoded(sources))
-
-    def sources_of(self, name: str, files: Sequence[Path]) -> _Sources | None:
-        """Return the files of a recording as they are now; None if one of them cannot be read, or changes meanwhile."""
-        before = self.last_sources(name) if self.trust_times else None
-        unchanged = before is not None and state_of(files) == tuple((item.size, item.modified) for item in before)
-        if before is not None and unchanged and names_of(files) == [item.name for item in before]:
-            return before
-        return read_sources(files)
 
 
 def _values(mark: Path) -> Mapping[str, Any]:

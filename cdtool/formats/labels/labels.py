@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta, timezone
 from decimal import Decimal
 from pathlib import Path, PurePosixPath
-from typing import Literal, get_args
+from typing import Literal
 
 from cdtool.base.errors import ConfigurationError, RecordingError, nearest
 from cdtool.base.findings import Finding
@@ -33,7 +33,6 @@ _ZONE = re.compile(r"(?P<sign>[+-])(?P<hours>\d\d):?(?P<minutes>\d\d)|[Zz]")
 _DATED = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d")
 
 LabelClock = Literal["recording", "source"]
-CLOCKS: tuple[str, ...] = get_args(LabelClock)
 
 
 @dataclass(frozen=True)

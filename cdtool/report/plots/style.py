@@ -8,15 +8,13 @@ from zlib import crc32
 from cdtool.base.errors import CdtoolError
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.detection import Status
-from cdtool.detectors.look import BLUE, BROWN, GREY, RED, SKY, Look
+from cdtool.detectors.look import BROWN, GREY, SKY, Look
 
 FORCE = "black"
 LIMIT = "0.25"
 BAND = "#DCE6EE"
 # At least 3 : 1 on white and on the normal band (WCAG 2.2, 1.4.11).
 NOT_ASSESSED = "0.5"
-# From far below the mean to far above it, pale in the middle; distinct for colour-blind readers.
-DEVIATION_COLOURS = ("#003F6B", BLUE, "#9CCBE6", "#F7F7F7", "#F2B48A", RED, "#7A2E00")
 ONSET_DASHES = (0, (6, 2, 1.5, 2))
 # Why a sample is not assessable; distinct without colour.
 HATCHES = {

@@ -101,11 +101,6 @@ class ChannelLatency:
         """Whether an event has a delay: together with other logs, there may be an offset."""
         return any(event.delay.known for event in self.events)
 
-    def offset_at(self, time: float) -> float:
-        """Return the offset at another time [s], with the drift if it is known."""
-        drift = self.drift.value if self.drift.known else 0.0
-        return self.offset.value + drift * (time - self.at)
-
 
 def latency_from(empty: ChannelLatency, events: Sequence[TimedEvent]) -> ChannelLatency:
     """Return the latency that events show.

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from cdtool.base.exit_status import STATUSES_OF
-from cdtool.execution.store.store import Store
 from cdtool.results.evaluated import evaluate
 from cdtool.results.files.results_file import to_json
 from cdtool.results.limits import LimitRule
@@ -91,11 +90,6 @@ class Folder:
     @property
     def gate_protocol(self) -> Path:
         return GATE / "protocol.toml"
-
-    @property
-    def store(self) -> Path:
-        Store(self.path / "store").create()
-        return self.path / "store"
 
     def triggers(self, rows: str) -> Path:
         path = self.path / "triggers.csv"
@@ -229,10 +223,6 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("protocol check", 0): lambda f: cdtool("protocol", "check", f.gate_protocol),
     ("protocol check", 2): lambda f: cdtool("protocol", "check", f.machine),
     ("protocol check", 4): lambda f: cdtool("protocol", "check", write_protocol(f.path, valid_until="2026-01-16")),
-    ("store status", 0): lambda f: cdtool("store", "status", f.store),
-    ("store status", 2): lambda f: cdtool("store", "status", f.absent),
-    ("store gc", 0): lambda f: cdtool("store", "gc", f.store),
-    ("store gc", 2): lambda f: cdtool("store", "gc", f.absent),
     ("simulate", 0): lambda f: cdtool("simulate", "gate", *ONE_RUN, "-o", f.path / "gate"),
     ("simulate", 2): lambda f: cdtool("simulate", "gate", "--set", "format=xyz", "-o", f.path / "gate"),
     ("study sensors", 0): lambda _: cdtool(

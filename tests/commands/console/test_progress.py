@@ -6,7 +6,7 @@ import threading
 
 from cdtool.commands.console.console import progress
 from cdtool.execution.workers import Workers, in_order
-from tests.commands.console.test_late_progress import terminal
+from tests.commands.console.test_pulsing_bar import terminal
 
 
 def test_the_bar_is_drawn_as_the_work_advances_and_removed_at_the_end(monkeypatch):

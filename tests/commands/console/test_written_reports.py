@@ -8,7 +8,7 @@ from cdtool.commands.console.written_reports import show_results, write_reports
 from cdtool.report.outputs import write_outputs
 from cdtool.report.plots.folder_figures import FOLDER_FIGURES
 from cdtool.report.writers.base import Report
-from tests.commands.console.test_late_progress import terminal
+from tests.commands.console.test_pulsing_bar import terminal
 from tests.report.html.html_case import case
 
 
@@ -30,7 +30,6 @@ def test_progress_counts_every_file_and_figure_up_to_the_last_one(tmp_path):
 
 
 def test_a_bar_is_drawn_while_reports_are_written_unless_quiet(tmp_path, monkeypatch):
-    monkeypatch.setattr("cdtool.commands.console.written_reports.AFTER_S", 0.0)
     stderr = terminal(monkeypatch)
     write_reports(report(), [tmp_path / "quiet"], force=False, quiet=True)
     assert stderr.text == ""

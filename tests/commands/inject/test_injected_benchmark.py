@@ -202,7 +202,7 @@ def test_a_folder_of_cdtool_inject_is_used_and_stays_the_users(gate: Path) -> No
 
 def test_a_dry_run_counts_the_contacts_that_are_not_made_yet_and_writes_nothing(gate: Path) -> None:
     path = write(gate, INJECT)
-    words = ("benchmark", path, "--store", gate / "store", "--dry-run")
+    words = ("benchmark", path, "--dry-run")
     done = command(*words)
     assert done.status == 0, done.err
     assert "1 contact of [inject] would be made first" in done.out
@@ -210,7 +210,7 @@ def test_a_dry_run_counts_the_contacts_that_are_not_made_yet_and_writes_nothing(
     cdtool.benchmark(path)
     done = command(*words)
     assert "would be made first" not in done.out
-    assert "injected/injected_stiff/" in done.out and "1 of 1 recording would be computed" in done.out
+    assert "injected_stiff: 1 recording" in done.out
 
 
 def test_changed_conditions_are_scored_beside_injected_contacts_and_not_copied(gate: Path) -> None:

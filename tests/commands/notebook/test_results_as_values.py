@@ -1,4 +1,4 @@
-"""Results as a notebook handles them: found by name, copied, pickled; typos are answered."""
+"""Results as a notebook handles them: copied, pickled; typos are answered."""
 
 from __future__ import annotations
 
@@ -18,33 +18,12 @@ def found():
     return cdtool.detect(LOGS, MACHINE, detector="gm", settings={"threshold.limits": 400.0})
 
 
-@pytest.mark.parametrize("name", ["04.csv", "stiff/04.csv", LOGS[1], str(LOGS[1]), 1, -2])
-def test_a_log_is_found_by_its_name_the_end_of_its_path_or_its_number(found, name):
-    assert found[name] is found.runs[1]
-    assert isinstance(name, int) or name in found
-
-
-def test_a_name_that_two_logs_have_is_refused_with_both(found):
-    with pytest.raises(KeyError) as caught:
-        found["03.csv"]
-    assert str(caught.value) == (
-        "2 logs are named '03.csv' (give more of the path or the number: stiff/03.csv [0], holdout/03.csv [2])"
-    )
-    assert "03.csv" in found and "05.csv" not in found
-
-
-def test_a_log_that_was_left_out_is_answered_with_the_reason(tmp_path):
+def test_a_log_is_found_by_its_number_and_one_that_was_left_out_is_listed(tmp_path):
     broken = tmp_path / "broken.csv"
     broken.write_text("a,b\n", encoding="utf-8")
     found = cdtool.detect([LOG, broken], MACHINE, detector="gm", settings={"threshold.limits": 400.0})
-    with pytest.raises(KeyError, match=r"no log 'broken\.csv' in these results \(it was left out: .*broken\.csv"):
-        found["broken.csv"]
-    assert "broken.csv" not in found and found.skipped.recording.tolist() == [str(broken)]
-
-
-def test_a_name_in_results_without_a_log_is_answered_in_words(found):
-    with pytest.raises(KeyError, match=r"no log '03\.csv' in these results \(they are empty\)"):
-        found[:0]["03.csv"]
+    assert len(found) == 1 and found[-1] is found.runs[0] and found[0] in found and len(found[1:]) == 0
+    assert found.skipped.recording.tolist() == [str(broken)]
 
 
 def test_reading_without_a_machine_file_says_what_to_pass_and_how_to_get_one():

@@ -12,17 +12,17 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import OutputError, RecordingError
-from cdtool.commands.scoring import pieces
+from cdtool.commands.scoring import benchmark, pieces
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
-from cdtool.commands.scoring.dry_run import dry_run
 from cdtool.commands.scoring.learned import Learned, Teaching
 from cdtool.commands.scoring.store.determinants import Determinants
 from cdtool.commands.scoring.store.stored_learned import learned_with_store
+from cdtool.execution.store.sources import read_sources
 from cdtool.execution.store.store import Store
-from cdtool.execution.store.upkeep import collect_garbage, store_status
 from cdtool.execution.workers import Workers
 from cdtool.results.files.results_file import to_json
 from cdtool.results.traces.file import encode_traces
+from cdtool.thresholds import THRESHOLDS
 
 FILE = """machine = "machine.toml"
 detectors = ["momentum", "friction_ekf"]
@@ -84,10 +84,9 @@ def bytes_of(done: cdtool.BenchmarkResult) -> bytes:
     return to_json(done.results).encode() + encode_traces(done.traces)
 
 
-def run(folder: Path, store: Path | None, **settings) -> tuple[bytes, int | None]:
+def run(folder: Path, store: Path | None, jobs: int = 1) -> tuple[bytes, int | None]:
     """Return results and traces as bytes, and the number of recordings that were computed."""
-    jobs = settings.pop("jobs", 1)
-    use = None if store is None else Store(store, **settings)
+    use = None if store is None else Store(store)
     done = cdtool.benchmark(folder / "b.toml", store=use, jobs=jobs)
     return bytes_of(done), done.stored.computed if done.stored else None
 
@@ -106,37 +105,56 @@ def alone(folder: Path) -> bytes:
     return WITHOUT_STORE[digest.digest()]
 
 
-def planned(folder: Path, store: Path, **settings) -> dict[str, tuple[str, ...]]:
-    """Return the detectors that would run, by recording."""
-    found = dry_run(folder / "b.toml", store=Store(store, **settings))
-    return {item.recording: item.detectors for item in found.logs}
+@pytest.fixture
+def ran(monkeypatch) -> dict[str, tuple[str, ...]]:
+    """The detectors that ran first on a recording, by its name."""
+    found: dict[str, tuple[str, ...]] = {}
+    call = pieces.PieceScoring.__call__
+
+    def noted(self, piece):
+        found.setdefault(piece.path.name, piece.detectors or self.setup.detectors)
+        return call(self, piece)
+
+    monkeypatch.setattr(pieces.PieceScoring, "__call__", noted)
+    return found
 
 
-@pytest.mark.parametrize("threshold", ["signature", "combined"])  # all are saved and loaded: tests/contracts
+@pytest.mark.parametrize("threshold", THRESHOLDS.names())
 def test_a_second_run_computes_nothing_and_writes_the_same_bytes(gate, threshold, tmp_path):
     write(gate, threshold)
     expected = alone(gate)
     assert run(gate, tmp_path / "s") == (expected, 6)
     assert run(gate, tmp_path / "s") == (expected, 0)
-    assert run(gate, tmp_path / "s", trust_times=True, jobs=2) == (expected, 0)
+    assert run(gate, tmp_path / "s", jobs=2) == (expected, 0)
 
 
-def test_of_one_recording_more_only_that_is_computed(gate, tmp_path):
+def test_of_one_recording_more_only_that_is_computed(gate, tmp_path, ran):
     new = gate / "stiff" / "04.csv"
     kept = new.read_bytes()
     new.unlink()
     run(gate, tmp_path / "s")
     new.write_bytes(kept)
-    assert planned(gate, tmp_path / "s") == {"stiff/04.csv": ("momentum", "friction_ekf")}
-    assert run(gate, tmp_path / "s") == (alone(gate), 1)
+    ran.clear()
+    found = run(gate, tmp_path / "s")
+    assert ran["04.csv"] == ("momentum", "friction_ekf")
+    assert found == (alone(gate), 1)
 
 
-def test_with_another_gain_only_the_rows_of_that_detector_are_computed(gate, filled):
+def test_with_another_gain_only_the_rows_of_that_detector_are_computed(gate, filled, ran):
     with (gate / "machine.toml").open("a", encoding="utf-8") as file:
         file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
-    assert set(planned(gate, filled).values()) == {("momentum",)}
-    assert run(gate, filled) == (alone(gate), 6)
+    found = run(gate, filled)
+    assert set(ran.values()) == {("momentum",)}
+    assert found == (alone(gate), 6)
     assert run(gate, filled) == (alone(gate), 0)
+
+
+def test_a_detector_more_leaves_the_rows_of_the_others(gate, filled, ran):
+    text = (gate / "b.toml").read_text(encoding="utf-8")
+    (gate / "b.toml").write_text(text.replace('"friction_ekf"]', '"friction_ekf", "pure_torque"]'), encoding="utf-8")
+    found = run(gate, filled)
+    assert set(ran.values()) == {("pure_torque",)}
+    assert found == (alone(gate), 6)
 
 
 @pytest.mark.parametrize(
@@ -159,23 +177,35 @@ def test_another_impact_free_run_computes_all_again(gate, filled):
     assert run(gate, filled) == (alone(gate), 6)
 
 
-def test_content_is_compared_unless_times_are_trusted(gate, tmp_path):
+def test_content_is_compared_not_times(gate, tmp_path):
     run(gate, tmp_path / "s")
     log = gate / "stiff" / "01.csv"
     state, text = log.stat(), log.read_bytes()
     log.write_bytes(text[:-2] + (b"1" if text[-2:-1] != b"1" else b"2") + text[-1:])
     os.utime(log, ns=(state.st_atime_ns, state.st_mtime_ns))
-    assert planned(gate, tmp_path / "s", trust_times=True) == {}
-    assert list(planned(gate, tmp_path / "s")) == ["stiff/01.csv"]
+    assert run(gate, tmp_path / "s")[1] == 1
+    for log in gate.rglob("*.csv"):
+        os.utime(log, ns=(1, 1))
+    assert run(gate, tmp_path / "s")[1] == 0
 
 
-def test_a_reading_error_is_stored_until_it_is_to_be_retried(gate, tmp_path):
+def test_a_reading_error_is_stored(gate, tmp_path):
     (gate / "stiff" / "02.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
     expected = alone(gate)
     assert run(gate, tmp_path / "s") == (expected, 6)
     assert run(gate, tmp_path / "s") == (expected, 0)
-    assert planned(gate, tmp_path / "s", retry_failed=True) == {"stiff/02.csv": ("momentum", "friction_ekf")}
-    assert run(gate, tmp_path / "s", retry_failed=True) == (expected, 1)
+
+
+@pytest.mark.parametrize("operations", ["", 'operations = "clock-reset"'])
+def test_a_log_that_cannot_be_read_stays_one_with_another_detector(gate, tmp_path, operations):
+    (gate / "stiff" / "02.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
+    write(gate, operations=operations)
+    run(gate, tmp_path / "s")
+    text = (gate / "b.toml").read_text(encoding="utf-8")
+    (gate / "b.toml").write_text(text.replace('"friction_ekf"]', '"friction_ekf", "pure_torque"]'), encoding="utf-8")
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s") == (expected, 6)
+    assert run(gate, tmp_path / "s") == (expected, 0)
 
 
 def test_a_log_that_ends_its_worker_is_left_out_also_if_other_detectors_are_stored(gate, filled, monkeypatch):
@@ -212,15 +242,15 @@ def test_an_error_of_the_system_is_not_stored(gate, tmp_path, monkeypatch):
 def test_a_log_that_changes_while_it_is_read_is_left_out_with_that_reason(gate, tmp_path, monkeypatch, with_store):
     log = gate / "stiff" / "03.csv"
     before = log.read_bytes()
-    state = pieces.state_of
+    score = benchmark.score_runs
 
-    def changing(files):
-        found = state(files)
-        if files == [log]:
+    def changing(setup, group, path, *others):
+        found = score(setup, group, path, *others)
+        if path == log:
             log.write_bytes(before + b"\n")
         return found
 
-    monkeypatch.setattr(pieces, "state_of", changing)
+    monkeypatch.setattr(benchmark, "score_runs", changing)
     use = Store(tmp_path / "s") if with_store else None
     done = cdtool.benchmark(gate / "b.toml", store=use)
     assert [(item.recording, item.reason) for item in done.results.skipped] == [
@@ -231,15 +261,40 @@ def test_a_log_that_changes_while_it_is_read_is_left_out_with_that_reason(gate, 
     assert run(gate, tmp_path / "s") == (alone(gate), 1 if with_store else 6)
 
 
-def test_logs_that_are_learned_from_and_scored_depend_on_all_others(gate, tmp_path):
+def test_a_log_that_changes_before_another_detector_runs_is_left_out_and_computed_whole_later(
+    gate, filled, monkeypatch
+):
+    """The outcomes that are stored are those of the old content."""
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    log = gate / "stiff" / "03.csv"
+    text = log.read_bytes()
+    score = pieces.PieceScoring.__call__
+
+    def after_a_change(self, piece):
+        if piece.path == log:
+            log.write_bytes(text.replace(b"-0.00093", b"-0.00094", 1) + b"\n")
+        return score(self, piece)
+
+    monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
+    done = cdtool.benchmark(gate / "b.toml", store=Store(filled))
+    monkeypatch.undo()
+    left_out = [(item.recording, item.reason) for item in done.results.skipped]
+    assert left_out == [("stiff/03.csv", "changed while it was read")]
+    assert run(gate, filled) == (alone(gate), 1)
+
+
+def test_logs_that_are_learned_from_and_scored_depend_on_all_others(gate, tmp_path, ran):
     write(gate, learn=', "stiff/*.csv"', until='until = "onset"')
     expected = alone(gate)
     assert run(gate, tmp_path / "s") == (expected, 6)
     assert run(gate, tmp_path / "s") == (expected, 0)
     with (gate / "machine.toml").open("a", encoding="utf-8") as file:
         file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
-    assert set(planned(gate, tmp_path / "s").values()) == {("momentum",)}
-    assert run(gate, tmp_path / "s") == (alone(gate), 6)
+    ran.clear()
+    found = run(gate, tmp_path / "s")
+    assert set(ran.values()) == {("momentum",)}
+    assert found == (alone(gate), 6)
     shutil.copy(gate / "free" / "01.csv", gate / "free" / "other.csv")
     text = (gate / "free" / "other.csv").read_text(encoding="utf-8")
     (gate / "free" / "other.csv").write_text(text.replace("-0.0083", "-0.0084", 1), encoding="utf-8")
@@ -257,6 +312,17 @@ def test_a_detector_refused_in_a_group_is_not_found_under_the_key_of_one_that_is
     one, other = (Determinants(each, teaching.learned, {}, {}) for each in (setup, replace(setup, impacts=groups)))
     group, item = next(iter(setup.impacts.items()))
     assert one.log_key(group, item.logs[0], ()) != other.log_key(group, item.logs[0], ())
+
+
+def test_a_renamed_part_of_a_log_is_another_log(tmp_path):
+    for name in ("a.mcap", "b.mcap"):
+        (tmp_path / name).write_bytes(b"x")
+    before = read_sources(sorted(tmp_path.iterdir()))
+    (tmp_path / "a.mcap").rename(tmp_path / "c.mcap")
+    after = read_sources(sorted(tmp_path.iterdir()))
+    assert before is not None and after is not None
+    assert {item.digest for item in before} == {item.digest for item in after}
+    assert [item.content for item in before] != [item.content for item in after]
 
 
 def test_a_damaged_or_missing_file_is_computed_again(gate, tmp_path):
@@ -295,12 +361,16 @@ def killed_run(gate):
 
 def test_a_killed_run_continues_where_it_stopped(gate, tmp_path):
     killed_run(gate)
-    planned = dry_run(gate / "b.toml", store=Store(tmp_path / "s"))
-    assert (len(planned.logs), planned.total) == (2, 6)
     assert run(gate, tmp_path / "s") == (alone(gate), 2)
 
 
-def test_a_run_to_learn_from_that_could_not_be_read_is_retried(gate, tmp_path):
+def test_a_folder_that_is_not_a_store_is_refused(gate):
+    with pytest.raises(cdtool.base.errors.ConfigurationError, match="neither a store nor an empty folder"):
+        run(gate, gate)
+    assert not (gate / "logs").exists()
+
+
+def test_what_was_learned_is_not_learned_again(gate, tmp_path):
     bad = gate / "free" / "99.csv"
     bad.write_text("no table")
     run(gate, tmp_path / "store")
@@ -313,35 +383,5 @@ def test_a_run_to_learn_from_that_could_not_be_read_is_retried(gate, tmp_path):
             asked.append(1)
             return super().learned
 
-    for retried, count in ((False, 0), (True, 1)):
-        store = Store(tmp_path / "store", retry_failed=retried, writes=False)
-        learned, _ = learned_with_store(store, Asked(setup, Workers()))
-        assert len(asked) == count and [item.recording for item in learned.about.skipped] == ["free/99.csv"]
-
-
-def test_a_dry_run_writes_nothing(gate, tmp_path):
-    found = dry_run(gate / "b.toml", store=Store(tmp_path / "s"))
-    assert (len(found.logs), found.total, found.seconds) == (6, 6, None)
-    assert not (tmp_path / "s").exists()
-    run(gate, tmp_path / "s")
-    (gate / "stiff" / "04.csv").write_text("t\n1\n", encoding="utf-8")
-    before = sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "s").rglob("*"))
-    found = dry_run(gate / "b.toml", store=Store(tmp_path / "s"))
-    assert [(item.recording, item.bytes) for item in found.logs] == [("stiff/04.csv", 4)]
-    assert found.seconds
-    assert sorted((path, path.stat().st_mtime_ns) for path in (tmp_path / "s").rglob("*")) == before
-
-
-def test_what_was_not_used_for_a_time_is_removed(gate, filled):
-    for path in filled.rglob("*/*/*"):
-        os.utime(path, (1.0, 1.0))
-    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
-        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
-    entries = store_status(filled).entries
-    assert (entries["logs"], entries["learned"]) == (6, 1)
-    run(gate, filled)
-    done = collect_garbage(filled)
-    assert done.removed >= 2  # what was learned, and the traces
-    assert done.kept == sum(store_status(filled).entries.values()) >= 13
-    assert run(gate, filled) == (alone(gate), 0)
-    assert collect_garbage(filled, older_than_days=0.0).kept == 0
+    learned, _ = learned_with_store(Store(tmp_path / "store"), Asked(setup, Workers()))
+    assert not asked and [item.recording for item in learned.about.skipped] == ["free/99.csv"]

@@ -28,7 +28,7 @@ def test_offset_and_drift_of_a_load_cell_are_found_with_jitter_and_other_rates()
     found = load_cell(audit(recording, axis(), contacts))
     assert contains(found, clocks) and found.offset.high - found.offset.low < 1e-3
     assert found.drift.low <= 60e-6 <= found.drift.high and abs(found.drift.value - 60e-6) < 5e-6
-    assert found.offset_at(0.0) == pytest.approx(0.0123, abs=1e-3)
+    assert found.offset.value - found.drift.value * found.at == pytest.approx(0.0123, abs=1e-3)
 
 
 def test_intervals_contain_the_offset_and_drifts_are_within_5_ppm():

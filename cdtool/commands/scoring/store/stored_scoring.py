@@ -8,10 +8,10 @@ from pathlib import Path
 
 from cdtool.base.files.typed_json import decoded, encoded
 from cdtool.commands.scoring.log_outcome import DetectorOutcome, LogOutcome
-from cdtool.commands.scoring.pieces import Piece, PieceOutcome, PieceScoring, same_content, source_files
+from cdtool.commands.scoring.pieces import Piece, PieceOutcome, PieceScoring, source_files
 from cdtool.commands.scoring.scoring import LogRows
 from cdtool.commands.scoring.store.determinants import Determinants
-from cdtool.execution.store.sources import SourceFile
+from cdtool.execution.store.sources import SourceFile, read_sources
 from cdtool.execution.store.store import Store
 from cdtool.results.traces.trace import Trace
 
@@ -23,94 +23,60 @@ _BETWEEN = "\t"
 
 @dataclass(frozen=True)
 class KnownLog:
-    """What a store has of a log: its rows, and the outcomes of detectors by key, each as JSON.
+    """What a store has of a log: its rows, and the outcomes of detectors by key, each as JSON."""
 
-    `size` is that of its files [bytes], which took `seconds`; `unread`: it could not be read.
-    """
-
-    size: int
-    seconds: float
-    unread: bool
     rows: str
     detectors: Mapping[str, str] = field(default_factory=dict)
 
     def to_text(self) -> str:
         """Return it as lines."""
-        head = encoded((self.size, self.seconds, self.unread))
-        return "\n".join([head, self.rows, *(f"{key}{_BETWEEN}{text}" for key, text in self.detectors.items())])
+        return "\n".join([self.rows, *(f"{key}{_BETWEEN}{text}" for key, text in self.detectors.items())])
 
     @classmethod
     def of_text(cls, text: str) -> KnownLog:
-        """Return what `to_text` made; raises ValueError for anything else."""
-        head, rows, *detectors = text.split("\n")
+        """Return what `to_text` made."""
+        rows, *detectors = text.split("\n")
         pairs = (line.partition(_BETWEEN) for line in detectors)
-        return cls(*decoded(head, tuple[int, float, bool]), rows, {key: text for key, _, text in pairs})
+        return cls(rows, {key: text for key, _, text in pairs})
 
 
 @dataclass(frozen=True)
 class StoredScoring:
-    """Scores a log with the detectors whose outcomes the `store` does not have, by the keys of the `determinants`.
+    """Scores a log with the detectors whose outcomes the `store` does not have, by the keys of the `determinants`."""
 
-    Without `scoring`, it is only asked what would be computed.
-    """
-
-    scoring: PieceScoring | None
+    scoring: PieceScoring
     store: Store
     determinants: Determinants
 
     def __call__(self, piece: Piece) -> PieceOutcome:
         """Return the outcome of a log; the traces that are known are among it if certain operations are asked for."""
-        assert self.scoring is not None, "it is more than asked"
-        scoring = replace(self.scoring, with_sources=True)
-        sources = self._sources(piece.path)
-        known = self.known(piece.group, piece.path, sources)
-        missing = self.missing(known, piece.group, piece.path, sources)
-        if known is not None and sources is not None and not missing:
+        sources = read_sources(source_files(self.determinants.setup, piece.path))
+        if sources is None:  # one cannot be read now, or changes
+            return self.scoring(piece)
+        piece = replace(piece, sources=sources)
+        known = self._known(piece, sources)
+        missing = tuple(
+            name
+            for name, key in self._keys(piece.group, piece.path, sources).items()
+            if known is None or key not in known.detectors
+        )
+        if known is not None and not missing:
             found = self._restored(piece, sources, known)
             if found is not None:
                 return found
             missing = self._names
-        if len(missing) == len(self._names):
-            made = scoring(replace(piece, sources=sources))
-        else:
-            made = scoring(replace(piece, choice=None, detectors=missing, sources=sources))
-            if made.sources is not None and not same_content(made.sources, sources):
-                return self(piece)  # it has changed since the others were computed
-        return made if made.sources is None else self._kept(piece, made, made.sources, known, missing)
+        is_whole = len(missing) == len(self._names)
+        made = self.scoring(piece if is_whole else replace(piece, choice=None, detectors=missing))
+        return made if made.sources is None else self._kept(piece, made, sources, known, missing)
 
     @property
     def _names(self) -> tuple[str, ...]:
         return self.determinants.setup.detectors
 
-    def _sources(self, path: Path) -> tuple[SourceFile, ...] | None:
-        """Return the files of a log; None for one that the store does not know: it is hashed while it is read."""
-        name = self.determinants.name(path)
-        if self.store.last_sources(name) is None and not self.store.is_remote:
-            return None
-        return self.store.sources_of(name, source_files(self.determinants.setup, path))
-
-    def known(self, group: str, path: Path, sources: tuple[SourceFile, ...] | None) -> KnownLog | None:
+    def _known(self, piece: Piece, sources: tuple[SourceFile, ...]) -> KnownLog | None:
         """Return what the store has of a log with these files."""
-        text = None if sources is None else self.store.known("logs", self.determinants.log_key(group, path, sources))
-        try:
-            found = None if text is None else KnownLog.of_text(text)
-        except ValueError:
-            return None
-        return None if found is not None and found.unread and self.store.retry_failed else found
-
-    def missing(
-        self, known: KnownLog | None, group: str, path: Path, sources: tuple[SourceFile, ...] | None
-    ) -> tuple[str, ...]:
-        """Return the detectors that have to be run on a log: all if its rows are missing."""
-        if known is None or sources is None:
-            return self._names
-        return tuple(name for name, key in self._keys(group, path, sources).items() if key not in known.detectors)
-
-    def planned(self, log: tuple[str, Path]) -> tuple[KnownLog | None, tuple[str, ...]]:
-        """Return what the store has of the log of a group, and the detectors that would be run on it."""
-        sources = self._sources(log[1])
-        known = self.known(*log, sources)
-        return known, self.missing(known, *log, sources)
+        text = self.store.known("logs", self.determinants.log_key(piece.group, piece.path, sources))
+        return None if text is None else KnownLog.of_text(text)
 
     def _keys(self, group: str, path: Path, sources: tuple[SourceFile, ...]) -> dict[str, str]:
         of = self.determinants
@@ -133,7 +99,6 @@ class StoredScoring:
             traces = {number: decoded(text, Trace) for number, text in texts.items() if text is not None}
         except ValueError:
             return None
-        self.store.keep_sources(self.determinants.name(piece.path), sources)
         if traces:
             outcomes = _with_traces(outcomes, traces)
         return PieceOutcome(tuple(outcomes), sources, is_stored=True)
@@ -153,11 +118,9 @@ class StoredScoring:
         texts = {keys[name]: encoded(item) for name, item in new.items()}
         others = known.detectors if known is not None else {}
         if known is None or len(missing) == len(self._names):
-            unread, size = any(item.unread for item in rows), sum(item.size for item in sources)
-            known = KnownLog(size, made.seconds, unread, encoded(rows))
+            known = KnownLog(encoded(rows))
         both = replace(known, detectors={**others, **texts})
         self.store.keep("logs", self.determinants.log_key(piece.group, piece.path, sources), both.to_text())
-        self.store.keep_sources(self.determinants.name(piece.path), sources)
         traces = [trace for outcome in made.outcomes for trace in outcome.traces]
         for number, trace in enumerate(traces):
             if trace is not None:

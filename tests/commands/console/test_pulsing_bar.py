@@ -1,4 +1,4 @@
-"""Progress of convert, recover and init: only on a terminal, and only for long tasks."""
+"""Progress of convert, recover and init: only on a terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from time import sleep
 
 import pytest
 
-from cdtool.commands.console.late_progress import late_progress
+from cdtool.commands.console.console import progress
 from cdtool.commands.convert.converting import convert
 from cdtool.commands.convert.recovering import recover
 from tests.commands.convert.bags import write_part
@@ -42,22 +42,14 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
 
 def test_nothing_is_drawn_without_a_terminal(capsys):
-    with late_progress("converting", after=0.0) as advance:
+    with progress("converting", pulses=True) as advance:
         assert advance is None
     assert capsys.readouterr().err == ""
 
 
-def test_nothing_is_drawn_for_a_short_task(monkeypatch):
+def test_a_bar_appears_and_disappears_at_the_end(monkeypatch):
     stderr = terminal(monkeypatch)
-    with late_progress("converting", after=60.0) as advance:
-        assert advance is not None
-        advance(1, 2)
-    assert stderr.text == ""
-
-
-def test_a_bar_appears_for_a_long_task_and_disappears_at_the_end(monkeypatch):
-    stderr = terminal(monkeypatch)
-    with late_progress("converting", after=0.0) as advance:
+    with progress("converting", pulses=True) as advance:
         sleep(0.3)
         assert advance is not None
         advance(3, 7)
@@ -68,7 +60,7 @@ def test_a_bar_appears_for_a_long_task_and_disappears_at_the_end(monkeypatch):
 
 def test_an_error_in_the_block_is_raised_and_removes_the_bar(monkeypatch):
     stderr = terminal(monkeypatch)
-    with pytest.raises(ValueError, match="mine"), late_progress("converting", after=0.0):
+    with pytest.raises(ValueError, match="mine"), progress("converting", pulses=True):
         sleep(0.3)
         raise ValueError("mine")
     assert stderr.text.rstrip("\r\n").endswith("\x1b[2K")
