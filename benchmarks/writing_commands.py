@@ -209,7 +209,6 @@ def cases(inputs: Path) -> list[Case]:
             for suffix in ("csv", "mcap", "parquet")
         ),
         Case("study sensors", _sensors(machine, "0.3"), _sensors(machine, "0.2")),
-        Case("study figures", ("study", "figures", "-o", "{out}/figures")),
     ]
 
 

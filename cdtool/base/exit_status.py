@@ -106,7 +106,6 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "store gc": _ALWAYS,
     "simulate": _ALWAYS,
     "study sensors": _ALWAYS,
-    "study figures": _ALWAYS,
     "list": _CAN_LOSE,
     "schema": _ALWAYS,
 }
