@@ -16,7 +16,6 @@ from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.files.bounded_loading import parse_toml
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.commands.tune import tuning as module
 from cdtool.commands.tune.command import _show
 from cdtool.commands.tune.files import open_folder, write_tuning
 from cdtool.commands.tune.options import TuningOptions
@@ -51,24 +50,17 @@ def gate(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def quick(gate: Path) -> BenchmarkFile:
     """Few runs and a threshold that is learned and assessed in no time."""
     setup = read_benchmark_file(gate / "benchmark.toml")
-    return replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    return replace(setup, learn=setup.learn[:12], rule=Limit())
 
 
 @pytest.fixture(scope="module")
-def journals(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("journals")
+def done(gate: Path):
+    return tune(read_benchmark_file(gate / "benchmark.toml"), OPTIONS)
 
 
 @pytest.fixture(scope="module")
-def done(gate: Path, journals: Path):
-    return tune(read_benchmark_file(gate / "benchmark.toml"), OPTIONS, journals=journals)
-
-
-@pytest.fixture(scope="module")
-def written(done, gate: Path, journals: Path, tmp_path_factory: pytest.TempPathFactory):
-    """The command, which goes on with the search of `done`."""
+def written(gate: Path, tmp_path_factory: pytest.TempPathFactory):
     folder = tmp_path_factory.mktemp("out") / "tuned"
-    shutil.copytree(journals, folder / "search")
     outcome = command("tune", gate / "benchmark.toml", *ARGUMENTS, "-o", folder)
     assert outcome.status == 0, outcome.err
     return folder, outcome
@@ -106,28 +98,9 @@ def test_every_surface_opens_with_the_worst_fact_of_a_tuning(name, done, capsys)
     assert f"<p>Tuned: {made.verdict[1]}</p>" in made._repr_html_()
 
 
-def test_the_result_depends_on_neither_the_number_of_workers_nor_on_an_interruption(quick, tmp_path):
-    first = tune(quick, QUICK, journals=tmp_path)
-    expected = json.dumps(tuning_summary(first), default=str)
-    two = tune(quick, QUICK, workers=Workers(2))
-    assert json.dumps(tuning_summary(two), default=str) == expected
-    journal = tmp_path / "momentum.jsonl"
-    text = journal.read_text(encoding="utf-8")
-    journal.write_text(text[: int(0.6 * len(text))], encoding="utf-8")
-    again = tune(quick, QUICK, journals=tmp_path)
-    assert json.dumps(tuning_summary(again), default=str) == expected
-    assert sorted(journal.read_text(encoding="utf-8").splitlines()) == sorted(text.splitlines())
-
-
-def test_a_search_that_is_complete_is_not_measured_again(quick, tmp_path, monkeypatch):
-    tune(quick, QUICK, journals=tmp_path)
-    measured = []
-    usual = module.Measuring._measured
-    monkeypatch.setattr(module.Measuring, "_measured", lambda own, item: measured.append(item) or usual(own, item))
-    tune(quick, QUICK, journals=tmp_path)
-    assert measured == []
-    tune(quick, replace(QUICK, false_alarm_budget="1/6op"), journals=tmp_path)
-    assert measured
+def test_the_result_does_not_depend_on_the_number_of_workers(quick):
+    expected = json.dumps(tuning_summary(tune(quick, QUICK)), default=str)
+    assert json.dumps(tuning_summary(tune(quick, QUICK, workers=Workers(2))), default=str) == expected
 
 
 @pytest.mark.parametrize("goal", ["p95", "force"])
@@ -149,7 +122,6 @@ def test_the_files_can_be_used(written, gate):
         "signature_momentum.json",
         "tuning.html",
         "tuning.json",
-        "search",
     }
     made = api.benchmark(folder / "benchmark.toml").results
     summary = json.loads((folder / "tuning.json").read_text(encoding="utf-8"))
@@ -181,11 +153,11 @@ def test_files_state_what_was_chosen_and_why(written):
 def test_it_may_run_again_into_its_folder_but_replaces_no_other_file(written, tmp_path):
     folder = tmp_path / "tuned"
     shutil.copytree(written[0], folder)
-    assert open_folder(folder, ()) == folder / "search"
+    open_folder(folder, ())
     (folder / "machine.toml").write_text("[machine]\n", encoding="utf-8")
     with pytest.raises(UsageError, match="already exists and contains no file of cdtool tune"):
         open_folder(folder, ())
-    assert open_folder(folder, (), force=True).is_dir()
+    open_folder(folder, (), force=True)
     with pytest.raises(UsageError, match="exists and is not a folder"):
         open_folder(folder / "tuning.html", ())
 
@@ -199,7 +171,7 @@ def test_too_few_runs_are_refused_with_the_numbers_needed(tmp_path):
 
 def test_between_the_two_numbers_figures_are_apparent(gate):
     setup = read_benchmark_file(gate / "benchmark.toml")
-    few = replace(setup, learn=setup.learn[:20], threshold="limit", rule=Limit())
+    few = replace(setup, learn=setup.learn[:20], rule=Limit())
     made = tune(few, replace(QUICK, false_alarm_budget=BUDGET))
     assert not made.is_nested and made.detectors[0].nested is None
     assert made.detectors[0].chosen_in_folds == ()
@@ -228,7 +200,7 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
     inject += "[inject.obstacles.hard]\nstiffness_n_per_mm = 500\n"
     (gate / "both.toml").write_text(text + inject, encoding="utf-8")
     both = read_benchmark_file(gate / "both.toml")
-    both = replace(both, learn=both.learn[:12], threshold="limit", rule=Limit())
+    both = replace(both, learn=both.learn[:12], rule=Limit())
     with pytest.raises(UsageError, match=r"has real contacts \(stiff, soft\) and injected ones"):
         tune(both, QUICK)
     made = tune(both, replace(QUICK, impacts="injected"))
@@ -245,7 +217,7 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
     ("arguments", "words"),
     [
         (("--set", "tune.objective=speed"), "--set tune.objective: is 'speed'"),
-        (("--set", "tune.thresholds=glx"), "unknown threshold 'glx'"),
+        (("--set", "tune.thresholds=glx"), "tune.thresholds: contains 'glx'"),
         (("--set", "tune.impacts=all"), "--set tune.impacts: is 'all'"),
         (("--set", "tune.impacts=injected"), "has no section [inject]"),
         (("--set", "tune.worse_at_most=-1"), "--set tune.worse_at_most: is -1"),
@@ -303,7 +275,7 @@ def test_the_force_is_not_minimised_where_none_is_known(quick, tmp_path):
     written = written.replace("[onset]", '[onset]\nlabels = "labels.csv"')
     (quick.path.parent / "labelled.toml").write_text(written, encoding="utf-8")
     setup = read_benchmark_file(quick.path.parent / "labelled.toml")
-    setup = replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    setup = replace(setup, learn=setup.learn[:12], rule=Limit())
     with pytest.raises(UsageError, match="no log has the force of its contact"):
         tune(setup, QUICK, objective=Goal.FORCE)
     made = tune(setup, QUICK)

@@ -10,7 +10,7 @@ from cdtool.commands.tune.search.candidate import Candidate, Measured
 from cdtool.commands.tune.search.grid import debounces_to_try, rules_to_try
 from cdtool.commands.tune.search.objective import Goal, Objective
 from cdtool.commands.tune.search.search import search
-from cdtool.commands.tune.search.tuned import pareto_of, sensitivities_of
+from cdtool.commands.tune.search.tuned import sensitivities_of
 from cdtool.detectors.momentum import Momentum
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
@@ -96,13 +96,6 @@ def test_the_sensitivity_shows_the_flat_part_and_the_edge():
     far, _ = run(by_rule(VALUES, bandwidth=1e6))
     by_name = {item.name: item for item in sensitivities_of(far, far.best, [9], ("bandwidth",))}
     assert by_name["bandwidth"].is_at_edge
-
-
-def test_the_pareto_front_has_what_nothing_beats_in_every_group():
-    found, _ = run(by_rule(VALUES))
-    points = pareto_of(OBJECTIVE, found, ["9 ms"])
-    assert [point.candidate.rule.name for point in points] == ["cusum", "glr"]
-    assert np.allclose(points[1].costs, (12.0, 55.0))
 
 
 def test_rules_are_tried_with_their_settings_where_their_channels_exist():
