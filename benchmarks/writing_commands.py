@@ -241,7 +241,7 @@ def _tune(setup: str, threshold: str) -> tuple[str, ...]:
 
 
 def _coverage(setup: str) -> tuple[str, ...]:
-    return ("inject", setup, "-o", "{out}/p.png", "--force")
+    return ("inject", setup, "-o", "{out}/p.html", "--force")
 
 
 def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The files of a map of `cdtool inject`: a figure with a panel per class of speed, all cells as JSON."""
+"""The files of a map of `cdtool inject`: all cells as JSON."""
 
 from __future__ import annotations
 
@@ -7,17 +7,6 @@ from pathlib import Path
 
 from cdtool.commands.inject.coverage.files import check_coverage_files, write_coverage
 from tests.report.html.coverage_case import coverage_case
-
-
-def test_the_figure_has_a_panel_per_detector_and_class_of_speed(tmp_path: Path) -> None:
-    target = tmp_path / "map.svg"
-    write_coverage(coverage_case(speeds=(0.1, 0.3)), [target])
-    text = target.read_text(encoding="utf-8")
-    titles = [f"{name}, {speed} m/s" for name in ("quick", "slow") for speed in ("0.100", "0.300")]
-    assert all(f">{title}<" in text for title in titles)
-    write_coverage(coverage_case(), [target])
-    text = target.read_text(encoding="utf-8")
-    assert ">quick<" in text and "m/s<" not in text
 
 
 def test_the_json_has_the_reasons_and_the_speeds(tmp_path: Path) -> None:
