@@ -45,7 +45,7 @@ def test_the_figures_name_impulses_speeds_and_works():
     assert len(FIGURES.plot_restitution(FIGURES.restitution_over_speed()).axes[0].texts) == 3
 
 
-def test_every_figure_is_one_of_the_pages(tmp_path):
+def test_every_picture_is_on_a_page(tmp_path):
     FIGURES.draw(tmp_path)
     text = (DOCS / "impact.md").read_text(encoding="utf-8") + (DOCS / "study.md").read_text(encoding="utf-8")
     drawn = sorted(tmp_path.iterdir())
