@@ -93,7 +93,7 @@ def compare(
     """
     from cdtool.base.files.foreign import refuse_inputs
     from cdtool.commands.compare.comparing import compare as run
-    from cdtool.commands.compare.comparison_writers import to_json
+    from cdtool.commands.compare.comparison_json import to_json
     from cdtool.report.outputs import check_outputs, write_outputs
 
     targets = output or []

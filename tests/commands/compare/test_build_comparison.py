@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.commands.compare.comparison import compare_builds
-from cdtool.commands.compare.comparison_writers import to_json
+from cdtool.commands.compare.comparison_json import to_json
 from cdtool.statistics.paired import fisher_p, mcnemar_p
 from cdtool.statistics.rates import poisson_difference_p
 from cdtool.statistics.sample_size import detectable_difference, impacts_for_unpaired

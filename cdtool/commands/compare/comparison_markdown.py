@@ -1,13 +1,12 @@
-"""The comparison of two builds as files: Markdown for a pull request, JSON for programs."""
+"""The comparison of two builds as Markdown, for a pull request."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.base.files.foreign import Kind
-from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_text
 from cdtool.commands.compare.comparison import BuildComparison
 from cdtool.commands.compare.comparison_model import comparison_model
@@ -40,21 +39,3 @@ def to_markdown(comparison: BuildComparison) -> str:
         parts += [f"{model.changed.title}:", "\n".join(table_lines(model.changed))]
     parts += [escape(note) for note in model.notes]
     return "\n\n".join(parts) + "\n"
-
-
-class ComparisonJson(Writer[BuildComparison]):
-    """Comparison of two builds: JSON with all numbers, for programs."""
-
-    name: ClassVar[str] = "comparison_json"
-    subject: ClassVar[Subject] = "comparison"
-    suffixes: ClassVar[tuple[str, ...]] = (".json",)
-    kinds: ClassVar[dict[str, Kind]] = {".json": Kind(b'{\n "verdict": "', "comparison of cdtool")}
-
-    def write(self, report: BuildComparison, target: Path) -> None:
-        """Write it; raises CdtoolError."""
-        write_text(target, to_json(report))
-
-
-def to_json(comparison: BuildComparison) -> str:
-    """Return strict JSON: null for a number that is missing or not finite."""
-    return strict_json(asdict(comparison)) + "\n"
