@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.impact.checks import require_positive, require_restitution
+from cdtool.impact.checks import require_not_negative, require_positive, require_restitution
 
 # Powers 1, 2, ... of x in e(x) - 1 and of 1 - e in x(e): the exact relation, solved as a power series about x = 0.
 _RESTITUTION_SERIES = (-2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225)
@@ -53,6 +53,58 @@ def stronge(compression_work: float, restitution_work: float) -> float:
     """
     require_positive("the work taken up in compression, -W_c,", -compression_work, "J")
     return float(np.sqrt(max(-restitution_work / compression_work, 0.0)))
+
+
+def coefficients(time: FloatArray, rate: FloatArray, force: FloatArray) -> Restitution:
+    """Newton's, Poisson's and Stronge's coefficient (3.2, 3.4, 3.8) of one contact, simulated or measured.
+
+    `time` (n,) s from first touch to separation, `rate` (n,) of the penetration m/s, positive while the bodies
+    approach, `force` (n,) N. Trapezoids between the samples; compression ends where the rate passes 0. Fails where
+    samples are so few that the force's peak falls between them. Raises UsageError where compression or its end is
+    missing.
+    """
+    if not (time.ndim == 1 and time.shape == rate.shape == force.shape and len(time) > 2):
+        raise UsageError(f"shapes {time.shape}, {rate.shape}, {force.shape}", "three arrays of one length above 2")
+    after = np.flatnonzero(rate <= 0.0)
+    if rate[0] <= 0.0 or not len(after):
+        raise UsageError("the penetration's rate does not fall from positive to 0", "give one whole contact")
+    turn = int(after[0])
+    share = rate[turn - 1] / (rate[turn - 1] - rate[turn])
+    at = time[turn - 1] + share * (time[turn] - time[turn - 1])
+    force_at = force[turn - 1] + share * (force[turn] - force[turn - 1])
+    times, rates, forces = (
+        np.insert(values, turn, value) for values, value in ((time, at), (rate, 0.0), (force, force_at))
+    )
+    steps = np.diff(times)
+    impulses = np.cumsum(0.5 * (forces[1:] + forces[:-1]) * steps)
+    power = -forces * rates
+    works = np.cumsum(0.5 * (power[1:] + power[:-1]) * steps)
+    return Restitution(
+        newton(float(rate[0]), float(rate[-1])),
+        poisson(float(impulses[turn - 1]), float(impulses[-1])),
+        stronge(float(works[turn - 1]), float(works[-1] - works[turn - 1])),
+    )
+
+
+def rate_from_force(time: FloatArray, force: FloatArray, mass: float, approach_speed: float) -> FloatArray:
+    """Penetration rate (n,) [m/s] from a measured force (n,) [N]: v - p/m (thesis 3.6), trapezoids.
+
+    `mass` is the effective mass of 3.7 [kg]; the mass must be free: a pushing drive is not included.
+    """
+    require_positive("the mass", mass, "kg")
+    impulses = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(time))))
+    return np.asarray(approach_speed - impulses / mass)
+
+
+def goldsmith(approach_speed: npt.ArrayLike, alpha: float, beta: float = 1.0) -> FloatArray:
+    """e = sqrt(1 - alpha |v|^beta) (thesis 3.10 with the magnitude); NaN beyond the speed at which it would be 0.
+
+    alpha [(s/m)^beta] and beta depend on material and geometry. Raises UsageError where one of them is below 0.
+    """
+    require_not_negative("alpha", alpha)
+    require_not_negative("beta", beta)
+    left = 1.0 - alpha * np.abs(np.asarray(approach_speed, dtype=np.float64)) ** beta
+    return np.where(left >= 0.0, np.sqrt(np.maximum(left, 0.0)), np.nan)[()]
 
 
 def hunt_crossley_restitution(damping_number: npt.ArrayLike) -> FloatArray:

@@ -6,16 +6,20 @@ less energy the larger it is. It has no number. The one here is that of a mode e
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
+from cdtool.base.errors import UsageError
 from cdtool.impact.checks import require_positive
 
 # With this ratio and above, a mode keeps at most 4.1 % of its energy at the force's peak.
 QUASI_STATIC_FROM = 5.0
+# Natural periods of a rod in travel times of a wave along it, by how its ends are held.
+_TRAVELS = {"free": 2.0, "one fixed": 4.0}
 
 
 @dataclass(frozen=True)
@@ -64,3 +68,17 @@ def vibration_share(ratio: npt.ArrayLike) -> FloatArray:
     q = np.asarray(ratio, dtype=np.float64)
     known = np.maximum(q, 1.0)
     return np.where(q >= 1.0, (4.0 * known / (4.0 * known**2 - 1.0)) ** 2, np.nan)[()]
+
+
+def rod_first_frequency(length: float, young: float, density: float, ends: str = "free") -> float:
+    """First longitudinal natural frequency [Hz] of a rod: c/(2 L) with free ends, c/(4 L) with one fixed.
+
+    c = sqrt(E/rho): Young's modulus in Pa, density in kg/m3; length in m. Raises UsageError for other ends ("free",
+    "one fixed"). A beam hit across its axis oscillates far slower: give `check_waves` its own frequency.
+    """
+    require_positive("the length", length, "m")
+    require_positive("Young's modulus", young, "Pa")
+    require_positive("the density", density, "kg/m3")
+    if ends not in _TRAVELS:
+        raise UsageError(f"a rod with ends '{ends}'", f"known: {', '.join(_TRAVELS)}")
+    return math.sqrt(young / density) / (_TRAVELS[ends] * length)

@@ -1,4 +1,4 @@
-"""Contact laws: forces, their constants, and what holds for every law."""
+"""Contact laws: forces, their constants, and what holds for every law of the table."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.errors import UsageError
+from cdtool.impact.contact_laws import CONTACT_LAWS
 from cdtool.impact.contact_laws.base import KeepsIndentation, StoresEnergy
 from cdtool.impact.contact_laws.hertz import Hertz, hertz_stiffness
 from cdtool.impact.contact_laws.hunt_crossley import HuntCrossley
@@ -27,6 +28,11 @@ LAWS = {
     "lankarani_nikravesh": LankaraniNikravesh(1e8, 0.7, 0.5),
 }
 STEEL = {"young_1": 210e9, "poisson_1": 0.3, "young_2": 210e9, "poisson_2": 0.3}
+
+
+def test_every_law_of_the_table_is_tried_here():
+    assert list(LAWS) == CONTACT_LAWS.names()
+    assert all(CONTACT_LAWS.load(name) is type(law) and law.name == name for name, law in LAWS.items())
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
@@ -205,3 +211,9 @@ def test_lankarani_and_nikravesh_have_the_damping_of_3_22():
     alpha = (1.0 - 0.8) / 0.5
     assert law.damping == pytest.approx(1.5 * alpha * 1e8 * (1.0 - alpha * 0.5 / 2.0), rel=1e-12)
     assert law.force(1e-4, 0.3) == HuntCrossley(1e8, law.damping).force(1e-4, 0.3)
+
+
+def test_an_unknown_law_is_refused_with_the_nearest_name():
+    with pytest.raises(UsageError) as fault:
+        CONTACT_LAWS.load("hunt_crosley")
+    assert "hunt_crossley" in fault.value.hint

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from cdtool.base.errors import UsageError
 from cdtool.impact.restitution import (
+    coefficients,
     damping_for_restitution,
+    goldsmith,
     hunt_crossley_damping,
     hunt_crossley_damping_number,
     hunt_crossley_restitution,
@@ -19,6 +21,7 @@ from cdtool.impact.restitution import (
     lankarani_nikravesh_damping,
     newton,
     poisson,
+    rate_from_force,
     stronge,
 )
 
@@ -41,6 +44,40 @@ def test_an_impact_that_does_not_approach_has_no_restitution():
     for wrong in (lambda: newton(0.0, 1.0), lambda: poisson(0.0, 1.0), lambda: stronge(0.1, 0.1)):
         with pytest.raises(UsageError):
             wrong()
+
+
+def test_a_measured_half_sine_of_force_gives_its_coefficients():
+    # A free mass of 2 kg, 0.5 m/s, and a force that ends when 1.8 times the momentum has been taken: e = 0.8.
+    time = np.linspace(0.0, 1e-3, 2001)
+    force = np.sin(np.pi * time / 1e-3) * (1.8 * 2.0 * 0.5) * np.pi / 2e-3
+    rate = rate_from_force(time, force, 2.0, 0.5)
+    found = coefficients(time, rate, force)
+    assert found.newton == pytest.approx(0.8, abs=1e-5)
+    assert found.poisson == pytest.approx(0.8, abs=1e-5)
+    assert found.stronge == pytest.approx(0.8, abs=1e-5)
+
+
+def test_a_contact_with_few_samples_still_ends_its_compression_between_two_of_them():
+    time = np.linspace(0.0, 1e-3, 24)
+    force = np.sin(np.pi * time / 1e-3) * np.pi / 2e-3
+    found = coefficients(time, rate_from_force(time, force, 1.0, 0.55), force)
+    assert found.poisson == pytest.approx(0.45 / 0.55, abs=0.01)
+
+
+@pytest.mark.parametrize("rate", [[-1.0, -1.0, -1.0], [1.0, 0.5, 0.1]])
+def test_half_a_contact_is_refused(rate):
+    with pytest.raises(UsageError, match="rate"):
+        coefficients(np.array([0.0, 1.0, 2.0]), np.array(rate), np.ones(3))
+    with pytest.raises(UsageError, match="shapes"):
+        coefficients(np.zeros(3), np.zeros(2), np.zeros(3))
+
+
+def test_goldsmiths_relation_takes_the_magnitude_of_the_speed_and_ends_where_nothing_is_left():
+    assert goldsmith(-0.25, 0.2) == pytest.approx(math.sqrt(1.0 - 0.2 * 0.25), rel=1e-12)
+    assert goldsmith(-0.25, 0.2, 0.2) == goldsmith(0.25, 0.2, 0.2)
+    assert np.isnan(goldsmith(np.array([4.9, 5.1]), 0.2)).tolist() == [False, True]
+    # To first order it is e = 1 - (alpha/2) v: half the alpha of 3.21.
+    assert 1.0 - goldsmith(1e-3, 0.2) == pytest.approx(1e-4, rel=1e-3)
 
 
 def test_the_exact_relation_has_the_reference_values():
@@ -127,15 +164,24 @@ def test_the_damping_scales_with_stiffness_over_speed(e, speed, stiffness):
 @pytest.mark.parametrize(
     "wrong",
     [
+        lambda: goldsmith(0.5, -0.1),
+        lambda: goldsmith(0.5, 0.1, -1.0),
         lambda: hunt_crossley_damping(1.2, 0.5, 1e8),
         lambda: lankarani_nikravesh_damping(-0.1, 0.5, 1e8),
         lambda: hunt_crossley_damping(0.8, 0.5, 0.0),
     ],
-    ids=["above_1", "below_0", "stiffness"],
+    ids=["alpha", "beta", "above_1", "below_0", "stiffness"],
 )
 def test_constants_that_would_give_a_restitution_outside_0_to_1_are_refused(wrong):
     with pytest.raises(UsageError):
         wrong()
+
+
+@settings(deadline=None)
+@given(st.floats(-100.0, 100.0), st.floats(0.0, 10.0), st.floats(0.0, 3.0))
+def test_goldsmiths_restitution_lies_within_0_and_1_or_is_not_there(speed, alpha, beta):
+    e = goldsmith(speed, alpha, beta)
+    assert np.isnan(e) or 0.0 <= e <= 1.0
 
 
 def test_a_plastic_impact_has_no_damping_that_could_be_given():

@@ -10,22 +10,27 @@ from scipy.integrate import solve_ivp
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
-from cdtool.impact.waves import QUASI_STATIC_FROM, check_waves, vibration_share
+from cdtool.impact.waves import QUASI_STATIC_FROM, check_waves, rod_first_frequency, vibration_share
 
 
-def rod(length: float) -> float:
-    """The first natural frequency [Hz] of a steel rod with free ends."""
-    return math.sqrt(210e9 / 7850.0) / (2.0 * length)
+def test_a_rod_rings_with_the_travel_of_a_wave_there_and_back():
+    speed = math.sqrt(210e9 / 7850.0)
+    assert rod_first_frequency(1.0, 210e9, 7850.0) == pytest.approx(speed / 2.0)
+    assert rod_first_frequency(1.0, 210e9, 7850.0, "one fixed") == pytest.approx(speed / 4.0)
+    with pytest.raises(UsageError, match="ends"):
+        rod_first_frequency(1.0, 210e9, 7850.0, "both fixed")
+    with pytest.raises(UsageError, match="length"):
+        rod_first_frequency(0.0, 210e9, 7850.0)
 
 
 def test_a_long_contact_needs_no_warning_and_a_shorter_one_says_what_is_lost():
     # The steel sphere of 10 mm: 91 us against a first period of some 8 us of a steel bar of its diameter.
-    small = check_waves(91.192e-6, rod(0.02))
+    small = check_waves(91.192e-6, rod_first_frequency(0.02, 210e9, 7850.0))
     assert small.quasi_static and small.warning == "" and small.ratio == pytest.approx(11.8, abs=0.05)
-    long = check_waves(91.192e-6, rod(0.2))
+    long = check_waves(91.192e-6, rod_first_frequency(0.2, 210e9, 7850.0))
     assert not long.quasi_static
     assert "1.2 periods" in long.warning and "up to 107 %" in long.warning
-    longer = check_waves(91.192e-6, rod(2.0))
+    longer = check_waves(91.192e-6, rod_first_frequency(2.0, 210e9, 7850.0))
     assert "before the body has responded" in longer.warning
 
 

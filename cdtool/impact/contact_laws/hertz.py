@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,10 @@ class Hertz:
     and if the impact is so short that waves carry energy away (`cdtool.impact.waves`). Without delta_p no energy is
     lost.
     """
+
+    name: ClassVar[str] = "hertz"
+    title: ClassVar[str] = "Hertz"
+    source: ClassVar[str] = "thesis 3.13 to 3.16; 3.16 with the exponent of the loading (errata)"
 
     stiffness: float = field(metadata={"unit": "N/m^n", "meaning": "k: force at a penetration of 1 m"})
     exponent: float = field(default=1.5, metadata={"unit": "1", "meaning": "n: 1.5 for spheres"})

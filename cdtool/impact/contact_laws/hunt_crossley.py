@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,10 @@ class HuntCrossley:
     Fails where a body keeps a dent, or rings on (`cdtool.impact.waves`); e falls with the speed in one fixed way, see
     `hunt_crossley_restitution`.
     """
+
+    name: ClassVar[str] = "hunt_crossley"
+    title: ClassVar[str] = "Hunt-Crossley"
+    source: ClassVar[str] = "thesis 3.19, 3.20, 4.9"
 
     stiffness: float = field(metadata={"unit": "N/m^n", "meaning": "k: force at a penetration of 1 m"})
     damping: float = field(metadata={"unit": "N s/m^(n+1)", "meaning": "mu: hysteresis damping factor"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy.typing as npt
 
@@ -18,6 +19,10 @@ class HysteresisDamping:
     It begins and ends without a step and without tension (the thesis attributes the tension of 3.17 to it). Fails for
     curved bodies, whose stiffness grows with the penetration, and where Hunt-Crossley's law fails.
     """
+
+    name: ClassVar[str] = "hysteresis_damping"
+    title: ClassVar[str] = "Hysteresis damping"
+    source: ClassVar[str] = "thesis 3.18"
 
     stiffness: float = field(metadata={"unit": "N/m", "meaning": "k of the spring"})
     damping: float = field(metadata={"unit": "N s/m^2", "meaning": "mu: hysteresis damping factor"})

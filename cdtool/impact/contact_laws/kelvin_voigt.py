@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,10 @@ class KelvinVoigt:
     Fails at first touch, where the force steps to d v; near the end, where the bodies part although the surface
     has not recovered; and in the restitution, which does not depend on the speed. It was devised for polymers.
     """
+
+    name: ClassVar[str] = "kelvin_voigt"
+    title: ClassVar[str] = "Kelvin-Voigt"
+    source: ClassVar[str] = "thesis 3.17, without its tension (errata)"
 
     stiffness: float = field(metadata={"unit": "N/m", "meaning": "k of the spring"})
     damping: float = field(metadata={"unit": "N s/m", "meaning": "d of the damper"})

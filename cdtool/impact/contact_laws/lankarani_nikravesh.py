@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy.typing as npt
 
@@ -20,6 +21,10 @@ class LankaraniNikravesh:
     Use `HuntCrossley` with `damping_for_restitution` for e below 0.9. Fails where that law fails, and at other
     speeds than the one it is made for.
     """
+
+    name: ClassVar[str] = "lankarani_nikravesh"
+    title: ClassVar[str] = "Lankarani-Nikravesh"
+    source: ClassVar[str] = "thesis 3.22 with the alpha of e = 1 - alpha v (errata)"
 
     stiffness: float = field(metadata={"unit": "N/m^n", "meaning": "k: force at a penetration of 1 m"})
     restitution: float = field(metadata={"unit": "1", "meaning": "e that is wanted"})
