@@ -204,7 +204,6 @@ def cases(inputs: Path) -> list[Case]:
             for suffix in ("csv", "mcap", "parquet")
         ),
         Case("study sensors", _sensors(machine, "0.3"), _sensors(machine, "0.2")),
-        Case("study figures", ("study", "figures", "-o", "{out}/figures")),
     ]
 
 
@@ -237,7 +236,7 @@ def _tune(setup: str, threshold: str) -> tuple[str, ...]:
 
 
 def _coverage(setup: str) -> tuple[str, ...]:
-    return ("inject", setup, "-o", "{out}/p.png", "--force")
+    return ("inject", setup, "-o", "{out}/p.html", "--force")
 
 
 def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:

@@ -71,14 +71,6 @@ def budget(work: Path) -> None:
         shutil.copyfile(work / name, IMAGES / name)
 
 
-def coverage(work: Path) -> None:
-    """The coverage map of the sample gate, in a copy of its folder: the injected recordings are many."""
-    logs = work / "coverage"
-    shutil.copytree(ROOT / "sample_logs" / "gate", logs)
-    detectors = ("--detectors", "pi,feekf,gm,pt")
-    cdtool("inject", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
-
-
 def emps(work: Path) -> None:
     """The momentum observer on the recording with force pulses."""
     logs, machine, signature = DATA / "emps", EXAMPLES / "emps.toml", work / "emps.json"
@@ -110,7 +102,7 @@ def main() -> int:
     """Make all images that can be made; 1 where one is too large."""
     IMAGES.mkdir(exist_ok=True)
     samples = ROOT / "sample_logs" / "gate"
-    sources = dict.fromkeys((gate, budget, coverage), samples)
+    sources = dict.fromkeys((gate, budget), samples)
     sources |= {emps: DATA / "emps", ur10e: UR10E, ur10e_momentum: UR10E}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for make, needed in sources.items():

@@ -104,7 +104,6 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "protocol check": _ALWAYS | {ExitStatus.INCONCLUSIVE},
     "simulate": _ALWAYS,
     "study sensors": _ALWAYS,
-    "study figures": _ALWAYS,
     "list": _CAN_LOSE,
     "schema": _ALWAYS,
 }

@@ -64,7 +64,7 @@ COMMANDS = {
 }
 EXAMPLES = {
     "docs/python.md": 13,
-    "docs/impact.md": 10,
+    "docs/impact.md": 9,
     "docs/simulators.md": 2,
     "docs/detectors/friction-ekf.md": 1,
 }

@@ -15,7 +15,6 @@ ELSEWHERE = {
     "cdtool/commands/console/streams.py": "opens the null device",
     "cdtool/execution/on_cluster.py": "opens the null device",
     "cdtool/execution/store/store.py": "names a file when it is complete; a damaged one is computed again",
-    "cdtool/commands/tune/journal.py": "appends to a file that the next run goes on with if this one is killed",
     "cdtool/commands/simulate/recording_folder.py": "writes into the folder that replaced_folder gives it",
     "cdtool/commands/inject/injecting.py": "writes into the folder that replaced_folder gives it",
     "cdtool/commands/inject/injected_logs.py": "writes into that folder, or into the benchmark's own",

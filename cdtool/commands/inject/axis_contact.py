@@ -29,6 +29,8 @@ from cdtool.machines.axis_model.simulation import AxisInputs, AxisMotion, simula
 RELIABLE_FOR = 0.2
 # What is simulated before the contact where the axis is never at rest before it [s].
 _LONGEST_APPROACH = 30.0
+# A rest is at least as long as this [s].
+_SHORTEST_REST = 0.2
 # A controller without which the motor would not notice the contact: as stiff as the sampling permits.
 _STIFF_SHARE = 0.2
 # Further, or faster, than known: by more than the error of a simulation.
@@ -74,7 +76,36 @@ class InjectedContact:
     free_wind_up: float
     wind_up: float
     assumption: Assumption
-    doubts: tuple[Doubt, ...]
+    doubts: tuple[Doubt, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        changes: Mapping[str, ChannelChange],
+        force: ChannelChange,
+        speed: float,
+        wind_ups: tuple[float, float],
+        assumption: Assumption,
+    ) -> InjectedContact:
+        """Return the contact of the greatest `wind_ups`, free and hit; raises RecordingError if it changes nothing."""
+        start = force.start
+        if not np.any(force.values) or (changes["torque"].is_nothing and changes["speed"].is_nothing):
+            raise RecordingError(
+                f"the contact at {start:.3f} s changes nothing in the model", "its obstacle or its drive never acts"
+            )
+        separation = separation_time(force.time, force.values[:, 0])
+        until = min(start + RELIABLE_FOR, separation)
+        peak = float(np.max(force.values))
+        return cls(start, changes, force, peak, speed, until, separation, *wind_ups, assumption)
+
+    def with_doubts(self, doubts: Mapping[Doubt, bool]) -> InjectedContact:
+        """Return the contact with these doubts as far as they apply, and those that every machine may have."""
+        known = {
+            Doubt.SEPARATION: self.separation < self.start + RELIABLE_FOR,
+            Doubt.CONTROLLER_UNKNOWN: self.assumption.controller is not ControllerReaction.KNOWN,
+            **doubts,
+        }
+        return replace(self, doubts=tuple(doubt for doubt in Doubt if known.get(doubt)))
 
 
 def axis_contact(
@@ -189,18 +220,19 @@ def _with_controller(model: AxisModel, run: AxisRun, reaction: ControllerReactio
 def _beginning(run: AxisRun, contact: float) -> float:
     """Return when the simulation begins [s]: in the last rest before the contact, or 30 s before it."""
     speed = _speed(run)
-    before = run.time <= contact
     moving = np.abs(np.nan_to_num(speed)) > 0.02 * float(np.nanmax(np.abs(speed)))
-    rest = np.flatnonzero(before & ~moving)
-    start = contact - _LONGEST_APPROACH
-    if len(rest):
-        # A rest of 0.2 s at least: a sample without speed may be noise or the turning point of a stroke.
-        long = round(0.2 / run.period)
-        sums = np.convolve(before & ~moving, np.ones(long), mode="valid") if len(speed) >= long else np.zeros(0)
-        whole = np.flatnonzero(sums >= long)
-        if len(whole):
-            start = max(start, float(run.time[whole[-1]]))
-    return max(start, run.start)
+    return max(contact - _LONGEST_APPROACH, last_rest(run.time, (run.time <= contact) & ~moving, run.period), run.start)
+
+
+def last_rest(time: FloatArray, resting: BoolArray, period: float) -> float:
+    """Return when the last rest of 0.2 s or more has its last 0.2 s [s]; minus infinity without one.
+
+    A shorter one may be noise, or the turning point of a stroke.
+    """
+    long = max(round(_SHORTEST_REST / period), 1)
+    sums = np.convolve(resting, np.ones(long), mode="valid") if len(resting) >= long else np.zeros(0)
+    whole = np.flatnonzero(sums >= long - 0.5)
+    return float(time[whole[-1]]) if len(whole) else -math.inf
 
 
 def _speed(run: AxisRun) -> FloatArray:
@@ -272,37 +304,19 @@ def _difference(
     changes = {
         name: ChannelChange(time, values[:, np.newaxis], start, held=name in held) for name, values in channels.items()
     }
-    force = hit["contact_force"]
-    if not np.any(force) or (changes["torque"].is_nothing and changes["speed"].is_nothing):
-        raise RecordingError(
-            f"the contact at {start:.3f} s changes nothing in the model", "its obstacle or its drive never acts"
-        )
-    separation = separation_time(time, force)
-    free_wind_up, wind_up = (float(np.max(np.abs(item["wind_up"]))) for item in (free, hit))
-    until = min(start + RELIABLE_FOR, separation)
+    force = ChannelChange(time, hit["contact_force"][:, np.newaxis], start)
+    wind_ups = (float(np.max(np.abs(free["wind_up"]))), float(np.max(np.abs(hit["wind_up"]))))
+    made = InjectedContact.of(changes, force, approach, wind_ups, assumption)
+    reliable = time <= made.reliable_until
     doubts = {
         Doubt.RIGID_DRIVE: model.drive.is_rigid,
-        Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, free, hit, time <= until),
+        Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, free, hit, reliable),
         Doubt.SLOPE_BEYOND_FREE_RUNS: assumption.slew is SlewBeyond.NO_LIMIT
-        and _rises_beyond(model, hit, (time <= until) & (time >= start)),
-        Doubt.SEPARATION: separation < start + RELIABLE_FOR,
-        Doubt.CONTROLLER_UNKNOWN: assumption.controller is not ControllerReaction.KNOWN,
+        and _rises_beyond(model, hit, reliable & (time >= start)),
         Doubt.APPROACH_SPEED: deviation > _DOUBTFUL_DEVIATION,
         Doubt.ACCELEROMETER_UNKNOWN: sensors.accelerometer_hz == 0.0,
     }
-    return InjectedContact(
-        start=start,
-        changes=changes,
-        force=ChannelChange(time, force[:, np.newaxis], start),
-        peak_force=float(np.max(force)),
-        speed=approach,
-        reliable_until=until,
-        separation=separation,
-        free_wind_up=free_wind_up,
-        wind_up=wind_up,
-        assumption=assumption,
-        doubts=tuple(doubt for doubt, applies in doubts.items() if applies),
-    )
+    return made.with_doubts(doubts)
 
 
 def _winds_up_beyond(model: AxisModel, free: AxisMotion, hit: AxisMotion, reliable: BoolArray) -> bool:

@@ -38,7 +38,7 @@ def inject(
             "--output",
             "-o",
             parser=location,
-            help="A folder for the logs; or the map, repeatable: .html, .json, .png, .svg, .pdf. Default: a table.",
+            help="A folder for the logs; or the map, repeatable: .html, .json. Default: a table.",
         ),
     ] = None,
     force: ForceOption = False,

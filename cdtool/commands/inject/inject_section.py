@@ -19,7 +19,6 @@ from msgspec import Meta
 from cdtool.base.errors import ConfigurationError, FieldsError, RecordingError, UsageError, nearest
 from cdtool.base.files.bounded_loading import read_toml
 from cdtool.base.plain_text import digits
-from cdtool.base.remote.remote_path import joined
 from cdtool.base.settings import Count, CountFromZero, NotNegative, Place, Positive, read, setting
 from cdtool.commands.inject.assumption import Assumption
 from cdtool.commands.inject.robot_contact import StruckPoint
@@ -38,9 +37,9 @@ _PER_MM = 1e3  # N/mm in N/m
 
 @dataclass(frozen=True, kw_only=True)
 class ObstacleTable:
-    """[inject.obstacles.NAME], or an obstacle of a file: one of a profile, a spring or a force curve."""
+    """[inject.obstacles.NAME], or a shipped obstacle: one of a profile, a spring or a force curve."""
 
-    profile: Annotated[str, setting("name of an obstacle of the obstacle file")] = ""
+    profile: Annotated[str, setting("name of a shipped obstacle")] = ""
     stiffness_n_per_mm: Annotated[Positive | None, setting("of a spring", unit="N/mm")] = None
     force_n: Annotated[tuple[NotNegative, ...], setting("forces of a curve, from 0", unit="N")] = ()
     deflection_mm: Annotated[tuple[NotNegative, ...], setting("deflections of a curve, from 0", unit="mm")] = ()
@@ -52,7 +51,7 @@ class ObstacleTable:
         setting("in series, such as a load cell; adds to that of a profile", unit="N/mm", infinite=True),
     ] = math.inf
     compare_with: Annotated[str, setting("a group of real impacts")] = ""
-    title: Annotated[str, setting("what it is, in a file of obstacles")] = ""
+    title: Annotated[str, setting("what it is, of a shipped obstacle")] = ""
     checked: Annotated[bool, setting("whether someone has checked the values against their source")] = False
 
     def __post_init__(self) -> None:
@@ -66,19 +65,15 @@ class ObstacleTable:
             raise FieldsError(fields, "and deflection_mm do not fit", "give two or more of each, both from 0")
 
 
-def shipped_obstacles(path: Path | None = None) -> dict[str, Obstacle]:
-    """Return the obstacles of a file by name; by default those that ship with cdtool.
-
-    Raises ConfigurationError naming file and key.
+def shipped_obstacles() -> dict[str, Obstacle]:
+    """Return the obstacles that ship with cdtool by name; raises ConfigurationError naming the key.
 
     >>> round(shipped_obstacles()["en_12453_force_meter"].steepest)
     500000
     """
-    place = Place(str(path) if path else "the shipped obstacles.toml")
-    values = read_toml(path or _SHIPPED, "a file of obstacles")
+    place = Place("the shipped obstacles.toml")
+    values = read_toml(_SHIPPED, "a file of obstacles")
     tables = {name: read(ObstacleTable, table, place.below(name)) for name, table in values.items()}
-    if not tables:
-        raise ConfigurationError(f"{place.where}: contains no obstacle", "write one table per obstacle")
     place.finish()
     return {name: _obstacle(table, {}, place.below(name)) for name, table in tables.items() if table}
 
@@ -244,9 +239,6 @@ class InjectTable:
     stiffnesses_n_per_mm: Annotated[
         tuple[Positive, ...] | StiffnessGrid, setting("springs without damping, one obstacle each", unit="N/mm")
     ] = ()
-    obstacle_file: Annotated[
-        str, setting("a TOML file with obstacles by name, for `profile`; default: the shipped one")
-    ] = ""
     duration_s: Annotated[
         Positive, setting("length of a recording after its contact; a log that ends sooner is left out", unit="s")
     ] = 1.0
@@ -283,7 +275,7 @@ def inject_section(table: InjectTable, place: Place, found: LogsOf, groups: tupl
     """
     machine = found.machine_file.machine
     joints = machine.joints
-    shipped = shipped_obstacles(joined(found.base, table.obstacle_file) if table.obstacle_file else None)
+    shipped = shipped_obstacles()
     if table.joint and table.joint not in joints:
         place.note("joint", f"is '{table.joint}'", nearest(table.joint, joints))
     return InjectSection(

@@ -15,7 +15,7 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.commands.inject.axis_contact import RELIABLE_FOR, Doubt, InjectedContact, separation_time
+from cdtool.commands.inject.axis_contact import Doubt, InjectedContact, last_rest
 from cdtool.commands.inject.channel_change import ChannelChange
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.obstacle import Obstacle
@@ -26,8 +26,8 @@ from cdtool.machines.robot_model.simulation import PointContact, RobotInputs, Ro
 
 # What is simulated before the contact where the robot is never at rest before it [s].
 _LONGEST_APPROACH = 5.0
-# A rest shorter than this [s] may be a turning point; speeds are means over this time [s].
-_SHORTEST_REST, _MEAN_SPEED_OVER = 0.2, 0.02
+# Speeds are means over this time [s].
+_MEAN_SPEED_OVER = 0.02
 # A joint below this share of its own greatest speed is at rest.
 _AT_REST = 0.02
 # A controller without which the motors would not notice the contact: as stiff as this sampling [s] permits.
@@ -194,15 +194,7 @@ def _beginning(log: RobotLog, contact: float) -> float:
     """Return when the simulation begins [s]: in the last rest of all joints before the contact, or 5 s before it."""
     speed = np.abs(log.speed())
     moving = np.any(speed > _AT_REST * np.max(speed, axis=0, initial=0.0), axis=1)
-    before = log.time <= contact
-    start = contact - _LONGEST_APPROACH
-    long = max(round(_SHORTEST_REST / log.period), 1)
-    if len(moving) >= long:
-        sums = np.convolve(before & ~moving, np.ones(long), mode="valid")
-        whole = np.flatnonzero(sums >= long - 0.5)
-        if len(whole):
-            start = max(start, float(log.time[whole[-1]]))
-    return max(start, log.start)
+    return max(contact - _LONGEST_APPROACH, last_rest(log.time, (log.time <= contact) & ~moving, log.period), log.start)
 
 
 def _inputs(log: RobotLog, time: FloatArray) -> RobotInputs:
@@ -294,36 +286,17 @@ def _difference(
     if all(axis.sensors.speed_hz == 0.0 for axis in model.axes):
         held.add("speed")
     changes = {name: ChannelChange(time, values, start, held=name in held) for name, values in channels.items()}
-    force = hit.contact_force
-    if not np.any(force) or (changes["torque"].is_nothing and changes["speed"].is_nothing):
-        raise RecordingError(
-            f"the contact at {start:.3f} s changes nothing in the model", "its obstacle or its drives never act"
-        )
-    separation = separation_time(time, force)
-    until = min(start + RELIABLE_FOR, separation)
-    reliable = time <= until
+    force = ChannelChange(time, hit.contact_force[:, np.newaxis], start)
+    wind_ups = (float(np.max(np.abs(free["wind_up"]))), float(np.max(np.abs(hit["wind_up"]))))
+    made = InjectedContact.of(changes, force, approach, wind_ups, assumption)
+    reliable = time <= made.reliable_until
     doubts = {
         Doubt.RIGID_DRIVE: model.is_rigid,
         Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, motions, reliable),
         Doubt.SLOPE_BEYOND_FREE_RUNS: _rises_beyond(model, hit, reliable),
-        Doubt.SEPARATION: separation < start + RELIABLE_FOR,
-        Doubt.CONTROLLER_UNKNOWN: assumption.controller is not ControllerReaction.KNOWN,
         Doubt.ACCELEROMETER_UNKNOWN: not knows_accelerometer,
     }
-    free_wind_up, wind_up = (float(np.max(np.abs(motion["wind_up"]))) for motion in motions)
-    return InjectedContact(
-        start=start,
-        changes=changes,
-        force=ChannelChange(time, force[:, np.newaxis], start),
-        peak_force=float(np.max(force)),
-        speed=approach,
-        reliable_until=until,
-        separation=separation,
-        free_wind_up=free_wind_up,
-        wind_up=wind_up,
-        assumption=assumption,
-        doubts=tuple(doubt for doubt, applies in doubts.items() if applies),
-    )
+    return made.with_doubts(doubts)
 
 
 def _filtered(model: RobotModel, change: FloatArray, period: float, channel: str) -> FloatArray:

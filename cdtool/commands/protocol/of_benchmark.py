@@ -9,11 +9,27 @@ from pathlib import Path
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import plain
 from cdtool.commands.protocol.assessment.protocol import Protocol
-from cdtool.commands.protocol.document.names import protocol_names
 from cdtool.commands.protocol.protocol_file import ProtocolTable, has_protocol, read_protocol_file
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.results.evaluated import Evaluated
+
+ENDINGS = ("protocol.pdf", "protocol.html", "protokoll.pdf", "protokoll.html")
+# The names of a report and of a figure, as the documentation gives them.
+_OTHERS = ("report", "latency")
+
+
+def protocol_names(targets: Sequence[Path], is_wanted: bool) -> tuple[list[Path], list[Path]]:
+    """Return the targets that are test protocols, and the others.
+
+    A name that ends like gate-7-protocol.pdf or Prüfprotokoll.html is one. If a protocol `is_wanted` and there is no
+    such name, every PDF and HTML is one, except report.html and latency.pdf.
+    """
+    named = [target for target in targets if target.name.lower().endswith(ENDINGS)]
+    if is_wanted and not named:
+        pages = (target for target in targets if target.suffix.lower() in (".pdf", ".html"))
+        named = [target for target in pages if target.stem.lower() not in _OTHERS]
+    return named, [target for target in targets if target not in named]
 
 
 class ProtocolOfBenchmark:

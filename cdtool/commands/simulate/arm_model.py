@@ -7,7 +7,6 @@ speed loops commands their torques (thesis 6.2). Its numbers are assumptions: se
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,7 +19,6 @@ from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial, requir
 
 Array = npt.NDArray[np.float64]
 Impact = Literal["none", "stiff", "soft"]
-Friction = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -51,15 +49,13 @@ def simulate_arm_run(
     trial: Trial,
     impact: Impact,
     substeps: int = 5,
-    added_friction: Friction | None = None,
 ) -> ArmRun:
     """Simulate one stroke from rest, free or against a stiff or soft (bumper) obstacle.
 
     Trial 1: the arm's own contact point meets the obstacle, the forearm upright. Trial 2: the level forearm is
     carried up against a horizontal plate. All random numbers are drawn before the integration, sample by sample:
     the same seed gives the same run up to the contact whatever `impact` is, and the same noise whatever `substeps`
-    (of a log period) is. `added_friction`: a torque on the arm, the first link, against its motion [N m], of the log's
-    time [s]. Raises `UsageError` for unknown `trial` or `impact`, `substeps` < 1.
+    (of a log period) is. Raises `UsageError` for unknown `trial` or `impact`, `substeps` < 1.
     """
     require_trial(trial)
     if impact not in arm_kernel.CONTACT_KINDS:
@@ -75,8 +71,6 @@ def simulate_arm_run(
     noise = rng.standard_normal((time.size, 9))
     deviation, rate = parameters.disturbance_torque, parameters.disturbance_rate
     disturbance = np.array([sensors.coloured_noise(noise[:, joint], deviation, rate, period) for joint in (0, 1)])
-    if added_friction is not None:
-        disturbance[0] -= added_friction(time)
     reference = parameters.reference(trial, time)
     obstacle = parameters.obstacle(trial, angle)
     start = parameters.equilibrium(trial)

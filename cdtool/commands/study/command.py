@@ -74,21 +74,6 @@ def sensors(
         _show(done)
 
 
-@study.command("figures", short_help="Draw the thesis's figures of impacts.", epilog=statuses_words("study figures"))
-def figures(
-    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")],
-    force: ForceOption = False,
-) -> None:
-    """Draw the thesis's figures of impacts: 3.2, 3.4, 3.5, 4.3, 4.4, 4.7 and 4.10.
-
-    Example: cdtool study figures -o figures
-    """
-    from cdtool.commands.study.impact_plots import draw_impact_figures
-
-    for path in draw_impact_figures(output, force=force):
-        print_line(plain(path))
-
-
 def _show(done: SensorStudy) -> None:
     ranking = done.ranking
     case = ranking.case

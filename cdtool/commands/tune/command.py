@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.base.plain_text import counted
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import (
     leave,
@@ -27,8 +25,6 @@ from cdtool.commands.console.place import Place, location
 if TYPE_CHECKING:
     from cdtool.commands.tune.tuned_rows import Tuning
 
-_SHOWN = 110
-
 
 def tune(
     file: Annotated[
@@ -44,9 +40,7 @@ def tune(
             "--false-alarm-budget", help="As 1/100op or 0.1/h: met on average; 1/100op at 95%: with that confidence."
         ),
     ],
-    output: Annotated[
-        Place, typer.Option("--output", "-o", parser=location, help="Folder for what is tuned, and for the search.")
-    ],
+    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Folder for what is tuned.")],
     detectors: DetectorsOption = None,
     settings: SetOption = None,
     force: ForceOption = False,
@@ -71,11 +65,10 @@ def tune(
 
     names, others = detectors_of(listed(detectors or ""), given_settings(settings or ()))
     setup = read_benchmark_file(file, detectors=names, settings=others, command="tune")
-    watch = _unwatched if quiet else _watch
-    options = TuningOptions.of(setup, false_alarm_budget, detectors=names, workers=Workers(jobs), watch=watch)
-    searches = open_folder(output, setup.inputs, setup.detectors, force=force)
+    options = TuningOptions.of(setup, false_alarm_budget, detectors=names)
+    open_folder(output, setup.inputs, setup.detectors, force=force)
     with progress("tuning", quiet=quiet) as advance:
-        done = tune_detectors(setup, replace(options, journals=searches, workers=Workers(jobs, progress=advance)))
+        done = tune_detectors(setup, replace(options, workers=Workers(jobs, progress=advance)))
     written = write_tuning(done, output)
     left_out = [*done.left_out, *(Skipped(name, f"not tuned: {reason}") for name, reason in done.unusable.items())]
     print_skipped(left_out, done.findings)
@@ -86,17 +79,6 @@ def tune(
         for path in () if quiet else written:
             print_line(f"written: {plain(path)}")
     leave(left_out, done.findings)
-
-
-def _watch(detector: str, count: int, best: str) -> None:
-    """Print the best so far to a terminal, after each round of a search."""
-    if sys.stderr.isatty():
-        words = f"{detector}: {counted(count, 'candidate')}, best so far: {best}"
-        print_line(plain(words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."), err=True)
-
-
-def _unwatched(detector: str, count: int, best: str) -> None:
-    pass
 
 
 def _show(done: Tuning, *, quiet: bool) -> None:

@@ -27,7 +27,7 @@ from cdtool.commands.tune.tuned_files import (
 from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.formats.signature_store import SIGNATURE, write_signature
 
-PAGE, JSON, SEARCH = "tuning.html", "tuning.json", "search"
+PAGE, JSON = "tuning.html", "tuning.json"
 _KINDS = {
     ".toml": Kind(MARK.encode(), "file of cdtool tune"),
     ".html": Kind(b"<title>Tuning", "report of cdtool tune"),
@@ -47,7 +47,7 @@ def check_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] 
     `cdtool tune` did not write, unless `force`.
     """
     if is_remote(folder):
-        raise UsageError(f"--output is '{plain(folder)}'", "give a folder of this machine: the search is kept there")
+        raise UsageError(f"--output is '{plain(folder)}'", "give a folder of this machine")
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"{plain(folder)}: exists and is not a folder", "choose another name")
     kinds = {folder / name: _KINDS[Path(name).suffix] for name in (MACHINE, "benchmark.toml", PAGE, JSON)}
@@ -62,14 +62,13 @@ def check_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] 
         refuse_other_kind(target, kind, force=force)
 
 
-def open_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] = (), *, force: bool = False) -> Path:
-    """Create the output folder and return that of the searches in it; raises UsageError (see `check_folder`)."""
+def open_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] = (), *, force: bool = False) -> None:
+    """Create the output folder before the search; raises UsageError (see `check_folder`)."""
     check_folder(folder, inputs, detectors, force=force)
     try:
-        (folder / SEARCH).mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as fault:
         raise UsageError(f"{plain(folder)}: cannot be created: {fault.strerror}", "choose another name") from fault
-    return folder / SEARCH
 
 
 def write_tuning(tuning: Tuning, folder: Path) -> tuple[Path, ...]:

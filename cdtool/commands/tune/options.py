@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from cdtool.base.errors import FieldsError, nearest
@@ -15,13 +14,6 @@ from cdtool.commands.tune.search.objective import WORSE_AT_MOST, Goal
 from cdtool.execution.workers import Workers
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.thresholds import THRESHOLDS
-
-# Called after each round of a search: the detector, the candidates measured so far, and the best so far in words.
-Watch = Callable[[str, int, str], None]
-
-
-def unwatched(detector: str, count: int, best: str) -> None:
-    """Ignore a round of a search."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,9 +50,7 @@ class TuningOptions(TuneTable):
 
     false_alarm_budget: str
     detectors: Sequence[str] = ()
-    journals: Path | None = None
     workers: Workers | None = None
-    watch: Watch = unwatched
 
     table: ClassVar[type[TuneTable]] = TuneTable
 

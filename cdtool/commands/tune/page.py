@@ -7,13 +7,12 @@ from dataclasses import replace
 from functools import partial
 
 from cdtool.base.plain_text import counted
-from cdtool.commands.tune.plots import draw_pareto, draw_sensitivity
 from cdtool.commands.tune.search.objective import Goal
-from cdtool.commands.tune.search.tuned import ChoiceResults, GroupResults, ParetoPoint, Sensitivity, TunedDetector
+from cdtool.commands.tune.search.tuned import ChoiceResults, GroupResults, Sensitivity, TunedDetector
 from cdtool.commands.tune.tuned_files import described_choice
 from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.report.html.page_tables import visible
-from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
+from cdtool.report.html.sections_page import PageSection, SectionsPage, left_out_sections
 from cdtool.report.model import NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number, short
 from cdtool.report.table import Cell, Heading, Table, count_cell, interval_cell, number_cell, tabulate
@@ -45,7 +44,7 @@ def tuning_html(tuning: Tuning) -> str:
         )
     ]
     for tuned in tuning.detectors:
-        sections += _sections_of(tuning, tuned)
+        sections += _sections_of(tuned)
     if tuning.unusable:
         rows = [[Cell(visible(name)), Cell(visible(reason))] for name, reason in tuning.unusable.items()]
         table = Table("unusable", "Detectors that could not be tuned", (Heading("detector"), Heading("reason")), rows)
@@ -60,7 +59,7 @@ def tuning_html(tuning: Tuning) -> str:
         visible(f"From {counted(len(tuning.runs.operations), 'impact-free run')} and contacts: {contacts}."),
         tone,
         (f"minimised: {_GOALS[tuning.options.objective]}", f"seed {tuning.options.seed}"),
-        tuple(section for section in sections if section.tables or section.images or section.note),
+        tuple(section for section in sections if section.tables or section.note),
     ).html()
 
 
@@ -141,29 +140,18 @@ def rejection_words(tuned: TunedDetector) -> list[str]:
     ]
 
 
-def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
-    name, groups = visible(tuned.detector), list(tuned.apparent.groups)
-    tables = [_results_table(tuned)]
-    if tuned.steps:
-        rows = [[Cell(item.name), Cell(f"{100.0 * item.saved:.1f} %")] for item in tuned.steps]
-        tables.append(Table("steps", "What each choice saved of the cost", (Heading("choice"), Heading("saved")), rows))
-    figures = []
-    if len(groups) > 1 and tuned.pareto and all(len(point.costs) > 1 for point in tuned.pareto):
-        words = "Apparent costs of two groups: a choice with less in one of them has more in the other."
-        figures.append((partial(draw_pareto, tuned, groups, tuning.options.objective), words))
-    if any(len(item.tried) > 1 for item in tuned.sensitivities):
-        words = "Cost around the choice, one gain or setting changed at a time; grey: at most 5 % more."
-        figures.append((partial(draw_sensitivity, tuned.sensitivities), words))
+def _sections_of(tuned: TunedDetector) -> list[PageSection]:
+    name = visible(tuned.detector)
     note = "" if not tuned.default_reason else f"The default cannot be used: {visible(tuned.default_reason)}. "
     note += " ".join(f"{words}." for words in rejection_words(tuned))
-    more = [_sensitivity_table(tuned.sensitivities), _pareto_table(tuned.pareto, groups)]
+    more = [_sensitivity_table(tuned.sensitivities)]
     if tuned.chosen_in_folds:
         rows = [[Cell(str(number)), Cell(visible(text))] for number, text in enumerate(tuned.chosen_in_folds, 1)]
         columns = (Heading("without fold"), Heading("choice"))
         more.append(Table("folds", "What is chosen without a fifth of the recordings", columns, rows))
     return [
-        PageSection(f"{name}: results", tuple(tables), note=note),
-        PageSection(f"{name}: around the choice", tuple(more), images_of(figures)),
+        PageSection(f"{name}: results", (_results_table(tuned),), note=note),
+        PageSection(f"{name}: around the choice", tuple(more)),
     ]
 
 
@@ -208,23 +196,3 @@ def _sensitivity_table(items: Sequence[Sensitivity]) -> Table:
         ),
     )
     return tabulate("sensitivity", "How flat the optimum is", fields, items)
-
-
-def _pareto_table(points: Sequence[ParetoPoint], groups: Sequence[str]) -> Table:
-    fields = [
-        (Heading("threshold"), lambda item: Cell(item.candidate.rule.name)),
-        (Heading("settings"), lambda item: Cell(visible(_settings(item)))),
-        (Heading("debounce"), lambda item: Cell(item.debounce)),
-    ]
-    for place, name in enumerate(groups):
-        fields.append((Heading(visible(name), numeric=True), partial(_cost_cell, place)))
-    return tabulate("pareto", "Choices that none beats in every group (apparent costs)", fields, points, most=20)
-
-
-def _cost_cell(place: int, item: ParetoPoint) -> Cell:
-    return number_cell(item.costs[place]) if place < len(item.costs) else Cell(NOTHING)
-
-
-def _settings(item: ParetoPoint) -> str:
-    rule = item.candidate.rule
-    return ", ".join(f"{name} {short(getattr(rule, name))}" for name in getattr(rule, "searched", {})) or NOTHING

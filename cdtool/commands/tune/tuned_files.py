@@ -130,7 +130,7 @@ def _rebase(document: Any, base: Path, folder: Path) -> None:
         _rebase_logs(condition.get("holdout", {}), base, folder)
     if "labels" in document.get("onset", {}):
         document["onset"]["labels"] = LABELS
-    for name, key in (("force", "limits"), ("inject", "obstacle_file"), ("inject", "folder")):
+    for name, key in (("force", "limits"), ("inject", "folder")):
         if key in document.get(name, {}):
             document[name][key] = relative_name(joined(base, str(document[name][key])), folder)
     if "inject" in document and "folder" not in document["inject"]:
@@ -199,8 +199,7 @@ def _why(tuning: Tuning, tuned: TunedDetector) -> list[str]:
         if tuned.nested
         else "# These results are apparent: on the recordings used for the choice. Check them on others."
     )
-    saved = ", ".join(f"{item.name} {100.0 * item.saved:.0f} %" for item in tuned.steps)
-    return [*lines, *([f"# What each choice saved: {saved}."] if saved else [])]
+    return lines
 
 
 def factor_words(tuning: Tuning, tuned: TunedDetector) -> str:
@@ -276,11 +275,6 @@ def _tuned_values(tuned: TunedDetector) -> dict[str, Any]:
                 "tried": [[one.value, one.cost_ratio] for one in item.tried],
             }
             for item in tuned.sensitivities
-        ],
-        "contributions": {item.name: item.saved for item in tuned.steps},
-        "pareto": [
-            {**_candidate(item.candidate), "debounce": item.debounce, "costs": list(item.costs)}
-            for item in tuned.pareto
         ],
         "candidates": tuned.candidates,
         "unusable": dict(tuned.unusable),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +22,7 @@ from cdtool.commands.scoring.benchmark_file import (
     refuse_limits_by_hand,
     with_detectors,
 )
-from cdtool.commands.scoring.store.determinants import how_logs_are_read
-from cdtool.commands.tune.journal import TuningJournal
-from cdtool.commands.tune.options import TuningOptions, Watch, unwatched
+from cdtool.commands.tune.options import TuningOptions
 from cdtool.commands.tune.recordings_to_tune import ReadRecordings, read_recordings, to_check
 from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.search.candidate import Candidate, Measured
@@ -41,23 +39,15 @@ from cdtool.commands.tune.search.tuned import (
     TunedDetector,
     apparent_results,
     held_out_results,
-    pareto_of,
     sensitivities_of,
     settings_of,
-    steps_of,
-    tried_costs_of,
 )
-from cdtool.execution.store.digest import code_version, digest_of
 from cdtool.execution.workers import Workers, in_order
 from cdtool.recordings.motion.applicable import HOLD
-from cdtool.recordings.operations import Operation
 from cdtool.results.results import Skipped
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.settings import with_context
-
-if TYPE_CHECKING:
-    pass
 
 # A statistic may be assessable for less time than its signal.
 _SPARE = 1.1
@@ -69,9 +59,7 @@ def tune(  # the public function: a keyword for each setting
     *,
     detectors: Sequence[str] = (),
     settings: Mapping[str, Any] | None = None,
-    journals: Path | None = None,
     workers: Workers | None = None,
-    watch: Watch = unwatched,
 ) -> TuningResult:
     """Search gains, threshold and debounce of the detectors of a benchmark file at a false-alarm budget.
 
@@ -86,12 +74,8 @@ def tune(  # the public function: a keyword for each setting
         Detectors in place of the file's.
     settings : mapping, optional
         Values in place of keys of the file, as {"tune.objective": "p95"}; docs/tuning.md has those of [tune].
-    journals : Path, optional
-        A folder for what is measured, from which an interrupted search goes on.
     workers : Workers, optional
         How many candidates are measured at a time; the result does not depend on it.
-    watch : callable, optional
-        Called after each round of a search with the detector, the number of candidates and the best one so far.
 
     Returns
     -------
@@ -115,8 +99,7 @@ def tune(  # the public function: a keyword for each setting
     if not isinstance(file, BenchmarkFile):
         detectors, others = detectors_of(detectors, settings)
         file = read_benchmark_file(file, detectors=detectors, settings=others, command="tune")
-    more = {"journals": journals, "workers": workers, "watch": watch}
-    return tune_detectors(file, TuningOptions.of(file, false_alarm_budget, detectors=detectors, **more))
+    return tune_detectors(file, TuningOptions.of(file, false_alarm_budget, detectors=detectors, workers=workers))
 
 
 def tune_detectors(setup: BenchmarkFile, options: TuningOptions) -> TuningResult:
@@ -135,7 +118,7 @@ def tune_detectors(setup: BenchmarkFile, options: TuningOptions) -> TuningResult
         skipped = list(read.skipped)
         for name in setup.detectors:
             try:
-                tuned, left_out = _TuningOf(setup, options, read, name, workers).tuned(options.journals, options.watch)
+                tuned, left_out = _TuningOf(setup, options, read, name, workers).tuned()
             except CdtoolError as fault:
                 unusable[name] = fault.message
                 continue
@@ -193,7 +176,7 @@ class _TuningOf:
     name: str
     workers: Workers
 
-    def tuned(self, journals: Path | None, watch: Watch) -> tuple[TunedDetector, list[Skipped]]:
+    def tuned(self) -> tuple[TunedDetector, list[Skipped]]:
         """Return the tuned detector, and the recordings that it cannot use."""
         recordings, signals, skipped = self._usable()
         period = float(np.median([signal.period for _, signal in signals[0]]))
@@ -203,21 +186,12 @@ class _TuningOf:
         measuring = self._measuring(recordings, activations)
         measuring.remember(default, signals)
         objective = Objective(self.options.objective, recordings, self.options.worse_at_most)
-        journal = self._journal(journals, measuring)
         words = [_debounce_words(activation) for activation in activations]
         gains = movable_gains(self._detector, default)
-        measure = _MeasuresAll(measuring, self.workers, journal)
+        measure = _MeasuresAll(measuring, self.workers)
         channels = set.intersection(*(set(run.operation.recording.channels) for run in recordings.free))
         grid = [Candidate(default.gains, item) for item in self._rules(rule, channels)]
-        found = search(
-            default,
-            0,
-            grid,
-            gains,
-            objective,
-            measure,
-            lambda count, best: watch(self.name, count, in_words(best, words, gains) if best else ""),
-        )
+        found = search(default, 0, grid, gains, objective, measure)
         if not np.isfinite(found.best.score):
             reason = found.measured[default.key].reason or "no candidate is acceptable"
             raise UsageError(f"{self.name} cannot be tuned: {reason}", "check the logs with cdtool info")
@@ -304,29 +278,6 @@ class _TuningOf:
             recordings, machine, self._detector, setup.watched, self.options.budget, activations, learned, hold
         )
 
-    def _journal(self, folder: Path | None, measuring: Measuring) -> TuningJournal | None:
-        if folder is None:
-            return None
-        recordings = measuring.recordings
-        free = [(_part_of_log(run.operation), run.fold) for run in recordings.free]
-        struck = [
-            (list(map(_part_of_log, log.operations)), log.group, log.fold, log.window, log.contacts, log.curves)
-            for log in recordings.struck
-        ]
-        key = digest_of(
-            code_version(),
-            how_logs_are_read(self.setup),
-            self._detector,
-            self.setup.watched,
-            self.options.budget,
-            measuring.activations,
-            measuring.hold,
-            recordings.is_nested,
-            free,
-            struck,
-        )
-        return TuningJournal(folder / f"{self.name}.jsonl", key)
-
     def _result(
         self, found: Searched, objective: Objective, measure: _MeasuresAll, debounces: list[int], words: list[str]
     ) -> TunedDetector:
@@ -362,14 +313,11 @@ class _TuningOf:
             default_nested=default_nested,
             default_reason=default_reason,
             sensitivities=sensitivities_of(found, best, debounces, gains),
-            steps=steps_of(found, best),
-            pareto=pareto_of(objective, found, words),
             candidates=len(found.measured),
             unusable=unusable,
             chosen_in_folds=tuple(in_words(item, words, gains) for item in chosen),
             rejected=tuple(rejected),
             why_not_nested=why,
-            tried_costs=tried_costs_of(objective, found),
         )
 
 
@@ -401,12 +349,6 @@ def _checked_choice(
         rejected.append(Rejection(best.candidate.rule.name, group, float(ratios[worst])))
 
 
-def _part_of_log(operation: Operation) -> tuple[str, int, float, float]:
-    """Return what identifies an operation: the log's content, and the part of it."""
-    part = operation.recording
-    return part.digest, operation.number, part.start, part.end
-
-
 def learned(rule: Threshold, pairs: Sequence[Pair]) -> tuple[FittedThreshold, ...]:
     """Return the thresholds that a rule learns from runs; raises SignatureError, also for a run that is left out."""
     return fitting(rule)(pairs).thresholds
@@ -431,22 +373,15 @@ def in_words(item: Scored, debounces: Sequence[str], gains: Sequence[str]) -> st
 
 @dataclass(frozen=True)
 class _MeasuresAll:
-    """Measures candidates and choices with several workers; what a journal has is not measured again."""
+    """Measures candidates and choices with several workers."""
 
     measuring: Measuring
     workers: Workers
-    journal: TuningJournal | None
     _held_out: dict[tuple[str, int, int], HeldOut] = field(default_factory=dict)
 
     def __call__(self, candidates: Sequence[Candidate]) -> list[Measured]:
         """Return what each candidate gives."""
-        known: dict[str, Measured] = dict(self.journal.known) if self.journal else {}
-        new = [item for item in candidates if item.key not in known]
-        for item, made in zip(new, self._all(new), strict=True):
-            known[item.key] = made
-            if self.journal:
-                self.journal.add(item, made)
-        return [known[item.key] for item in candidates]
+        return list(self._all(candidates))
 
     def held_out(self, chosen: Sequence[Scored]) -> list[HeldOut]:
         """Return what the choice without each fold gives on that fold."""

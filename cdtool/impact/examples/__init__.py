@@ -1,1 +1,1 @@
-"""Impacts with numbers, for the figures, the pages and the tests: chapter_3.py, chapter_4.py (Table 4.1)."""
+"""The drive of Table 4.1 of the thesis with numbers, for the pages and the tests."""

@@ -229,8 +229,6 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
         "study", "sensors", "-m", GATE / "machine.toml", "--set", "impact.speed=0.2"
     ),
     ("study sensors", 2): lambda f: cdtool("study", "sensors", "-m", f.absent),
-    ("study figures", 0): lambda f: cdtool("study", "figures", "-o", f.path / "figures"),
-    ("study figures", 2): lambda f: cdtool("study", "figures", "-o", f.empty),
     ("list", 0): lambda _: cdtool("list", "machines"),
     ("list", 2): lambda _: cdtool("list", "nothing"),
     ("list", 3): _broken_plugin,

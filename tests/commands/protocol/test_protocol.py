@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.base.errors import MistakesError
-from cdtool.commands.protocol.document.names import protocol_names
+from cdtool.commands.protocol.of_benchmark import protocol_names
 from cdtool.commands.protocol.protocol_file import read_protocol_file
 from tests.command import Outcome, cdtool
 from tests.synthetic.force_rig import half_sine, write_protocol, write_rig

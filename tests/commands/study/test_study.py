@@ -151,17 +151,6 @@ def test_a_derivative_part_and_a_force_limit_of_the_controller_count(tmp_path):
     assert held["peak_force_n"] < 0.85 * plain["peak_force_n"]
 
 
-def test_the_figures_of_the_thesis_are_drawn_again(tmp_path):
-    done = cdtool("study", "figures", "-o", tmp_path / "new")
-    assert (done.status, done.err) == (0, "")
-    written = [Path(line) for line in done.out.splitlines()]
-    assert {"transmission_course.png", "transmission_rigid.png", "transmission_elastic.png", "sensor_ranking.png"} <= {
-        path.name for path in written
-    }
-    assert all(path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size < 200_000 for path in written)
-    assert len(written) >= 7
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -15,7 +15,6 @@ from cdtool import simulate_gate
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.files.bounded_loading import parse_toml
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.commands.tune import tuning as module
 from cdtool.commands.tune.command import _show
 from cdtool.commands.tune.files import open_folder, write_tuning
 from cdtool.commands.tune.options import TuningOptions
@@ -54,20 +53,13 @@ def quick(gate: Path) -> BenchmarkFile:
 
 
 @pytest.fixture(scope="module")
-def journals(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("journals")
+def done(gate: Path):
+    return tune(read_benchmark_file(gate / "benchmark.toml"), OPTIONS)
 
 
 @pytest.fixture(scope="module")
-def done(gate: Path, journals: Path):
-    return tune(read_benchmark_file(gate / "benchmark.toml"), OPTIONS, journals=journals)
-
-
-@pytest.fixture(scope="module")
-def written(done, gate: Path, journals: Path, tmp_path_factory: pytest.TempPathFactory):
-    """The command, which goes on with the search of `done`."""
+def written(gate: Path, tmp_path_factory: pytest.TempPathFactory):
     folder = tmp_path_factory.mktemp("out") / "tuned"
-    shutil.copytree(journals, folder / "search")
     outcome = command("tune", gate / "benchmark.toml", *ARGUMENTS, "-o", folder)
     assert outcome.status == 0, outcome.err
     return folder, outcome
@@ -105,28 +97,9 @@ def test_every_surface_opens_with_the_worst_fact_of_a_tuning(name, done, capsys)
     assert f"<p>Tuned: {made.verdict[1]}</p>" in made._repr_html_()
 
 
-def test_the_result_depends_on_neither_the_number_of_workers_nor_on_an_interruption(quick, tmp_path):
-    first = tune(quick, QUICK, journals=tmp_path)
-    expected = json.dumps(tuning_summary(first), default=str)
-    two = tune(quick, QUICK, workers=Workers(2))
-    assert json.dumps(tuning_summary(two), default=str) == expected
-    journal = tmp_path / "momentum.jsonl"
-    text = journal.read_text(encoding="utf-8")
-    journal.write_text(text[: int(0.6 * len(text))], encoding="utf-8")
-    again = tune(quick, QUICK, journals=tmp_path)
-    assert json.dumps(tuning_summary(again), default=str) == expected
-    assert sorted(journal.read_text(encoding="utf-8").splitlines()) == sorted(text.splitlines())
-
-
-def test_a_search_that_is_complete_is_not_measured_again(quick, tmp_path, monkeypatch):
-    tune(quick, QUICK, journals=tmp_path)
-    measured = []
-    usual = module.Measuring._measured
-    monkeypatch.setattr(module.Measuring, "_measured", lambda own, item: measured.append(item) or usual(own, item))
-    tune(quick, QUICK, journals=tmp_path)
-    assert measured == []
-    tune(quick, replace(QUICK, false_alarm_budget="1/6op"), journals=tmp_path)
-    assert measured
+def test_the_result_does_not_depend_on_the_number_of_workers(quick):
+    expected = json.dumps(tuning_summary(tune(quick, QUICK)), default=str)
+    assert json.dumps(tuning_summary(tune(quick, QUICK, workers=Workers(2))), default=str) == expected
 
 
 @pytest.mark.parametrize("goal", ["p95", "force"])
@@ -148,7 +121,6 @@ def test_the_files_can_be_used(written, gate):
         "signature_momentum.json",
         "tuning.html",
         "tuning.json",
-        "search",
     }
     made = api.benchmark(folder / "benchmark.toml").results
     summary = json.loads((folder / "tuning.json").read_text(encoding="utf-8"))
@@ -180,11 +152,11 @@ def test_files_state_what_was_chosen_and_why(written):
 def test_it_may_run_again_into_its_folder_but_replaces_no_other_file(written, tmp_path):
     folder = tmp_path / "tuned"
     shutil.copytree(written[0], folder)
-    assert open_folder(folder, ()) == folder / "search"
+    open_folder(folder, ())
     (folder / "machine.toml").write_text("[machine]\n", encoding="utf-8")
     with pytest.raises(UsageError, match="already exists and contains no file of cdtool tune"):
         open_folder(folder, ())
-    assert open_folder(folder, (), force=True).is_dir()
+    open_folder(folder, (), force=True)
     with pytest.raises(UsageError, match="exists and is not a folder"):
         open_folder(folder / "tuning.html", ())
 

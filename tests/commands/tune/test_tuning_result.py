@@ -1,4 +1,4 @@
-"""The result of a tuning: one line, a DataFrame, the figures of its report, and its files."""
+"""The result of a tuning: one line, a DataFrame, and its files."""
 
 from __future__ import annotations
 

@@ -1,24 +1,22 @@
-"""The files of the map that `cdtool inject` writes, by suffix: figure, HTML page, JSON."""
+"""The files of the map that `cdtool inject` writes, by suffix: HTML page, JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from cdtool.base.files.foreign import FIGURES, Kind, refuse_inputs, refuse_other_kind
+from cdtool.base.files.foreign import Kind, refuse_inputs, refuse_other_kind
 from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.commands.inject.coverage.coverage import Coverage
-from cdtool.commands.inject.coverage.coverage_map import CellKey, CoverageMap, MapCell
-from cdtool.report.number_text import number
+from cdtool.commands.inject.coverage.coverage_map import CellKey, MapCell
 from cdtool.report.output_names import check_output_names
 
 PAGE, JSON = ".html", ".json"
 _TOOL = "cdtool inject"
 _KINDS: Mapping[str, Kind] = {
-    **FIGURES,
     PAGE: Kind(b"<title>Coverage", f"HTML page of {_TOOL}"),
     JSON: Kind(f'"tool": "{_TOOL}"'.encode(), f"map of {_TOOL}"),
 }
@@ -37,15 +35,9 @@ def check_coverage_files(targets: Sequence[Path], inputs: Sequence[Path], *, for
 
 
 def write_coverage(done: Coverage, targets: Sequence[Path]) -> None:
-    """Write each target by its suffix; page and JSON are replaced together, or none. Raises UsageError, OutputError."""
+    """Write each target by its suffix, all or none. Raises UsageError, OutputError."""
     refuse_inputs(targets, done.inputs)
-    figures = [target for target in targets if target.suffix.lower() in FIGURES]
-    texts = {target: _text(done, target) for target in targets if target not in figures}
-    for figure in figures:
-        from cdtool.commands.inject.coverage.plot import plot_coverage
-
-        plot_coverage(_with_panel_per_speed(done.map), done.machine, figure)
-    write_texts(texts)
+    write_texts({target: _text(done, target) for target in targets})
 
 
 def _text(done: Coverage, target: Path) -> str:
@@ -80,17 +72,3 @@ def _cell(detector: str, key: CellKey, cell: MapCell) -> dict[str, Any]:
     telling = cell.telling
     reason = None if telling is None else telling.name.lower()
     return {"detector": detector, **asdict(key), **asdict(cell), "telling": reason}
-
-
-def _with_panel_per_speed(made: CoverageMap) -> CoverageMap:
-    """Return the map with a panel per detector and class of speed, for the figure, which has two axes."""
-    if len(made.speeds) < 2:
-        return made
-    panels = {
-        f"{name}, {number(speed.speed)} {made.speed_unit}": {
-            replace(key, speed=None): cell for key, cell in cells.items() if key.speed == speed.speed
-        }
-        for name, cells in made.cells.items()
-        for speed in made.speeds
-    }
-    return replace(made, cells=panels)

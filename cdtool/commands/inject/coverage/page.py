@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -28,9 +27,9 @@ from cdtool.commands.inject.coverage.coverage_map import (
 )
 from cdtool.commands.inject.coverage.coverage_map import MapCell as MapCell
 from cdtool.detectors.detection import REASONS
-from cdtool.report.csv_text import csv_lines
 from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.plots import css_colour
+from cdtool.report.html.sections_page import left_out_sections
 from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json
 from cdtool.report.html.traces import HEIGHTS, trace_data
 from cdtool.report.model import AXES, NO_CERTIFICATE
@@ -129,8 +128,7 @@ def coverage_html(done: Coverage) -> str:
         missed=_missed_table(made, missed) if missed else None,
         few=len(missed) <= _FEW,
         telling=_telling_table(made, telling) if telling else None,
-        csv=_telling_csv(made, telling),
-        left_out=_left_out(done),
+        left_out=left_out_sections(tuple(dict.fromkeys(done.skipped)), tuple(dict.fromkeys(done.findings)))[0].tables,
         classes=classes,
     )
 
@@ -208,7 +206,7 @@ def _map(
             _page_cell(made.cells[name][key], numbers[name, key], scale) if key in made.cells[name] else None
             for key in keys
         ]
-        rows.append((_spring(stiffness), tuple(cells)))
+        rows.append((in_n_per_mm(stiffness), tuple(cells)))
     return PageMap(visible(name), _speed_words(made, speed), tuple(rows))
 
 
@@ -254,7 +252,8 @@ def _short(value: float) -> str:
     return digits(float(f"{value:.3g}"))
 
 
-def _spring(stiffness: float) -> str:
+def in_n_per_mm(stiffness: float) -> str:
+    """Return a stiffness [N/m] in N/mm, as a text."""
     return _short(stiffness / 1e3)
 
 
@@ -265,7 +264,7 @@ def _place_fields(made: CoverageMap) -> list[tuple[Heading, Any]]:
         (Heading(f"position [{made.unit}]", numeric=True), lambda item: number_cell(item[1].position)),
         (
             Heading("stiffness [N/mm]", numeric=True),
-            lambda item: Cell(_spring(item[1].stiffness), key=item[1].stiffness),
+            lambda item: Cell(in_n_per_mm(item[1].stiffness), key=item[1].stiffness),
         ),
     ]
     if len(made.speeds) > 1:
@@ -315,35 +314,6 @@ def _plan(item: TellingCell) -> str:
     if not std > 0.0:
         return NOTHING
     return f"cdtool plan --difference-ms {number(item.cell.uncertainty_ms)} --std-ms {number(std)} --unpaired"
-
-
-def _telling_csv(made: CoverageMap, items: Sequence[TellingCell]) -> list[str]:
-    names = ["detector", f"position_{made.unit}", "stiffness_n_per_mm", "speed", "reason", "missed", "assessable"]
-    names += ["latency_low_ms", "latency_high_ms", "std_ms", "plan"]
-    rows = (
-        (
-            *(item.detector, item.key.position, float(_spring(item.key.stiffness)), item.key.speed),
-            *(item.reason.name.lower(), item.cell.missed, item.cell.assessable),
-            *(_rounded(value) for value in (*item.cell.range_ms, item.cell.standard_deviation_ms)),
-            "" if _plan(item) == NOTHING else _plan(item),
-        )
-        for item in items
-    )
-    return [line.rstrip("\n") for line in csv_lines(names, rows)]
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.4g}")
-
-
-def _left_out(done: Coverage) -> list[Table]:
-    tables = []
-    for name, title, items in (("skipped", "Left out", done.skipped), ("findings", "Warnings", done.findings)):
-        if items:
-            counts = Counter((item.recording, item.reason) for item in items)
-            rows = [[name_cell(visible(where)), Cell(visible(reason))] for where, reason in counts]
-            tables.append(Table(name, title, (Heading("recording"), Heading("reason")), rows))
-    return tables
 
 
 def _traces(done: Coverage) -> dict[str, dict[str, Any]]:
@@ -399,7 +369,7 @@ def _detector(name: str) -> dict[str, str]:
 
 def _title(made: CoverageMap, name: str, key: CellKey) -> str:
     speed = "" if key.speed is None else f", {number(key.speed)} {made.speed_unit}"
-    return f"{visible(name)}: {_short(key.position)} {made.unit}, {_spring(key.stiffness)} N/mm{speed}"
+    return f"{visible(name)}: {_short(key.position)} {made.unit}, {in_n_per_mm(key.stiffness)} N/mm{speed}"
 
 
 def _words(contact: CellContact, speed_unit: str) -> list[str]:

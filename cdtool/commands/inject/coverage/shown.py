@@ -10,7 +10,7 @@ from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import number, print_line, say, table
 from cdtool.commands.inject.coverage.coverage import Coverage
 from cdtool.commands.inject.coverage.coverage_map import CellKey, MapCell, TellingCell
-from cdtool.commands.inject.coverage.page import coverage_counts, coverage_headline, coverage_tone
+from cdtool.commands.inject.coverage.page import coverage_counts, coverage_headline, coverage_tone, in_n_per_mm
 
 
 def show_coverage(done: Coverage, *, quiet: bool) -> None:
@@ -32,7 +32,9 @@ def _show_table(done: Coverage) -> None:
                 keys = [CellKey(position, stiffness, speed.speed) for position in made.positions]
                 here = [cells[key] for key in keys if key in cells]
                 if here:
-                    rows.append((name, _spring(stiffness), *([number(speed.speed)] if by_speed else []), *_row(here)))
+                    rows.append(
+                        (name, in_n_per_mm(stiffness), *([number(speed.speed)] if by_speed else []), *_row(here))
+                    )
     columns = [("detector", "left"), ("stiffness\nN/mm", "right")]
     columns += [(f"speed\n{made.speed_unit}", "right")] if by_speed else []
     columns += [("contacts", "right"), ("missed", "right"), ("latency\nms", "right"), ("force at alarm\nN", "right")]
@@ -51,7 +53,7 @@ def _show_telling(done: Coverage) -> None:
         print_line("a test at the rig would tell most here:")
     for item in telling:
         speed_words = "" if item.key.speed is None else f", {item.key.speed:g} {made.speed_unit}"
-        where = f"{item.key.position:g} {made.unit}, {_spring(item.key.stiffness)} N/mm{speed_words}"
+        where = f"{item.key.position:g} {made.unit}, {in_n_per_mm(item.key.stiffness)} N/mm{speed_words}"
         print_line(f"  {item.detector} at {where}: {_why(item)}")
 
 
@@ -68,10 +70,6 @@ def _why(item: TellingCell) -> str:
         return f"{cell.missed} of {cell.assessable} missed"
     uncertain = f"+- {cell.uncertainty_ms:.0f} ms"
     return uncertain if cell.limit_ms is None else f"{uncertain}, limit {cell.limit_ms:g} ms"
-
-
-def _spring(stiffness: float) -> str:
-    return digits(float(f"{stiffness / 1e3:.3g}"))
 
 
 def _range(values: list[float]) -> str:

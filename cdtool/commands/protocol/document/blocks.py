@@ -10,12 +10,11 @@ Level = Literal[1, 2]
 
 @dataclass(frozen=True)
 class SectionHeading:
-    """A heading; `page_break`: it begins a new page; `label`: the name by which a `Reference` refers to it."""
+    """A heading; `page_break`: it begins a new page."""
 
     text: str
     level: Level = 1
     page_break: bool = False
-    label: str = ""
     kind: Literal["heading"] = "heading"
 
 
@@ -44,19 +43,6 @@ class Items:
 
     items: tuple[str, ...]
     kind: Literal["items"] = "items"
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A sentence that refers to the heading with the same `label`: as a link, or on paper with the number of its page.
-
-    `on_paper` has the placeholder {page}.
-    """
-
-    text: str
-    on_paper: str
-    label: str
-    kind: Literal["reference"] = "reference"
 
 
 @dataclass(frozen=True)
@@ -103,7 +89,7 @@ class Signatures:
     kind: Literal["signatures"] = "signatures"
 
 
-Block = SectionHeading | Paragraph | VerdictBox | Items | Reference | Facts | HeadedTable | CurveDrawing | Signatures
+Block = SectionHeading | Paragraph | VerdictBox | Items | Facts | HeadedTable | CurveDrawing | Signatures
 
 
 @dataclass(frozen=True)

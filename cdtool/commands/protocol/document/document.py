@@ -21,7 +21,6 @@ from cdtool.commands.protocol.document.blocks import (
     HeadedTable,
     Items,
     Paragraph,
-    Reference,
     SectionHeading,
     Signatures,
     VerdictBox,
@@ -39,12 +38,8 @@ from cdtool.commands.protocol.document.words import Words, words_of
 from cdtool.truth.force.limits import ForceProfile
 from cdtool.truth.force.verdict import PointVerdict
 
-# The first page: so many lines for reasons and notices, at least so many for the reasons, and those left for a second
-# outcome; with so many characters on each.
-_FIRST_LINES, _LEAST_LINES, _LEFT_LINES, _IN_A_LINE = 28, 12, 6, 95
 # Names of measuring points on the first page: so many characters.
 _NAMED = 200
-_ALL_REASONS = "all-reasons"
 # A page is as wide as so many forces beside each other; the next steps are in another table.
 _STEPS_IN_TABLE = 5
 
@@ -121,10 +116,12 @@ def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
         ("points", _first_names([point.point.name for point in points], words)),
     )
     yield Facts(tuple((words(f"field.{name}"), plain(words.value(value or None))) for name, value in shown))
-    yield from _first_reasons(protocol, words)
+    # The notices before the reasons: these may need more than the first page.
     yield SectionHeading(words("verdict.notices"))
     yield Items(tuple(map(plain, _notices(protocol, words))))
-    yield from _all_reasons(protocol, words)
+    for outcome, sentences in _reasons(protocol, words):
+        yield SectionHeading(words(f"verdict.why_{outcome}"))
+        yield Items(tuple(map(plain, sentences)))
 
 
 def _first_names(names: Sequence[str], words: Words) -> str:
@@ -139,38 +136,6 @@ def _reasons(protocol: Protocol, words: Words) -> list[tuple[str, list[str]]]:
     """Return the sentences of each outcome that has any, those of a fail first."""
     found = [(outcome, words.reasons(protocol.verdict, outcome)) for outcome in ("fail", "incomplete")]
     return [(outcome, sentences) for outcome, sentences in found if sentences]
-
-
-def _first_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
-    """Yield the reasons that fit on the first page, at least one of each outcome; the others are referred to."""
-    space = max(_LEAST_LINES, _FIRST_LINES - sum(map(_lines, _notices(protocol, words))))
-    reasons = _reasons(protocol, words)
-    for number, (outcome, sentences) in enumerate(reasons, 1):
-        # The first outcome leaves some lines for the second one.
-        ends = accumulate(map(_lines, sentences))
-        most = space if number == len(reasons) else space - _LEFT_LINES
-        count = max(1, sum(end <= most for end in ends))
-        space -= sum(map(_lines, sentences[:count]))
-        yield SectionHeading(words(f"verdict.why_{outcome}"))
-        yield Items(tuple(map(plain, sentences[:count])))
-        if count < len(sentences):
-            more = len(sentences) - count
-            on_paper = words("verdict.more_on_page", count=more, page="{page}")
-            yield Reference(words("verdict.more_below", count=more), on_paper, _ALL_REASONS)
-
-
-def _lines(sentence: str) -> int:
-    return 1 + len(sentence) // _IN_A_LINE
-
-
-def _all_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
-    """Yield every reason, if the first page does not hold them."""
-    if not any(isinstance(item, Reference) for item in _first_reasons(protocol, words)):
-        return
-    yield SectionHeading(words("section.reasons"), page_break=True, label=_ALL_REASONS)
-    for outcome, sentences in _reasons(protocol, words):
-        yield SectionHeading(words(f"verdict.why_{outcome}"), level=2)
-        yield Items(tuple(map(plain, sentences)))
 
 
 def _notices(protocol: Protocol, words: Words) -> Iterator[str]:

@@ -74,32 +74,3 @@ class Measured:
         return cls(
             np.empty((0, 0)), np.empty((0, 0, 0)), np.empty((0, 0, 0)), np.empty(0, bool), np.empty((0, 0), int), reason
         )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON values."""
-        return {
-            "factors": self.factors.tolist(),
-            "latency": _with_none(self.latency),
-            "force": _with_none(self.force),
-            "assessable": self.assessable.tolist(),
-            "alarming": self.alarming.tolist(),
-            "reason": self.reason,
-        }
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Measured:
-        """Return what `to_dict` has written; raises KeyError, TypeError or ValueError for anything else."""
-        if values["reason"]:
-            return cls.unusable(str(values["reason"]))
-        return cls(
-            np.array(values["factors"], dtype=np.float64),
-            np.array(values["latency"], dtype=np.float64),
-            np.array(values["force"], dtype=np.float64),
-            np.array(values["assessable"], dtype=bool),
-            np.array(values["alarming"], dtype=np.int64),
-        )
-
-
-def _with_none(values: FloatArray) -> Any:
-    """Return nested lists with None for NaN."""
-    return np.where(np.isnan(values), None, values.astype(object)).tolist()  # type: ignore[call-overload]

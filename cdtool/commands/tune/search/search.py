@@ -23,7 +23,6 @@ _RULES, _RULES_WITHOUT_FOLD = 3, 1
 # Measures candidates, in their order.
 Measure = Callable[[Sequence[Candidate]], Sequence[Measured]]
 # Called after each round with the candidates measured so far, and the best one of all recordings.
-Watch = Callable[[int, "Scored | None"], None]
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,6 @@ def search(
     gains: tuple[str, ...],
     objective: Objective,
     measure: Measure,
-    watch: Watch = lambda count, best: None,  # noqa: ARG005
 ) -> Searched:
     """Search for the best candidate on all recordings, and without each fold.
 
@@ -126,8 +124,6 @@ def search(
         What is minimised.
     measure : callable
         Measures candidates.
-    watch : callable, optional
-        Called after each round.
 
     Returns
     -------
@@ -152,7 +148,6 @@ def search(
         for candidate in (default, *rules):
             made.take(candidate, known[candidate.key])
         subsets.append(made)
-    watch(len(known), subsets[0].best)
     running: list[tuple[SubsetSearch, CoordinateSearch]] = [
         (item, CoordinateSearch(start.candidate, start.score, gains))
         for item in subsets
@@ -168,7 +163,6 @@ def search(
                 scores = {one.key: item.best_of(one.key) for one in wanted}
                 own.tell({key: math.inf if made is None else made.score for key, made in scores.items()})
         running = [(item, own) for item, own, wanted in asked if wanted]
-        watch(len(known), subsets[0].best)
     return Searched(tuple(subsets), known, default, default_debounce)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.tune.search.candidate import Candidate
 from cdtool.commands.tune.search.held_out import Pooled
-from cdtool.commands.tune.search.objective import Goal, Objective
+from cdtool.commands.tune.search.objective import Objective
 from cdtool.commands.tune.search.search import Scored, Searched
 from cdtool.statistics.interval import Interval
 from cdtool.statistics.rates import binomial_share
@@ -110,14 +110,6 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class TuningStep:
-    """What a part of the search contributed: the share by which the cost fell, the others as they were before."""
-
-    name: str
-    saved: float
-
-
-@dataclass(frozen=True)
 class Rejection:
     """A kind of rule that was best but is not chosen: on recordings not used for the choice, a group is much worse.
 
@@ -130,15 +122,6 @@ class Rejection:
 
 
 @dataclass(frozen=True)
-class ParetoPoint:
-    """A candidate that no other one beats in every group, with its apparent costs (ms, or N) by group."""
-
-    candidate: Candidate
-    debounce: str
-    costs: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class TunedDetector:
     """A detector with the choice, its debounce and the safety factor that meets the budget.
 
@@ -148,8 +131,8 @@ class TunedDetector:
     `apparent` results are from the recordings used for the choice, each assessed without its fold; `nested` those of
     recordings not used for the choice, None if there are too few runs; `default` and `default_nested` those of what the
     benchmark file has, at the same budget, None if it cannot be used: `default_reason`. `chosen_in_folds` are the
-    choices without each fold, in words. `debounce` [samples] is None for the default of 9 ms. `tried_costs` are the
-    apparent costs (ms, or N) by group of everything that was tried. `why_not_nested`: why there is no nested result.
+    choices without each fold, in words. `debounce` [samples] is None for the default of 9 ms.
+    `why_not_nested`: why there is no nested result.
     """
 
     detector: str
@@ -165,13 +148,10 @@ class TunedDetector:
     default_nested: ChoiceResults | None
     default_reason: str
     sensitivities: tuple[Sensitivity, ...]
-    steps: tuple[TuningStep, ...]
-    pareto: tuple[ParetoPoint, ...]
     candidates: int
     unusable: dict[str, str]
     chosen_in_folds: tuple[str, ...]
     rejected: tuple[Rejection, ...] = ()
-    tried_costs: tuple[tuple[float, ...], ...] = ()
     why_not_nested: str = ""
 
     @property
@@ -272,49 +252,3 @@ def sensitivities_of(
 
 def _number(value: Any) -> float:
     return float(value[0] if isinstance(value, tuple) else value)
-
-
-def steps_of(searched: Searched, best: Scored) -> tuple[TuningStep, ...]:
-    """Return what debounce, threshold and gains contributed, one after the other; none without a usable default."""
-    found = searched.subsets[0]
-    if not math.isfinite(found.default.score):
-        return ()
-    by_debounce = found.best_of(searched.default.key)
-    of_default_gains = [
-        item
-        for key in found.known
-        if (item := found.best_of(key)) is not None and item.candidate.gains == searched.default.gains
-    ]
-    of_rule = [item.score for item in of_default_gains if item.candidate.rule.name == best.candidate.rule.name]
-    scores = [found.default.score]
-    scores.append(min(scores[-1], by_debounce.score if by_debounce else math.inf))
-    scores.append(min(scores[-1], min(of_rule, default=math.inf)))
-    scores.append(min(scores[-1], best.score))
-    names = ("debounce", "threshold", "gains")
-    return tuple(
-        TuningStep(name, 1.0 - math.exp(after - before))
-        for name, before, after in zip(names, scores[:-1], scores[1:], strict=True)
-    )
-
-
-def tried_costs_of(objective: Objective, searched: Searched) -> tuple[tuple[float, ...], ...]:
-    """Return the costs (ms, or N) by group of every candidate with every debounce."""
-    factor = 1.0 if objective.goal is Goal.FORCE else 1e3
-    items = [item for scored in searched.subsets[0].known.values() for item in scored if math.isfinite(item.score)]
-    return tuple(tuple(factor * float(cost) for cost in item.costs if np.isfinite(cost)) for item in items)
-
-
-def pareto_of(objective: Objective, searched: Searched, words: Sequence[str]) -> tuple[ParetoPoint, ...]:
-    """Return the candidates that no other one beats in every group, by the cost of the first group."""
-    items = [item for scored in searched.subsets[0].known.values() for item in scored if math.isfinite(item.score)]
-    costs = np.array([item.costs for item in items]).reshape(len(items), len(objective.recordings.groups))
-    costs = costs[:, np.isfinite(costs).all(axis=0)]
-    factor = 1.0 if objective.goal is Goal.FORCE else 1e3
-    found: dict[tuple[float, ...], ParetoPoint] = {}
-    for item, own in zip(items, costs, strict=True):
-        beaten = (costs <= own).all(axis=1) & (costs < own).any(axis=1)
-        if not beaten.any():
-            key = tuple(float(value) for value in own)
-            scaled = tuple(factor * value for value in key)
-            found.setdefault(key, ParetoPoint(item.candidate, words[item.debounce], scaled))
-    return tuple(found[key] for key in sorted(found))

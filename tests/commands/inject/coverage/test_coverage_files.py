@@ -1,4 +1,4 @@
-"""The files of a map of `cdtool inject`: a figure with a panel per class of speed, all cells as JSON."""
+"""The files of a map of `cdtool inject`: all cells as JSON."""
 
 from __future__ import annotations
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import csv
 import hashlib
 import html
 import json
@@ -51,19 +50,17 @@ def test_a_cell_opens_its_worst_contact_that_has_a_trigger_plot() -> None:
     assert data["cells"][data["first"]]["title"] == "slow: 1 m, 10 N/mm"
 
 
-def test_the_list_of_tests_can_be_copied_and_has_commands_that_exist() -> None:
+def test_the_list_of_tests_has_commands_that_exist() -> None:
     text = coverage_html(coverage_case())
-    found = re.search(r"<pre>(.*?)</pre>", text, re.DOTALL)
-    assert found
-    rows = list(csv.DictReader(html.unescape(found[1]).splitlines()))
-    assert (rows[0]["detector"], rows[0]["position_m"], rows[0]["reason"]) == ("slow", "0.5", "missed_in_part")
-    assert rows[0]["plan"] == "cdtool plan --missed-at-most 5%"
-    assert [row["reason"] for row in rows[1:3]] == ["near_limit", "near_limit"]
-    assert rows[-1]["plan"].startswith("cdtool plan --difference-ms ")
+    table = text[text.index('id="telling-table"') : text.index('id="contacts"')]
+    lines = re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL)
+    rows = [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", line) for line in lines[1:]]
+    assert rows[0][:2] == ["slow", "0.500"] and rows[0][-1] == "cdtool plan --missed-at-most 5%"
+    assert rows[-1][-1].startswith("cdtool plan --difference-ms ")
     from tests.command import cdtool as command
 
     for row in (rows[0], rows[-1]):
-        assert command(*row["plan"].split()[1:]).status == 0
+        assert command(*row[-1].split()[1:]).status == 0
 
 
 def test_clearly_different_speeds_have_maps_of_their_own() -> None:

@@ -70,7 +70,7 @@ def test_the_text_holds_every_cell_of_the_document(name, documents, pypdf):
 
 
 @pytest.mark.parametrize("name", ["fail", "incomplete"])
-def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, protocols, pypdf):
+def test_the_first_page_has_the_notices_and_the_first_of_many_reasons(name, protocols, pypdf):
     long = "Nebenschließkante {number}, 300 mm über dem Boden, bei geöffnetem Flügel, von der Straße aus gesehen"
     made = many(protocols[name], 25)
     points = tuple(
@@ -85,12 +85,8 @@ def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, p
     plan = replace(made.plan, language="en", points=tuple(item.point for item in points))
     document = protocol_document(replace(made, plan=plan, points=points, verdict=ProtocolVerdict(reasons)))
     pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages]
-    first = " ".join(pages[0].split())
-    assert first.index("Nebenschließkante 0") < first.index("To be observed")
-    more, page = re.search(r"and (\d+) more, see all reasons on page (\d+)", first).groups()
-    assert "All reasons" in pages[int(page) - 1] and int(page) == 2
-    listed = next(item.items for item in document.blocks if isinstance(item, Items))
-    assert len(listed) + int(more) == len(reasons) and len(listed) >= 3
+    notices, first_reasons, *_ = (item.items for item in document.blocks if isinstance(item, Items))
+    assert all(squeezed(sentence) in squeezed(pages[0]) for sentence in (*notices, *first_reasons[:3]))
     everything = squeezed("".join(pages))
     assert all(squeezed(words_of("en").reason(item)) in everything for item in reasons)
 
