@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.base.errors import OutputError, UsageError
+from cdtool.base.errors import UsageError
 from cdtool.commands.convert.converting import convert
 from cdtool.commands.judging.runs import read
 from cdtool.formats.channels.channel_assembly import file_digest
@@ -120,19 +120,6 @@ def test_nothing_is_overwritten_without_force_and_the_log_never(tmp_path):
     assert (tmp_path / "out.csv").read_text() != "mine"
     with pytest.raises(UsageError, match="is the log itself"):
         convert(log, log, machine=machine, force=True)
-
-
-def test_a_write_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
-    log, machine = gate(tmp_path)
-    before = sorted(tmp_path.iterdir())
-
-    def fail(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("cdtool.formats.exports.csv_writing.write_csv_table", fail)
-    with pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space left on device"):
-        convert(log, tmp_path / "out.csv", machine=machine)
-    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_a_log_without_a_clock_is_written_only_to_formats_without_one(tmp_path):

@@ -33,17 +33,6 @@ def test_a_picture_in_a_notebook_is_that_of_the_report(result, tmp_path):
     assert result.plot.latency()._repr_png_()[0] == (tmp_path / "latency.png").read_bytes()
 
 
-def test_the_triggers_of_a_recording_or_group_are_chosen(result):
-    name = next(trace.recording for trace in result.traces if trace.group == "soft")
-    assert name in result.plot.triggers(name).description
-    assert result.plot.triggers(group="soft").description.startswith("soft/")
-    with pytest.raises(UsageError, match=r"no curves of 'soft/99\.csv' were kept"):
-        result.plot.triggers("soft/99.csv")
-    without = cdtool.BenchmarkResult(result.evaluated)
-    with pytest.raises(UsageError, match="no curves were kept"):
-        without.plot.triggers()
-
-
 def test_the_triggers_of_a_recording_are_found_by_any_ending_of_one(result):
     (trace, *_) = result.traces
     traces = tuple(replace(trace, recording=name) for name in ("a/01.csv#1", "a/01.csv#2", "b/01.csv", "b/21.csv"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,6 @@ import cdtool
 from cdtool.base.errors import UsageError
 from cdtool.results.evaluated import evaluate
 from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, Results, tables
-from cdtool.results.summary import FIGURES
 from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE
 
 EMPTY = cdtool.BenchmarkResult(
@@ -61,18 +59,6 @@ def test_the_columns_are_typed_and_hold_the_values_of_the_rows(result):
     for name in ("recording", "detector", "latency_ms", "outcome", "side", "reason"):
         shown = [None if pd.isna(value) else value for value in frame[name]]
         assert shown == [getattr(row, name) for row in rows], name
-
-
-def test_the_summary_has_the_metrics_of_the_limits(result):
-    summary = result.summary()
-    assert set(summary.columns) == set(FIGURES) and summary.index.names == ["group", "detector"]
-    assert (summary.dtypes == np.float64).all()
-    for item in result.evaluated.summaries:
-        row = summary.loc[(item.group, item.detector)]
-        assert (row.median_ms, row.contacts) == pytest.approx((item.median.value, item.contacts), nan_ok=True)
-    assert math.isnan(summary.loc[("holdout", "momentum"), "missed"])
-    empty = EMPTY.summary()
-    assert list(empty.columns) == list(summary.columns) and (empty.dtypes == np.float64).all()
 
 
 def test_a_recording_becomes_a_frame_with_the_names_of_convert(tmp_path):

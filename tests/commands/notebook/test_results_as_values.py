@@ -40,15 +40,3 @@ def test_results_and_recordings_are_pickled_and_copied(found):
     for copied in (pickle.loads(pickle.dumps((found, recording))), copy.deepcopy((found, recording))):
         assert copied[0].summary().equals(found.summary()) and copied[0].contacts.equals(found.contacts)
         assert copied[1].to_frame().equals(recording.to_frame())
-
-
-def test_typos_are_answered_by_python_with_the_nearest_name(found):
-    """Python proposes names when it prints the error: the error must know the name and the object."""
-    for value, typo in ((found[0], "alarm"), (cdtool, "reed")):
-        with pytest.raises(AttributeError) as caught:
-            getattr(value, typo)
-        assert (caught.value.name, caught.value.obj) == (typo, value)
-    with pytest.raises(TypeError, match="'detektor'"):
-        cdtool.detect(LOG, MACHINE, detektor="gm")
-    with pytest.raises(AttributeError, match=r"use recording\['speed'\]"):
-        found[0].recording.speed  # noqa: B018

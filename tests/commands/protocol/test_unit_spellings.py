@@ -141,7 +141,7 @@ MATRIX = [(spelling, by_init) for spelling in SPELLINGS for by_init in (True, Fa
 
 @pytest.mark.parametrize(("spelling", "by_init"), MATRIX, ids=name_of)
 def test_no_spelling_of_a_unit_passes_a_force_above_the_limit(tmp_path, spelling, by_init):
-    """60 curves in newtons; of another spelling only the factor and what the unit is taken for differ."""
+    """60 curves in newtons; another spelling differs in its factor and in how its unit is read only."""
     check(tmp_path, spelling, PEAKS if spelling == SPELLINGS[0] else [368.0, 421.0], by_init)
 
 

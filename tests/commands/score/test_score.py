@@ -173,22 +173,6 @@ def test_rows_of_recordings_that_are_not_scored_are_a_note(logs, measured):
     assert done.status == 2 and "no row is about a scored recording: stiff/99.csv" in one_line(done.err)
 
 
-@pytest.mark.parametrize(
-    ("header", "rows", "words"),
-    [
-        ("recording,time\n", "stiff/01.csv,1\n", ("triggers.csv line 1", "'time'", "time_s")),
-        ("recording,time_s\n", "stiff/01.csv,6,05\n", ("triggers.csv line 2", "3 cells")),
-        ("recording,time_s\n", "stiff/01.csv,late\n", ("triggers.csv line 2", "'late'")),
-        ("log,time,joint\n", "a,1,x\n", ("line 1", "'log', 'time', 'joint'", "needed: recording, time_s")),
-        ("recording,time_s\n", "", ("triggers.csv", "contains no row")),
-    ],
-)
-def test_a_wrong_file_is_one_line_and_status_2(logs, header, rows, words):
-    done = score(logs, rows, header=header)
-    assert done.status == 2 and done.out == "" and done.err.count("\n") == 1
-    assert all(word in done.err for word in words), done.err
-
-
 def test_nothing_to_score_never_exits_with_0(logs, tmp_path):
     done = score(logs, "stiff/99.csv,1.0,plc,\n", "--set=triggers.listed_only=true")
     assert (

@@ -130,25 +130,3 @@ def test_limits_set_by_hand_exclude_a_factor_and_need_no_runs(gate_folder, tmp_p
     assert done.status == 0 and "limit 400 N set by hand" in done.out and "less certain" not in done.err
     refused = cdtool(*learn, "--set=threshold.safety_factor=3")
     assert refused.status == 2 and "cannot be combined with limits set by hand" in refused.err
-
-
-@pytest.mark.parametrize(
-    ("keys", "named"),
-    [
-        (("signature.rule=foo",), "signature.rule: is 'foo'"),
-        (("signature.alignment=foo",), "signature.alignment: is 'foo'"),
-        (("signature.sides=three",), "signature.sides: is 'three'"),
-        (("signature.safety_factor=-1",), "signature.safety_factor: is -1"),
-        (("threshold.name=cusum", "signature.rule=foo"), "signature.rule: is 'foo'"),
-        (("rule=foo",), "rule: unknown key (write signature.rule)"),
-        (("foo=1",), "foo: unknown key"),
-        (("threshold.name=cusum", "threshold.drift=a"), "threshold.drift: is 'a'"),
-        (("learn.guard_s=-1", "learn.until=onset"), "learn.guard_s: is -1"),
-    ],
-)
-def test_a_wrong_setting_is_named_by_its_key(gate_folder, tmp_path, keys, named):
-    machine, log = gate_folder / "machine.toml", gate_folder / "free" / "01.csv"
-    done = cdtool(
-        "learn-signature", log, "-m", machine, "-d", "gm", "-o", tmp_path / "s.json", *(f"--set={key}" for key in keys)
-    )
-    assert done.status == 2 and done.err.startswith(f"error: --set {named}"), done.err
