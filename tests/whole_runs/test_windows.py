@@ -72,7 +72,6 @@ def test_commands_write_replace_and_reuse_their_files(on_windows, tmp_path):
             ("benchmark", bench, "-o", f"{tmp_path / 'report'}/", "-o", tmp_path / "results.parquet", "--force"),
             ("benchmark", bench, "--store", tmp_path / "store"),
             *(("convert", log, tmp_path / f"to{end}", "--force") for end in (".csv", ".mcap", ".parquet")),
-            ("store", "gc", tmp_path / "store"),
         ):
             done = cdtool(*words)
             assert done.status in (0, 1, 3) and "cannot be written" not in done.err, (words, done.err)

@@ -94,7 +94,7 @@ def test_nested_brackets_are_one_line_in_every_file(tmp_path, text):
     gate = ROOT / "sample_logs/gate"
     detect = ("detect", gate / "stiff/03.csv", "-m", gate / "machine.toml", "--signature", tmp_path / "signature.json")
     for arguments in (
-        ("store", "status", tmp_path),
+        ("benchmark", gate / "benchmark.toml", "--store", tmp_path),
         ("report", tmp_path / "results.json", "-o", tmp_path / "r.md"),
         detect,
     ):
