@@ -63,7 +63,7 @@ COMMANDS = {
     "docs/identification.md": 4,
 }
 EXAMPLES = {
-    "docs/python.md": 13,
+    "docs/python.md": 12,
     "docs/impact.md": 9,
     "docs/simulators.md": 2,
     "docs/detectors/friction-ekf.md": 1,

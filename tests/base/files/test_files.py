@@ -367,7 +367,7 @@ def slow(path, content):
         os.kill(os.getpid(), number)
         for _ in range(1000): pass
 figures.write_bytes = slow
-sys.argv = ["cdtool", "study", "figures", "-o", sys.argv[2]]
+sys.argv = ["cdtool", "study", "sensors", "-m", "sample_logs/gate/machine.toml", "-o", sys.argv[2]]
 from cdtool.commands.app import main
 main()
 """
@@ -376,7 +376,7 @@ main()
 @posix_only
 @pytest.mark.parametrize(("name", "status", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")])
 def test_sigterm_cleans_up_as_sigint_does(tmp_path, name, status, word):
-    arguments = [sys.executable, "-c", COMMAND, name, str(tmp_path / "new" / "figures")]
+    arguments = [sys.executable, "-c", COMMAND, name, str(tmp_path / "ranking.png")]
     done = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (status, f"{word}\n")
     assert names(tmp_path) == set()
