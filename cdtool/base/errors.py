@@ -63,9 +63,9 @@ class FieldsError(UsageError):
 
 
 class ConfigurationError(CdtoolError):
-    """A machine file or benchmark file is wrong; the message names the key, which is `key` where it is known."""
+    """A machine file or benchmark file is wrong; the message names `file` and `key`, which are empty if not known."""
 
-    key = ""
+    key, file = "", ""
 
 
 class MistakesError(ConfigurationError):

@@ -279,7 +279,7 @@ class Place:
     def fault(self, name: str, problem: str, hint: str = "") -> ConfigurationError:
         """Return an error about one key."""
         found = ConfigurationError(f"{self.key(name)}: {problem}", hint)
-        found.key = f"{self.prefix}{name}"
+        found.key, found.file = f"{self.prefix}{name}", self.where
         return found
 
     def whole(self, fault: CdtoolError) -> ConfigurationError:
@@ -300,7 +300,7 @@ class Place:
 
     def _is_own(self, mistake: ConfigurationError) -> bool:
         """Whether a mistake is of this file: one of a file that it names has keys of its own."""
-        return mistake.message.startswith((self.where, "--set"))
+        return mistake.file in ("", self.where)
 
     def has_mistake(self, *keys: str) -> bool:
         """Whether a mistake is about one of these full keys or a part of it, or excuses one of them."""

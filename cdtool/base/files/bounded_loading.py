@@ -158,6 +158,7 @@ def read_toml(path: Path, what: str, place: Place | None = None) -> dict[str, An
         except ContentError as fault:
             broken, reason = _broken_lines(lines, fault)
             mistakes.append(_not_toml(path, text, what, reason))
+            mistakes[-1].file = str(path)
         if place is None or not broken or _other_kind(text):
             break
         for line in broken:
