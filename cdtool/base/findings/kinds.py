@@ -27,7 +27,7 @@ class FindingKind(NamedTuple):
 def kind_of(name: str) -> FindingKind:
     """Return a kind by its name; raises ValueError for an unknown one."""
     if name not in sections():
-        raise ValueError(f"'{name}' is no kind of finding; a finding in words is remark('...')")
+        raise ValueError(f"'{name}' is not a kind of finding; a finding in words is remark('...')")
     table = tomllib.loads(sections()[name])
     return FindingKind(
         table.pop("sentence"),

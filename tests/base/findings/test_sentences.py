@@ -89,7 +89,7 @@ def test_the_table_of_kinds_is_complete_and_read_kind_by_kind():
 @pytest.mark.parametrize(
     ("kind", "numbers", "said"),
     [
-        ("the recorder lost its clock", {}, r"no kind of finding; a finding in words is remark\('\.\.\.'\)"),
+        ("the recorder lost its clock", {}, r"not a kind of finding; a finding in words is remark\('\.\.\.'\)"),
         ("missing_values", {"count": 1}, r"'missing_values' has the numbers \('count', 'values'\), not \('count',\)"),
         ("no_clock", {"count": 1}, r"has the numbers \(\), not \('count',\)"),
     ],
