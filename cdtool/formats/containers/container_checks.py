@@ -38,15 +38,26 @@ def check_size(path: Path, values: int) -> None:
 
 
 def check_chunks(path: Path, name: str, dataset: Any) -> None:
-    """Raise RecordingError if an HDF5 dataset is compressed twice, or has chunks far larger than its file.
+    """Raise RecordingError if an HDF5 dataset is compressed twice, lacks chunks, or has some far larger than its file.
 
     HDF5 decompresses whole chunks even if only a part is read, and each compression may shrink zeros to a thousandth.
+    In place of a chunk whose address is lost, or that was never written, it reads zeros.
     """
     check_size(path, math.prod(dataset.chunks or ()) * dataset.dtype.itemsize // 8)
     properties = dataset.id.get_create_plist()
     filters = [properties.get_filter(i)[0] for i in range(properties.get_nfilters())]
     if sum(number not in _FILTERS_WITHOUT_COMPRESSION for number in filters) > 1:
         raise RecordingError(f"dataset '{name}' is compressed more than once: refused", "save it again")
+    if dataset.chunks:
+        found: set[tuple[int, ...]] = set()
+        dataset.id.chunk_iter(lambda chunk: found.add(chunk.chunk_offset) if chunk.size else None)
+        stored = len(found)
+        parts = math.prod(math.ceil(rows / most) for rows, most in zip(dataset.shape, dataset.chunks, strict=True))
+    else:
+        stored, parts = min(dataset.id.get_storage_size(), 1), min(dataset.size, 1)
+    if stored < parts:
+        lost = f"dataset '{name}': {parts - stored} of {parts} chunks are not in the file: refused"
+        raise RecordingError(lost, "copy it again, or save it without the rows that were never written")
 
 
 @contextmanager

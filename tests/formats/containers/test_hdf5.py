@@ -112,11 +112,14 @@ def test_external_and_cyclic_links_are_not_followed(tmp_path):
     assert [finding.numbers["what"] for finding in source.findings] == ["stored in other files"] * 2
 
 
-def test_a_declared_dataset_without_data_is_refused_by_its_size(tmp_path):
-    path = tmp_path / "bomb.h5"
+@pytest.mark.parametrize(("chunks", "lost"), [((10,), "1 of 3"), (None, "1 of 1")])
+def test_rows_that_were_never_written_are_refused_instead_of_read_as_zeros(tmp_path, chunks, lost):
+    path = tmp_path / "log.h5"
     with h5py.File(path, "w") as file:
-        file.create_dataset("v", shape=(10**10,), dtype="f8", chunks=(2**16,))
-    with pytest.raises(RecordingError, match="times its size: refused"):
+        dataset = file.create_dataset("v", shape=(25,), dtype="f8", chunks=chunks)
+        if chunks:
+            dataset[:20] = 1.0
+    with pytest.raises(RecordingError, match=f"dataset 'v': {lost} chunks are not in the file"):
         survey(path)
 
 
