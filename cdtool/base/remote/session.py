@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import atexit
 import os
+import secrets
 import shutil
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import IO
 
 # The folder, for the processes that are started here.
 _FOLDER = "CDTOOL_REMOTE_FOLDER"
@@ -47,11 +47,14 @@ def _made() -> Path:
 
     from cdtool.base.files.locks import lock_handle
 
-    made = Path(tempfile.mkdtemp(prefix=_PREFIX))
-    lock = (made / _LOCK).open("xb")
-    lock_handle(lock.fileno())
+    # Its removal is registered before it is made: a signal may end the command after any step.
+    made = Path(tempfile.gettempdir()) / f"{_PREFIX}{secrets.token_hex(8)}"
+    ending = ExitStack()
+    ending.callback(shutil.rmtree, made, ignore_errors=True)
+    atexit.register(_end, ending, os.getpid())
+    made.mkdir(mode=0o700)
+    lock_handle(ending.enter_context((made / _LOCK).open("xb")).fileno())
     os.environ[_FOLDER] = str(made)
-    atexit.register(_end, made, lock, os.getpid())
     for left in set(made.parent.glob(f"{_PREFIX}*")) - {made}:
         with suppress(OSError):
             with (left / _LOCK).open("r+b") as file:
@@ -61,8 +64,7 @@ def _made() -> Path:
     return made
 
 
-def _end(made: Path, lock: IO[bytes], process: int) -> None:
+def _end(ending: ExitStack, process: int) -> None:
     if os.getpid() == process:  # not in a forked worker
-        lock.close()
         os.environ.pop(_FOLDER, None)
-        shutil.rmtree(made, ignore_errors=True)
+        ending.close()
