@@ -12,7 +12,6 @@ from cdtool.detectors.base import (
     for_every_joint,
     gain,
     held_on,
-    missing_after_first,
     per_joint,
     require_channels,
     require_positive,
@@ -110,8 +109,8 @@ class DesiredDynamics:
         )
         balance = machine.force_balance(torque, pose, speed, acceleration)
         cutoff = per_joint(self.cutoff, len(machine.joints))
-        # A torque that is missing after it was present interrupts the low-pass, like a missing reference.
-        waits = motion_missing | missing_after_first(torque_missing)
+        # A missing torque interrupts the low-pass, like a missing reference; a missing position does not.
+        waits = motion_missing | torque_missing
         residual, _ = low_pass(time, balance, waits, cutoff)
         settle = settling_time(cutoff)
         started = started_at(time, waits, longest_gap(cutoff))

@@ -82,7 +82,7 @@ class Direct:
         drive = drive_of(self, recording, machine)
         balance = machine.force_balance(drive.torque, drive.position, drive.speed)
         cutoff = per_joint(self.cutoff, len(machine.joints))
-        waits = drive.interrupted
+        waits = drive.missing
         filtered, _ = low_pass(drive.time, balance, waits, cutoff)
         _, acceleration = low_pass(drive.time, drive.speed, waits, cutoff)
         residual = filtered - machine.inertia_times(drive.position, acceleration)

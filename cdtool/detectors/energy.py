@@ -101,14 +101,14 @@ class Energy:
         # Relative to the first sample: a potential energy may be large, and only its changes count.
         energy = energy - energy[:1]
         speed = np.abs(drive.speed)
-        missing, motion_missing = drive.missing, drive.speed_missing
+        without = drive.torque_missing, drive.motion_missing
         if machine.coupled:
             speed = np.linalg.norm(speed, axis=1, keepdims=True)
-            missing, motion_missing = (for_every_joint(item)[:, :1] for item in (missing, motion_missing))
-        alone = Drive(drive.time, drive.torque, drive.position, drive.speed, missing, motion_missing, drive.coupled)
+            without = for_every_joint(without[0])[:, :1], for_every_joint(without[1])[:, :1]
+        alone = Drive(drive.time, drive.torque, drive.position, drive.speed, *without, drive.coupled)
         ready = np.full(energy.shape[1], -np.inf)
         residual, status = observe_momentum(alone, power, energy, self.bandwidth, ready)
-        lost = unsettled(drive.time, missing, _LONGEST_UNSETTLED) if machine.coupled else None
+        lost = unsettled(drive.time, alone.missing, _LONGEST_UNSETTLED) if machine.coupled else None
         lost = lost if lost is not None and lost.any() else None
         slow = speed < per_joint(self.minimum_speed, speed.shape[1])
         status[(status == Status.VALID) & slow] = Status.NOT_APPLICABLE

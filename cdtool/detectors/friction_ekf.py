@@ -163,7 +163,7 @@ class FrictionEkf:
         others, lost = held_on(drive.time, acceleration)
         equations = machine.joint_equations(drive.torque, drive.position, drive.speed, others)
         missing = drive.missing | for_every_joint(lost) if machine.coupled else drive.missing
-        unknown = drive.speed_missing
+        unknown = drive.motion_missing
         speed, position = (
             np.where(unknown, np.nan, item) if unknown.any() else item for item in (drive.speed, drive.position)
         )

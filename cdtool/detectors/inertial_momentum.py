@@ -16,7 +16,6 @@ from cdtool.detectors.base import (
     for_every_joint,
     gain,
     held_on,
-    missing_after_first,
     observe_momentum,
     of_joint,
     require_positive,
@@ -107,8 +106,6 @@ class InertialMomentum:
         """Return the residual (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         acceleration, lost = held_on(drive.time, recording["acceleration"])
-        # Before the first accelerometer sample no sample is lost.
-        unknown = missing_after_first(lost)
         fused = np.empty_like(drive.speed)
         ready = np.empty(fused.shape[1])
         for j, stick_speed in enumerate(machine.stick_speed):
@@ -116,9 +113,9 @@ class InertialMomentum:
                 drive.time,
                 drive.speed[:, j],
                 acceleration[:, j],
-                drive.speed_missing[:, j],
+                drive.motion_missing[:, j],
                 stick_speed,
-                unknown[:, j],
+                lost[:, j],
             )
         if machine.coupled:
             lost = for_every_joint(lost)
@@ -220,6 +217,9 @@ def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by
         if missing[k]:
             continue
         if not started:
+            if lost[k]:
+                fused[k] = speed[k]
+                continue
             started = True
             begin = time[k]
             trusted = begin + settle
@@ -228,8 +228,9 @@ def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by
         if resting:
             resting = abs(speed[k]) <= standstill_speed and time[k] - begin <= window
             if resting:
-                total += acceleration[k]
-                count += 1
+                if not lost[k]:
+                    total += acceleration[k]
+                    count += 1
                 if time[k] - begin >= at_least:
                     trusted = min(trusted, time[k])  # only now the bias is known
                 w = speed[k]

@@ -108,7 +108,7 @@ class KalmanMomentum:
             per_joint(value, len(machine.joints)) ** 2
             for value in (self.contact_drift, self.sigma_torque, self.sigma_speed)
         )
-        usual, interrupted = usual_steps(drive.time), drive.interrupted
+        usual = usual_steps(drive.time)
         for j, inertia in enumerate(machine.nominal_inertia):
             _filter(
                 drive.time,
@@ -116,8 +116,7 @@ class KalmanMomentum:
                 np.ascontiguousarray(net_force[:, j]),
                 np.ascontiguousarray(momentum[:, j]),
                 np.ascontiguousarray(drive.missing[:, j]),
-                np.ascontiguousarray(drive.speed_missing[:, j]),
-                np.ascontiguousarray(interrupted[:, j]),
+                np.ascontiguousarray(drive.torque_missing[:, j]),
                 machine.coupled,
                 drift[j],
                 torque[j],
@@ -174,7 +173,7 @@ def _process_noise(drift: float, torque: float, step: float) -> FloatArray:
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, float64[::1], float64[::1], b1[::1], b1[::1], b1[::1], b1, float64, float64, "
+    f"void({READ_ONLY}, {READ_ONLY}, float64[::1], float64[::1], b1[::1], b1[::1], b1, float64, float64, "
     "float64, float64[:], uint8[:])"
 )
 def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
@@ -183,8 +182,7 @@ def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     net_force: FloatArray,
     momentum: FloatArray,
     missing: BoolArray,
-    speed_missing: BoolArray,
-    waits: BoolArray,
+    torque_missing: BoolArray,
     coupled: bool,
     drift: float,
     torque_noise: float,
@@ -198,8 +196,8 @@ def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
     mean force: the estimate is then where it would have been, and continues with the same gain. A single large step
     would have another gain, and the estimate would wander after the gap as it never does otherwise.
 
-    `waits`: where a sample is incomplete. After it the force is interpolated by a straight line if the torque was
-    missing, or the pose of `coupled` joints.
+    Over `missing` samples, the force is interpolated by a straight line if the torque is missing, or any input of
+    `coupled` joints.
     """
     started = False
     bridged = False
@@ -216,8 +214,8 @@ def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
             started = False
         if started:
             impulse += 0.5 * (net_force[k] + net_force[k - 1]) * (time[k] - time[k - 1])
-        if waits[k]:
-            bridged = bridged or coupled or not speed_missing[k]
+        if missing[k]:
+            bridged = bridged or coupled or torque_missing[k]
             estimate[k] = contact
             status[k] = Status.GAP
             continue
@@ -255,9 +253,4 @@ def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
         momentum_before = momentum[k]
         last = time[k]
         estimate[k] = contact
-        if missing[k]:
-            status[k] = Status.GAP
-        elif settled < 3.0:
-            status[k] = Status.START_UP
-        else:
-            status[k] = Status.VALID
+        status[k] = Status.START_UP if settled < 3.0 else Status.VALID

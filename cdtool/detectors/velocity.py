@@ -113,7 +113,6 @@ class Velocity:
             np.ascontiguousarray(drive.speed),
             lambda rows: machine.inertia_matrix(drive.position[rows]),
             np.ascontiguousarray(for_every_joint(drive.missing)[:, 0]),
-            np.ascontiguousarray(for_every_joint(drive.interrupted)[:, 0]),
             per_joint(self.bandwidth, len(machine.joints)) * machine.nominal_inertia,
         )
         return Signal(drive.time, residual, status, self.unit(machine), self.signed)
@@ -125,7 +124,6 @@ def observe_velocity(
     speed: FloatArray,
     inertia: Callable[[slice], FloatArray],
     missing: BoolArray,
-    motion_missing: BoolArray,
     gains: FloatArray,
 ) -> tuple[FloatArray, StatusArray]:
     """Return the residual res (n, J) and its status:
@@ -133,12 +131,12 @@ def observe_velocity(
     res_k = A res_(k-1) + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T); M is the mean of the step's ends.
 
     `inertia` returns M (n, J, J) of a part of the samples. With S = K^(-1/2) M K^(-1/2), which is symmetric, A is
-    K^(1/2) exp(-T S^-1) K^(-1/2). A missing motion makes the step longer; `missing` (any input) marks a sample as
-    missing. It restarts after three time constants of the slowest mode, and 0.15 s, without a sample.
+    K^(1/2) exp(-T S^-1) K^(-1/2). A `missing` sample (n,) makes the step longer. It restarts after three time constants
+    of the slowest mode, and 0.15 s, without a sample.
     """
     root = np.sqrt(gains)
     status = np.full(balance.shape, Status.GAP, dtype=np.uint8)
-    known = np.flatnonzero(~motion_missing)
+    known = np.flatnonzero(~missing)
     # Residual over sqrt(K), from row 1 on at the samples that are known; time constants since the start.
     values, settled, since = np.zeros((len(known) + 1, len(gains))), np.zeros(len(known)), 0.0
     for begin in range(1, len(known), _STEPS):
@@ -158,16 +156,15 @@ def observe_velocity(
         total = since + np.cumsum(np.where(restarts | ~settles, 0.0, elapsed / slowest))
         part = total - np.maximum.accumulate(np.where(restarts, total, 0.0))
         settled[begin : begin + len(elapsed)], since = part, part[-1]
-    verdict = np.where(missing[known], Status.GAP, np.where(settled < _SETTLED, Status.START_UP, Status.VALID))
-    status[known] = verdict[:, np.newaxis]
-    return root * values[np.cumsum(~motion_missing)], status
+    status[known] = np.where(settled < _SETTLED, Status.START_UP, Status.VALID)[:, np.newaxis]
+    return root * values[np.cumsum(~missing)], status
 
 
 def relaxations(scaled: FloatArray, elapsed: FloatArray, by_modes: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Return I - exp(-X) (n, J, J), X = T S^-1 of the symmetric S in `scaled`, and the slowest time constant (n,).
 
-    A series of X, as far as X is small, which has no time constant (1 s). Where that is needed (`by_modes`), and where
-    X is not small, each mode of S has its own factor.
+    Where X is small, a power series of it; its time constant is not computed (1 s is returned). Where that is needed
+    (`by_modes`), and where X is not small, each mode of S has its own factor.
     """
     try:
         x = np.linalg.solve(scaled, elapsed[:, np.newaxis, np.newaxis] * np.eye(scaled.shape[1]))

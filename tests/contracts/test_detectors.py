@@ -174,6 +174,44 @@ def test_missing_samples_are_masked_and_the_estimate_recovers(name, channel, sub
     assert np.abs(holed.values[end] - clean.values[end]).max() < 0.05 * spread
 
 
+def largest_of_a_contact(detector: Any, subject: Subject) -> float:
+    signal = detector.signal(subject.hit(3), subject.machine)
+    return float(np.abs(signal.values[signal.valid]).max())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_blank_rows_are_rows_that_are_not_in_the_log(name, subject):
+    detector, machine, recording = DETECTORS.load(name)(), subject.machine, subject.free(3).without_ground_truth()
+    kept = np.r_[0:2500, 2600 : len(recording["speed"])]
+    blank, absent = {}, {}
+    for channel, series in recording.channels.items():
+        values = series.values.copy()
+        values[2500:2600] = np.nan
+        blank[channel] = replace(series, values=values)
+        absent[channel] = replace(series, time=series.time[kept], values=series.values[kept])
+    found, expected = (detector.signal(replace(recording, channels=own), machine) for own in (blank, absent))
+    assert not found.valid[2500:2600].any()
+    both = found.valid[kept] & expected.valid
+    assert both.mean() > 0.98 * expected.valid.mean()
+    off = np.abs(found.values[kept] - expected.values)[both].max()
+    # These two read more than the sum of a row: acceleration at its own times, derivatives from a window of rows.
+    share = 0.02 if name in ("friction_ekf", "desired_dynamics") else 1e-9
+    assert off < share * largest_of_a_contact(detector, subject)
+
+
+@pytest.mark.parametrize(("name", "channel"), [(name, channel) for name in NAMES for channel in needs_of(name)])
+def test_a_channel_that_begins_late_is_not_valid_before_the_estimate_has_settled(name, channel, subject):
+    detector, machine, recording = DETECTORS.load(name)(), subject.machine, subject.free(3)
+    clean = detector.signal(recording, machine)
+    begun = replace(recording, channels={**recording.channels, channel: recording[channel].between(2.0, np.inf)})
+    late = detector.signal(begun, machine)
+    both = late.valid & clean.valid[len(clean.time) - len(late.time) :]
+    assert both.any()
+    off = np.abs(late.values - clean.values[len(clean.time) - len(late.time) :])[both].max()
+    # After a start-up, 5 % of an error at the start may be left, which is larger than a contact on a fast robot.
+    assert off < 0.1 * largest_of_a_contact(detector, subject)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_scattered_missing_samples_leave_the_other_samples_valid(name, subject):
     detector = DETECTORS.load(name)()

@@ -70,12 +70,12 @@ def test_a_motion_without_inertia_relaxes_at_once_and_the_others_as_slowly_as_ev
     np.testing.assert_allclose(found[0], expected, rtol=1e-12)
 
 
-def observed_by_modes(time, balance, speed, inertia, missing, motion_missing, gains):
+def observed_by_modes(time, balance, speed, inertia, missing, gains):
     """The same recursion in plain Python, with the eigenvalues of every step."""
     root, value, settled, last = np.sqrt(gains), np.zeros(len(gains)), 0.0, -1
     residual, status = np.zeros(balance.shape), np.full(balance.shape, Status.GAP)
     for k in range(len(time)):
-        if motion_missing[k]:
+        if missing[k]:
             residual[k] = value
             continue
         if last >= 0:
@@ -91,7 +91,7 @@ def observed_by_modes(time, balance, speed, inertia, missing, motion_missing, ga
                 settled += elapsed / periods[-1]
         last = k
         residual[k] = value
-        status[k] = Status.GAP if missing[k] else Status.START_UP if settled < 3.0 else Status.VALID
+        status[k] = Status.START_UP if settled < 3.0 else Status.VALID
     return residual, status
 
 
@@ -103,17 +103,16 @@ def test_residual_and_status_are_those_of_the_modes_of_every_step(joints, seed):
     time = np.cumsum(1e-3 + 2e-4 * rng.random(count))
     time[count // 3 :] += 0.08  # bridged
     time[count // 2 :] += 5.0  # a restart
-    motion_missing = rng.random(count) < 0.05
-    motion_missing[:3] = motion_missing[100:120] = motion_missing[-2:] = True
-    missing = motion_missing | (rng.random(count) < 0.05)
+    missing = rng.random(count) < 0.1
+    missing[:3] = missing[100:120] = missing[-2:] = True
     balance, speed = rng.normal(size=(count, joints)), 0.01 * rng.normal(size=(count, joints))
     smooth = np.linspace(0.0, 1.0, count)[:, np.newaxis, np.newaxis]
     ends = 20.0 * random_matrices(seed, joints, 2, 20.0)
     inertia = ends[0] + smooth * (ends[1] - ends[0])
     gains = 30.0 * np.diag(ends[0])
     inputs = time, balance, speed
-    found, status = observe_velocity(*inputs, lambda rows: inertia[rows], missing, motion_missing, gains)
-    expected, expected_status = observed_by_modes(*inputs, inertia, missing, motion_missing, gains)
+    found, status = observe_velocity(*inputs, lambda rows: inertia[rows], missing, gains)
+    expected, expected_status = observed_by_modes(*inputs, inertia, missing, gains)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
     np.testing.assert_array_equal(status, expected_status)
     assert {Status.GAP, Status.START_UP, Status.VALID} == set(status.ravel().tolist())
@@ -122,7 +121,6 @@ def test_residual_and_status_are_those_of_the_modes_of_every_step(joints, seed):
             *(item[:part] for item in inputs),
             lambda rows, part=part: inertia[:part][rows],
             missing[:part],
-            motion_missing[:part],
             gains,
         )
         np.testing.assert_array_equal(head, found[:part])

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
-from cdtool.detectors.base import missing_after_first
 from cdtool.recordings.clock import EPOCH, clean_time, previous_value, stamps
 from cdtool.recordings.clock.coarse_clock import recent_medians
 from cdtool.recordings.clock.held_samples import hold_last
@@ -72,11 +71,10 @@ def test_the_value_held_depends_on_no_later_time(drawn):
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=12))
-def test_what_is_missing_is_held_and_marked_once_there_was_a_sample(marks):
+def test_what_is_missing_is_held(marks):
     missing = np.array(marks, dtype=bool).reshape(-1, 2)
     values = np.arange(1.0, 2.0 * len(missing) + 1.0).reshape(-1, 2)
-    last, begun = np.zeros(2), np.zeros(2, dtype=bool)
-    held, marked = hold_last(values, missing), missing_after_first(missing)
-    for k in range(len(values)):
-        last, begun = np.where(missing[k], last, values[k]), begun | ~missing[k]
-        assert held[k].tolist() == last.tolist() and marked[k].tolist() == (missing[k] & begun).tolist()
+    last = np.zeros(2)
+    for k, held in enumerate(hold_last(values, missing)):
+        last = np.where(missing[k], last, values[k])
+        assert held.tolist() == last.tolist()
