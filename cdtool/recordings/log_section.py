@@ -200,7 +200,12 @@ def _travel(recording: Recording, mark: Mark) -> tuple[FloatArray, FloatArray]:
     if series.unit not in (wanted, "SI"):
         text = f"{recording.name}: {mark} is not a distance of this machine, whose {channel} is in {series.unit}"
         raise RecordingError(text, MARK_HINT)
-    joint = leading_joint(recording.channels.get("speed", series))
+    if "speed" in recording:
+        joint = leading_joint(recording["speed"])
+    else:  # the position varies most
+        known = np.isfinite(series.values)
+        largest = np.max(series.values, axis=0, initial=-np.inf, where=known)
+        joint = int(np.argmax(largest - np.min(series.values, axis=0, initial=np.inf, where=known)))
     present = np.isfinite(series.values[:, joint])
     time, values = series.time[present], series.values[present, joint]
     if channel == "speed":

@@ -143,6 +143,8 @@ def _motion_spans(recording: Recording) -> list[tuple[float, float]]:
 
 def _trigger_spans(recording: Recording) -> list[tuple[float, float]]:
     series = recording["trigger"]
+    if not len(series):
+        return []
     high: BoolArray = np.nan_to_num(series.values[:, 0]) > 0.5
     return [(float(series.time[a]), float(series.time[b])) for a, b in _runs(high) if high[a]]
 

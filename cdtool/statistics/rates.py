@@ -222,6 +222,8 @@ def binomial_increase_at_most(count_a: int, n_a: int, count_b: int, n_b: int, le
     >>> round(binomial_increase_at_most(0, 30, 0, 50), 4)
     0.095
     """
+    _check_share(count_a, n_a)
+    _check_share(count_b, n_b)
     if not n_a or not n_b:
         return 1.0
     above = binomial_at_most(count_a, n_a, level) - count_a / n_a
@@ -266,6 +268,8 @@ def poisson_increase_at_most(
     >>> round(poisson_increase_at_most(0, 100.0, 0, 50.0), 5)
     0.02996
     """
+    _check_exposure(count_a, exposure_a)
+    _check_exposure(count_b, exposure_b)
     if not exposure_a or not exposure_b:
         return math.inf
     from scipy import stats

@@ -55,11 +55,13 @@ class Step:
 class ChangeOverRuns:
     """How a value changed over `n` runs: "drift" or "step", whichever is shown and fits better, otherwise "steady".
 
-    `trend` and `step` are the estimates, shown or not; None below `LEAST_RUNS` runs with a value.
+    `span`: from the first to the last run with a value. `trend` and `step` are the estimates, shown or not; None below
+    `LEAST_RUNS` runs with a value.
     """
 
     kind: Literal["steady", "drift", "step"]
     n: int
+    span: int = 0
     trend: LinearTrend | None = None
     step: Step | None = None
 
@@ -67,7 +69,7 @@ class ChangeOverRuns:
     def change(self) -> float:
         """Return the increase of the value over the runs by the trend or step that is shown; 0 if it is steady."""
         if self.kind == "drift" and self.trend is not None:
-            return self.trend.slope.value * (self.n - 1)
+            return self.trend.slope.value * self.span
         return self.step.height if self.kind == "step" and self.step is not None else 0.0
 
 
@@ -114,7 +116,7 @@ def change_over_runs(values: npt.ArrayLike, comparisons: int = 1, level: float =
         stairs = np.where(runs < step.run, step.before, step.after)
         drifts = float(np.abs(present - line).sum()) <= float(np.abs(present - stairs).sum())
     kind: Literal["steady", "drift", "step"] = "drift" if drifts else "step" if steps else "steady"
-    return ChangeOverRuns(kind, len(runs), trend, step)
+    return ChangeOverRuns(kind, len(runs), int(runs[-1] - runs[0]), trend, step)
 
 
 def may_change(values: npt.ArrayLike, comparisons: int = 1) -> bool:

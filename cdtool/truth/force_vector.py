@@ -30,7 +30,7 @@ _AFTER = 4 * INTERVAL
 _FEWEST = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class ForceMagnitude(Series):
     """The magnitude (n, 1) [N] of a force vector without its rest level.
 

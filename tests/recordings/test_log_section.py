@@ -67,6 +67,13 @@ def test_single_wrong_values_and_an_encoder_that_starts_again_are_no_distance():
         assert Mark(3.6, "rad").time_in(recording) == pytest.approx(3.0, abs=0.06)
 
 
+def test_the_joint_that_travels_counts_and_not_the_one_at_the_largest_angle():
+    time = np.linspace(0.0, 5.0, 501)
+    angles = Series(time, np.column_stack((np.full(501, 3.0), 0.1 * time)), "rad")
+    recording = Recording("r", "", ("a", "b"), {"position": angles})
+    assert Mark(0.2, "rad").time_in(recording) == pytest.approx(2.0, abs=0.05)
+
+
 def test_a_distance_in_the_unit_of_another_machine_is_refused():
     with pytest.raises(
         RecordingError, match="1 rad of travel is not a distance of this machine, whose position is in m"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,13 @@ def test_a_trigger_channel_cuts_where_it_is_high():
     assert [(part.recording.start, round(part.recording.end, 3)) for part in parts] == [(2.0, 4.999), (6.0, 6.999)]
 
 
+def test_a_trigger_without_a_sample_cuts_nothing():
+    log = recording(speed_of((0, 12, 0.2)), trigger=np.zeros(len(TIME)))
+    log = replace(log, channels={**log.channels, "trigger": log["trigger"].between(20.0, 30.0)})
+    with pytest.raises(RecordingError, match="no operation found by trigger"):
+        operations_of(log, "trigger")
+
+
 def test_the_reference_speed_decides_the_class_where_it_is_logged():
     stopped = speed_of((1, 2, 0.05))
     log = recording(stopped, reference_speed=np.where(TIME > 1, 0.2, 0.0))
@@ -69,6 +78,9 @@ def test_the_leading_joint_is_the_one_that_moves_most():
     values = np.column_stack((0.01 * np.sin(TIME), np.sin(TIME)))
     log = Recording("r", "r", ("a", "b"), {"speed": Series(TIME, values, "rad/s")})
     assert motion_class(log).joint == 1
+    values[::2, 1] = np.nan  # every other message has no value of it
+    values[1::2, 1] = 0.007
+    assert motion_class(replace(log, channels={"speed": Series(TIME, values, "rad/s")})).joint == 1
 
 
 def test_an_unknown_way_to_cut_names_the_known_ones():

@@ -12,9 +12,11 @@ from cdtool.base.errors import UsageError
 from cdtool.statistics.interval import Interval
 from cdtool.statistics.rates import (
     binomial_at_most,
+    binomial_increase_at_most,
     binomial_share,
     poisson_at_most,
     poisson_difference_p,
+    poisson_increase_at_most,
     poisson_rate,
 )
 
@@ -125,6 +127,8 @@ def test_two_rates_are_compared_as_in_r():
         (lambda: binomial_at_most(0, -2), "n is -2"),
         (lambda: poisson_rate(1, 1.0, 0.0), "confidence level is 0"),
         (lambda: poisson_difference_p(1, -1.0, 1, 1.0), "exposure is -1"),
+        (lambda: poisson_increase_at_most(0, 100.0, 3, -5.0), "exposure is -5"),
+        (lambda: binomial_increase_at_most(-3, 0, 0, 5), "count is -3"),
     ],
 )
 def test_impossible_arguments_are_reported(call, said):

@@ -28,7 +28,7 @@ def test_a_missing_run_neither_shifts_the_slope_nor_the_step():
     values[[3, 17, 18]] = np.nan
     course = change_over_runs(values)
     assert course.n == 37 and course.kind == "drift"
-    assert course.trend.slope.value == pytest.approx(0.2)
+    assert course.trend.slope.value == pytest.approx(0.2) and course.change == pytest.approx(0.2 * 39)
     steps = np.where(np.arange(40) < 25, 0.0, 5.0) + 0.01 * noise(1)
     steps[[2, 24]] = np.nan
     assert change_over_runs(steps).step.run == 25

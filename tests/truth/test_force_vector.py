@@ -125,6 +125,11 @@ def test_a_vector_is_never_mistaken_for_its_first_axis():
         cell_samples(Series(np.arange(4.0), np.zeros((4, 3)), "N"))
 
 
+def test_a_magnitude_is_equal_to_itself_and_hashable_as_every_channel():
+    magnitude = force_magnitude(Series(np.arange(100.0), np.ones((100, 3)), "N"), OnsetRule())
+    assert magnitude == magnitude and isinstance(hash(magnitude), int)
+
+
 def test_a_vector_without_any_complete_sample_has_no_contact():
     vector = np.full((100, 3), np.nan)
     vector[::2, 0], vector[1::2, 1] = 1.0, 2.0

@@ -126,12 +126,13 @@ def _class_over(series: Series) -> MotionClass | None:
     return replace(_class_of(series.time, np.ascontiguousarray(speed), joint, period), unit=series.unit)
 
 
-def leading_joint(series: Series) -> int:
+def leading_joint(speed: Series) -> int:
     """Return the joint that moves most: largest mean absolute speed."""
-    if series.joint_count == 1:
+    if speed.joint_count == 1:
         return 0
-    means = np.nanmean(np.abs(np.nan_to_num(series.values)), axis=0)
-    return int(np.argmax(means))
+    known = np.isfinite(speed.values)
+    total = np.sum(np.abs(speed.values), axis=0, where=known)
+    return int(np.argmax(total / np.maximum(known.sum(axis=0), 1)))
 
 
 def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
