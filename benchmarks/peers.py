@@ -22,9 +22,11 @@ import numpy as np
 import numpy.typing as npt
 from timing import Spread, interleaved, main, ratio, table, verdict
 
+from cdtool.base.kernels import read_only
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.friction_ekf import _INITIAL_DRIFT_TIME as INITIAL_DRIFT_TIME
-from cdtool.detectors.friction_ekf import FrictionEkf, JointMeasurements
+from cdtool.detectors.friction_ekf import FrictionEkf
+from cdtool.detectors.friction_ekf_kernel import Samples
 from cdtool.detectors.momentum import Momentum
 from cdtool.machines.dynamics import JointEquation
 from cdtool.machines.linear_axis import LinearAxis
@@ -121,8 +123,9 @@ def _friction_ekf(axis: LinearAxis, log: Recording) -> bool:
 
     def estimate(section: slice) -> Array:
         time, force, speed, acceleration = (values[section] for values in (log["torque"].time, *columns))
-        measured = JointMeasurements(time, speed, speed, np.zeros(len(time), np.uint8), time, acceleration)
-        return detector.estimate(measured, JointEquation(axis.nominal_inertia, force, damping))[0]
+        measured = (time, force, speed, np.zeros(len(time), np.uint8), time, acceleration)
+        equation = JointEquation(axis.nominal_inertia, force, damping)
+        return detector.estimate(Samples(*map(read_only, measured)), equation, np.empty(0))[0]
 
     def theirs() -> Array:
         force, speed, acceleration = (values[MOVING] for values in columns)

@@ -38,22 +38,6 @@ _LONGEST_UNSETTLED = 0.01
 
 
 @dataclass(frozen=True)
-class JointMeasurements:
-    """The measurements of one joint.
-
-    `speed` and `position` (n,) are at `time` (n,) [s], NaN where there is no sample; `acceleration` (m,) is at its own
-    `acceleration_time` (m,) [s]. `missing` (n,) uint8: not 0 where any input has no sample.
-    """
-
-    time: FloatArray
-    speed: FloatArray
-    position: FloatArray
-    missing: StatusArray
-    acceleration_time: FloatArray
-    acceleration: FloatArray
-
-
-@dataclass(frozen=True)
 class FrictionEkf:
     """Virtual viscous friction d of m a = F - d v, estimated with the state (d, a, v) from measured a and v.
 
@@ -173,34 +157,33 @@ class FrictionEkf:
         status = np.empty(friction.shape, dtype=np.uint8)
         for j, (equation, *own) in enumerate(zip(equations, *inputs, strict=True)):
             own_speed, own_missing, own_acceleration = own
-            motion = JointMeasurements(
-                drive.time,
-                own_speed,
-                position[:, j],
-                own_missing.view(np.uint8),
-                acceleration.time,
-                own_acceleration,
+            samples = Samples(
+                read_only(drive.time),
+                read_only(equation.force),
+                read_only(own_speed),
+                read_only(own_missing.view(np.uint8)),
+                read_only(acceleration.time),
+                read_only(own_acceleration),
             )
-            friction[j], status[j] = of_joint(self, j, len(equations)).estimate(motion, equation)
+            friction[j], status[j] = of_joint(self, j, len(equations)).estimate(samples, equation, position[:, j])
         friction, status = np.ascontiguousarray(friction.T), np.ascontiguousarray(status.T)
         late = lost_samples(recording, ("acceleration",), drive.time)
-        lost = drive.missing if late is None else drive.missing | late
-        behind = unsettled(drive.time, for_every_joint(lost) if machine.coupled else lost, _LONGEST_UNSETTLED)
+        late_or_lost = drive.missing if late is None else drive.missing | late
+        if machine.coupled:
+            late_or_lost = for_every_joint(late_or_lost)
+        behind = unsettled(drive.time, late_or_lost, _LONGEST_UNSETTLED)
         status[behind & (status == Status.VALID)] = Status.GAP
         return Signal(drive.time, friction, status, self.unit(machine), self.signed)
 
-    def estimate(self, motion: JointMeasurements, equation: JointEquation) -> tuple[FloatArray, StatusArray]:
-        """Return friction and status (n,) of one joint; each accelerometer sample is used once, at its own time."""
-        friction = np.zeros(len(motion.time))
-        status = np.zeros(len(motion.time), dtype=np.uint8)
-        samples = Samples(
-            read_only(motion.time),
-            read_only(equation.force),
-            read_only(motion.speed),
-            read_only(motion.missing),
-            read_only(motion.acceleration_time),
-            read_only(motion.acceleration),
-        )
+    def estimate(
+        self, samples: Samples, equation: JointEquation, position: FloatArray
+    ) -> tuple[FloatArray, StatusArray]:
+        """Return friction and status (n,) of one joint; each accelerometer sample is used once, at its own time.
+
+        `position` (n,), NaN where there is no sample: of a planar arm, whose angle is a state.
+        """
+        friction = np.zeros(len(samples.time))
+        status = np.zeros(len(samples.time), dtype=np.uint8)
         drift = single(self.friction_drift) ** 2
         variances = Variances(
             q_d=drift,
@@ -219,7 +202,7 @@ class FrictionEkf:
         from cdtool.detectors.friction_ekf_arm_kernel import AngleVariances, Link, run_arm_filter
 
         link = Link(
-            read_only(motion.position),
+            read_only(position),
             read_only(pendulum.other_position),
             read_only(pendulum.other_speed),
             read_only(pendulum.other_acceleration),

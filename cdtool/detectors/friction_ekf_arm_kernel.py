@@ -127,7 +127,7 @@ def run_arm_filter(
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Fill `friction` and `status` (n,) of one joint of the arm, zeros before."""
+    """Fill `friction` and `status` (n,) of one joint of the arm; see `run_filter`."""
     time, force, speed, missing, acceleration_time, acceleration = samples
     position, other_position, other_speed, other_acceleration, inertia, viscous, gravity, coupling = link
     q_d, q_a, q_v, r_a, r_v, initial_variance = variances
@@ -145,7 +145,7 @@ def run_arm_filter(
     forward = True
     against = 0
     held = 0
-    bandwidth_scale = math.sqrt(q_d / (r_a + q_a)) / inertia
+    bandwidth_scale = math.sqrt(q_d / (r_a + q_a))
     for k in range(len(time)):
         seen = math.isfinite(speed[k]) and math.isfinite(position[k])
         if started and time[k] - last_speed_time > 1.0:
@@ -201,7 +201,7 @@ def run_arm_filter(
             (d, a, v, q), p = correct((d, a, v, q), p, column, p[7] + r_v, speed[k] - v, applicable)
             column = (p[3], p[6], p[8], p[9])
             (d, a, v, q), p = correct((d, a, v, q), p, column, p[9] + r_q, position[k] - q, applicable)
-            gained = bandwidth_scale * abs(speed[k]) * math.sqrt(time[k] - last_speed_time)
+            gained = bandwidth_scale / inertia * abs(speed[k]) * math.sqrt(time[k] - last_speed_time)
             settled, against, forward, last_applicable = progress_of_settling(
                 applicable, speed[k] > 0.0, time[k], gained, glitch, settled, against, forward, last_applicable
             )

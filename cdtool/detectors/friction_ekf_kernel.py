@@ -11,6 +11,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from cdtool.base.arrays import FloatArray
 from cdtool.base.kernels import READ_ONLY, fields_of, kernel
 from cdtool.detectors.detection import Status, StatusArray
@@ -30,7 +33,7 @@ class Samples(NamedTuple):
     time: FloatArray
     force: FloatArray
     speed: FloatArray
-    missing: StatusArray
+    missing: npt.NDArray[np.uint8]
     acceleration_time: FloatArray
     acceleration: FloatArray
 
@@ -127,9 +130,10 @@ def progress_of_settling(
 ) -> tuple[float, int, bool, float]:
     """Return (settled, against, forward, last_applicable) after one more sample: how far the estimate has settled.
 
-    `settled` is the integral of the approximate bandwidth over time, `gained` the part of this step; the estimate is
-    ready when it reaches 3. It restarts after a stop longer than `glitch`, and after a rebound, when the estimate has
-    the wrong sign for a while; fewer than 3 consecutive samples of the other sign are outliers.
+    `settled` is the integral over time of the approximate bandwidth |v| / m sqrt(q_d / ((r_a + q_a) T)) [rad/s],
+    `gained` the part of this step of length T; the estimate is ready when it reaches 3. It restarts after a stop longer
+    than `glitch`, and after a rebound, when the estimate has the wrong sign for a while; fewer than 3 consecutive
+    samples of the other sign are outliers.
     """
     if applicable:
         against = against + 1 if moves_forward != forward else 0
@@ -152,7 +156,7 @@ def run_filter(
     friction: FloatArray,
     status: StatusArray,
 ) -> None:
-    """Fill `friction` and `status` (n,) of one joint, zeros before.
+    """Fill `friction` (n,) of one joint, and its `status` (n,) where that is not VALID: zeros (VALID) on entry.
 
     `inertia` (n,), or (1,) if it is constant [kg, kg m2]; `viscous` [N s/m, N m s/rad]: the friction to start from.
     """

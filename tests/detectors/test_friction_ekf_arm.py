@@ -9,10 +9,12 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from cdtool.base.arrays import FloatArray
+from cdtool.base.kernels import read_only
 from cdtool.detectors.base import drive_on_speed_clock
 from cdtool.detectors.detection import Status
-from cdtool.detectors.friction_ekf import FrictionEkf, JointMeasurements
+from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.friction_ekf_arm_kernel import predict_covariance, update_covariance
+from cdtool.detectors.friction_ekf_kernel import Samples
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.dynamics import JointEquation
 from cdtool.machines.planar_arm import PlanarArm
@@ -96,23 +98,22 @@ def test_an_update_is_josephs_form_for_any_gain_and_without_a_gain_the_frictions
     assert found[0] == p[0, 0]
 
 
-def joint_of(arm: PlanarArm, log: Recording, joint: int) -> tuple[JointMeasurements, JointEquation, JointEquation]:
-    """One joint's motion; its equation with its angle as a state, and with everything that is known as an input."""
+def joint_of(arm: PlanarArm, log: Recording, joint: int) -> tuple[FloatArray, list[tuple[Samples, JointEquation]]]:
+    """One joint's angle; its samples with the angle as a state, and with everything that is known as an input."""
     drive = drive_on_speed_clock(log, arm)
     acceleration = log["acceleration"]
     inputs = (drive.torque, drive.position, drive.speed, acceleration.values)
-    motion = JointMeasurements(
-        drive.time,
-        np.ascontiguousarray(drive.speed[:, joint]),
-        np.ascontiguousarray(drive.position[:, joint]),
-        np.zeros(len(drive.time), dtype=np.uint8),
-        acceleration.time,
-        np.ascontiguousarray(acceleration.values[:, joint]),
-    )
-    return motion, arm.joint_equations(*inputs)[joint], CoupledMachine.joint_equations(arm, *inputs)[joint]
+    missing = np.zeros(len(drive.time), dtype=np.uint8)
+    equations = (arm.joint_equations(*inputs)[joint], CoupledMachine.joint_equations(arm, *inputs)[joint])
+    columns = [
+        (drive.time, equation.force, drive.speed[:, joint], missing, acceleration.time, acceleration.values[:, joint])
+        for equation in equations
+    ]
+    samples = [Samples(*map(read_only, column)) for column in columns]
+    return drive.position[:, joint], list(zip(samples, equations, strict=True))
 
 
-def plain_filter(motion: JointMeasurements, equation: JointEquation) -> FloatArray:
+def plain_filter(samples: Samples, equation: JointEquation, position: FloatArray) -> FloatArray:
     """Friction (n,) by matrices, the transition's Jacobian by numerical differentiation; all channels on one clock."""
     link, inertia = equation.pendulum, float(equation.inertia[0])
     assert link is not None
@@ -121,19 +122,19 @@ def plain_filter(motion: JointMeasurements, equation: JointEquation) -> FloatArr
         d, a, v, q = x
         between = q - link.other_position[k]
         coupled = np.cos(between) * link.other_acceleration[k] + np.sin(between) * link.other_speed[k] ** 2
-        force = equation.force[k] - d * v - link.gravity * np.cos(q) - link.coupling * coupled
+        force = samples.force[k] - d * v - link.gravity * np.cos(q) - link.coupling * coupled
         return np.array([d, force / inertia, v + PERIOD * a, q + PERIOD * v])
 
-    x = np.array([equation.viscous, motion.acceleration[0], motion.speed[0], motion.position[0]])
+    x = np.array([equation.viscous, samples.acceleration[0], samples.speed[0], position[0]])
     p = square(START)
-    applicable = abs(motion.speed[0]) >= EKF.minimum_speed
+    applicable = abs(samples.speed[0]) >= EKF.minimum_speed
     found = [x[0]]
-    for k in range(1, len(motion.time)):
+    for k in range(1, len(samples.time)):
         # A step into the imaginary plane: a numerical derivative without cancellation.
         jacobian = np.array([following(x + 1e-30j * unit, k - 1).imag / 1e-30 for unit in np.eye(4)]).T
         x = following(x, k - 1)
         p = jacobian @ p @ jacobian.T + np.diag([PROCESS[0] if applicable else 0.0, *PROCESS[1:]])
-        readings = (motion.acceleration[k], motion.speed[k], motion.position[k])
+        readings = (samples.acceleration[k], samples.speed[k], position[k])
         for state, (reading, noise) in enumerate(zip(readings, NOISE, strict=True), start=1):
             if state == 2:
                 applicable = abs(reading) >= EKF.minimum_speed
@@ -149,9 +150,9 @@ def plain_filter(motion: JointMeasurements, equation: JointEquation) -> FloatArr
 @pytest.mark.parametrize("joint", [0, 1])
 def test_it_equals_a_filter_of_matrices_with_a_numerical_jacobian(arm, joint):
     log = moving_recording(arm, seconds=3.0, seed=2, noise=5e-3, contact=[3.0, 2.0], contact_at=2.0)
-    motion, equation, _ = joint_of(arm, log, joint)
-    found, _ = EKF.estimate(motion, equation)
-    expected = plain_filter(motion, equation)
+    position, (own_angle, _) = joint_of(arm, log, joint)
+    found, _ = EKF.estimate(*own_angle, position)
+    expected = plain_filter(*own_angle, position)
     assert np.ptp(expected) > 1.0
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
@@ -195,8 +196,8 @@ def test_an_angle_as_a_state_and_everything_known_as_an_input_give_the_same_fric
     """Both equations are the same one; the angle's own noise and the first-order prediction of it differ."""
     log = with_friction(moving_recording(arm, seconds=6.0, seed=5, noise=1e-3), np.array([1.5, 0.7]))
     for joint in (0, 1):
-        motion, own_angle, all_known = joint_of(arm, log, joint)
-        (one, status), (other, _) = EKF.estimate(motion, own_angle), EKF.estimate(motion, all_known)
+        position, (own_angle, all_known) = joint_of(arm, log, joint)
+        (one, status), (other, _) = EKF.estimate(*own_angle, position), EKF.estimate(*all_known, position)
         judged = (status == Status.VALID) & fast(log)[:, joint]
         assert judged.sum() > 1000
         assert np.max(np.abs(one - other)[judged]) < 5e-3
