@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge, run_detector
+from cdtool.alarms.pipeline import Detection, judge_alone, run_detector
 from cdtool.commands.judging.runs import read_named
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import operations_of
@@ -49,7 +49,7 @@ def main() -> int:
     found = {}
     for name in THRESHOLDS.names():
         rule = with_context(THRESHOLDS.load(name)(), machine.default_sides, Signature(sides=machine.default_sides))
-        found[name] = judge(impact, detector.name, signal, [rule.fit(pairs)], Activation())
+        found[name] = judge_alone(impact, detector.name, signal, [rule.fit(pairs)], Activation())
     with drawing():
         rows = -(-len(found) // 2)
         figure = new_figure(8.0, 1.8 * rows)

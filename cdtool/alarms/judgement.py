@@ -16,11 +16,11 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.kernels import kernel
 from cdtool.detectors.detection import Band, Signal, Status, StatusArray, contiguous
 from cdtool.recordings.motion import MotionClass
-from cdtool.recordings.motion.applicable import HOLD, Motion, judging_classes, speed_is_recent
+from cdtool.recordings.motion.applicable import GRACE, Motion, applicable_classes, speed_is_recent
 from cdtool.recordings.motion.evident_motion import evident_speed
 from cdtool.recordings.motion.strokes import Stroke, strokes_so_far
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.base import FittedThreshold, KnownBand, is_per_run
+from cdtool.thresholds.base import Evaluable, FittedThreshold, is_per_run
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 from cdtool.thresholds.speed_range import over_speeds
 
@@ -32,23 +32,23 @@ OPEN_BELOW, OPEN_ABOVE, LIMITED = 1, 2, 4
 
 
 @dataclass(frozen=True)
-class _Share:
-    """The rows of a log on which a threshold is evaluated, and those to which it applies, (rows,)."""
+class _Evaluation:
+    """The `rows` of a log on which a threshold is evaluated, and where it `applies` (rows,)."""
 
-    threshold: KnownBand
+    threshold: Evaluable
     recording: Recording
     signal: Signal
     rows: slice
-    judges: BoolArray
+    applies: BoolArray
 
     @cached_property
     def evaluated(self) -> tuple[Signal, Band]:
         """Return the statistic and its band on these rows; raises RecordingError if the threshold fails."""
         return checked_evaluation(self.threshold, self.recording, self.signal)
 
-    def at_share(self, share: float) -> tuple[Signal, Band]:
-        """Return `evaluated` at that share of the safety factor."""
-        changed = checked_factor(self.threshold, share * self.threshold.safety_factor)
+    def at_share(self, factor_share: float) -> tuple[Signal, Band]:
+        """Return `evaluated` at a share of the safety factor."""
+        changed = checked_factor(self.threshold, factor_share * self.threshold.safety_factor)
         return checked_evaluation(changed, self.recording, self.signal)
 
     @cached_property
@@ -61,15 +61,16 @@ class _Share:
 class Judgement:
     """A signal with its thresholds over a whole log; `recording` has no ground truth.
 
-    If several classes of motion apply, a sample is outside only if it is outside all of their bands. `strokes` are
-    those of a log that is cut, as they were known while it ran.
+    If several classes of motion apply, a sample is outside only if it is outside all of their bands. If no threshold
+    has a class, the first one applies everywhere; otherwise those without a class are not used. `strokes` are those of
+    a log that is cut, as they were known while it ran.
     """
 
     recording: Recording
     signal: Signal
     thresholds: tuple[FittedThreshold, ...]
     strokes: tuple[Stroke, ...]
-    hold: float = HOLD
+    grace: float = GRACE
 
     @property
     def classes(self) -> tuple[MotionClass, ...]:
@@ -79,98 +80,100 @@ class Judgement:
     @cached_property
     def evaluated(self) -> tuple[Signal, Band]:
         """Return the statistic and its band; raises RecordingError if a threshold fails."""
-        return self._merged([share.evaluated for share in self._shares])
+        return self._merged([part.evaluated for part in self._evaluations])
 
-    def narrower(self, share: float) -> Band:
-        """Return the band at that share of the safety factor."""
-        return self._merged([item.at_share(share) for item in self._shares])[1]
+    def narrower(self, factor_share: float) -> Band:
+        """Return the band at a share of the safety factor."""
+        return self._merged([item.at_share(factor_share) for item in self._evaluations])[1]
 
     @cached_property
     def met_at(self) -> FloatArray:
         """Return (n, J) the safety factor at which each sample's limit would be met; -inf without a limit."""
         met = np.full(self.signal.values.shape, np.inf)
-        judged = np.zeros(met.shape, dtype=bool)
-        for share in self._shares:
-            statistic, own = share.met_at
-            valid = share.judges[:, np.newaxis] & (statistic.status == Status.VALID)
-            rows = slice(share.rows.start, share.rows.start + len(own))
+        applied = np.zeros(met.shape, dtype=bool)
+        for part in self._evaluations:
+            statistic, own = part.met_at
+            valid = part.applies[:, np.newaxis] & (statistic.status == Status.VALID)
+            rows = slice(part.rows.start, part.rows.start + len(own))
             met[rows] = np.where(valid & ((own < met[rows]) | np.isnan(own)), own, met[rows])
-            judged[rows] |= valid
-        met[~judged] = -np.inf
+            applied[rows] |= valid
+        met[~applied] = -np.inf
         return met
 
     @cached_property
-    def _shares(self) -> tuple[_Share, ...]:
+    def _evaluations(self) -> tuple[_Evaluation, ...]:
         if not self.classes and self.thresholds and is_per_run(self.thresholds[0]) and len(self.strokes) > 1:
             return tuple(self._of_stroke(number) for number in range(len(self.strokes)))
         if not self.classes:
             everywhere = np.ones(len(self.signal.time), dtype=bool)
             rows = slice(0, len(self.signal.time))
-            return tuple(_Share(item, self.recording, self.signal, rows, everywhere) for item in self.thresholds[:1])
+            return tuple(
+                _Evaluation(item, self.recording, self.signal, rows, everywhere) for item in self.thresholds[:1]
+            )
         applied = over_speeds([item for item in self.thresholds if class_of(item) is not None])
         motions: list[Motion] = [getattr(item, "motion") for item in applied]  # noqa: B009
-        judging = judging_classes(self.recording, motions, self.strokes, self.signal.time, self.hold)
-        return tuple(self._share(applied[item.motion], item.stroke, item.where) for item in judging)
+        applicable = applicable_classes(self.recording, motions, self.strokes, self.signal.time, self.grace)
+        return tuple(self._evaluation(applied[item.motion], item.stroke, item.where) for item in applicable)
 
-    def _of_stroke(self, number: int) -> _Share:
+    def _of_stroke(self, number: int) -> _Evaluation:
         """Evaluate the threshold in one stroke alone, and at rest after it: a contact that halts it ends the stroke."""
-        judges = self.signal.time >= self.strokes[number].applies
+        applies = self.signal.time >= self.strokes[number].applies
         if number + 1 < len(self.strokes):
-            judges &= self.signal.time < self._moves_after(self.strokes[number + 1].applies)
-        return self._share(self.thresholds[0], number, judges)
+            applies &= self.signal.time < self._moves_after(self.strokes[number + 1].applies)
+        return self._evaluation(self.thresholds[0], number, applies)
 
     def _moves_after(self, applies: float) -> float:
-        """Return when a joint moves again after `applies` [s], at most `hold` later."""
+        """Return when a joint moves again after `applies` [s], at most `grace` later."""
         speed = self.recording["speed"]
         moves = speed.derived("any joint moves", lambda: speed.time[evident_speed(speed).any(axis=1)])
         after = int(np.searchsorted(moves, applies, side="right"))
-        return min(float(moves[after]) if after < len(moves) else np.inf, applies + self.hold)
+        return min(float(moves[after]) if after < len(moves) else np.inf, applies + self.grace)
 
-    def _share(self, threshold: KnownBand, number: int, judges: BoolArray) -> _Share:
+    def _evaluation(self, threshold: Evaluable, number: int, applies: BoolArray) -> _Evaluation:
         """Evaluate a class in a stroke, without other motions before it, so that its filters start there."""
         stroke = self.strokes[number]
-        after = self.strokes[number + 1].applies + self.hold if number + 1 < len(self.strokes) else np.inf
+        after = self.strokes[number + 1].applies + self.grace if number + 1 < len(self.strokes) else np.inf
         whole = len(self.strokes) == 1
         rows = slice(0, len(self.signal.time)) if whole else self.signal.rows(stroke.start, after)
         recording = self.recording if whole else self.recording.section(stroke.start, after)
         part = self.signal.part(rows)
-        judges = judges[rows]
-        if not judges.all():
-            elsewhere = part.valid & ~judges[:, np.newaxis]
+        applies = applies[rows]
+        if not applies.all():
+            elsewhere = part.valid & ~applies[:, np.newaxis]
             part = part.changed(status=np.where(elsewhere, np.uint8(Status.OTHER_SPEED), part.status))
-        return _Share(threshold, recording, part, rows, judges)
+        return _Evaluation(threshold, recording, part, rows, applies)
 
     def _merged(self, evaluated: Sequence[tuple[Signal, Band]]) -> tuple[Signal, Band]:
         """Merge several classes: the band that a sample exceeds least applies, so it is outside only if outside all."""
-        shares = self._shares
-        if len(shares) == 1 and shares[0].judges.all():
+        evaluations = self._evaluations
+        if len(evaluations) == 1 and evaluations[0].applies.all():
             return evaluated[0]
         signal, shape = self.signal, self.signal.values.shape
-        recent = speed_is_recent(self.recording, self.classes, signal.time, self.hold)
+        recent = speed_is_recent(self.recording, self.classes, signal.time, self.grace)
         values, unit = np.array(signal.values, order="C"), signal.unit
         elsewhere = np.where(recent, np.uint8(Status.OTHER_SPEED), np.uint8(Status.GAP))[:, np.newaxis]
         status = np.ascontiguousarray(np.where(signal.valid, elsewhere, signal.status))
         lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
         marks = np.zeros(shape, dtype=np.uint8)
-        for share, (statistic, band) in zip(shares, evaluated, strict=True):
+        for part, (statistic, band) in zip(evaluations, evaluated, strict=True):
             own, unit = contiguous(statistic, band), statistic.unit
-            merge_share(*own, share.judges, share.rows.start, values, status, lower, upper, least, marks)
+            merge_evaluation(*own, part.applies, part.rows.start, values, status, lower, upper, least, marks)
         # If each class monitors a different side, together they monitor none.
         status[marks == (OPEN_BELOW | OPEN_ABOVE | LIMITED)] = Status.NO_LIMIT
         return signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
 
 
-def judged(
+def judgement_of(
     recording: Recording,
     signal: Signal,
     thresholds: Sequence[FittedThreshold],
     cut: str = "whole",
-    hold: float = HOLD,
+    grace: float = GRACE,
 ) -> Judgement:
-    """Return the judgement of a log, cut into strokes by `cut`; `hold` [s]: see `recordings.motion.applicable`."""
+    """Return the judgement of a log, cut into strokes by `cut`; `grace` [s]: see `recordings.motion.applicable`."""
     seen = recording.without_ground_truth()
     strokes = strokes_so_far(seen, cut, classes_of(thresholds))
-    return Judgement(seen, signal, tuple(thresholds), tuple(strokes), hold)
+    return Judgement(seen, signal, tuple(thresholds), tuple(strokes), grace)
 
 
 def classes_of(thresholds: Sequence[FittedThreshold]) -> tuple[MotionClass, ...]:
@@ -189,12 +192,12 @@ def class_of(threshold: FittedThreshold) -> MotionClass | None:
     f"void({_MATRIX}, {_STATUS}, {_MATRIX}, {_MATRIX}, {_ROWS}, int64, "
     "float64[:,::1], uint8[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], uint8[:,::1])",
 )
-def merge_share(  # noqa: PLR0913  a kernel: one loop, arrays one by one
+def merge_evaluation(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     own_values: FloatArray,
     own_status: StatusArray,
     own_lower: FloatArray,
     own_upper: FloatArray,
-    judges: BoolArray,
+    applies: BoolArray,
     first: int,
     values: FloatArray,
     status: StatusArray,
@@ -206,7 +209,7 @@ def merge_share(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     """Take a class's statistic and limits where it is exceeded `least` so far; its own arrays begin at row `first`."""
     for j in range(own_values.shape[1]):
         for i in range(own_values.shape[0]):
-            if not judges[i]:
+            if not applies[i]:
                 continue
             k = first + i
             if own_status[i, j] != Status.VALID:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.judgement import Judgement, judged
+from cdtool.alarms.judgement import Judgement, judgement_of
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal
@@ -19,7 +19,7 @@ from cdtool.machines.dynamics import Machine
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.clock.lost_samples import lost_samples
 from cdtool.recordings.motion import MotionClass
-from cdtool.recordings.motion.applicable import HOLD
+from cdtool.recordings.motion.applicable import GRACE
 from cdtool.recordings.motion.speed_course import TOLERANCE
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.recording import Recording
@@ -38,8 +38,8 @@ class UnassessableSection:
     reason: str
     start: float
     end: float
-    way_start: float
-    way_end: float
+    position_start: float
+    position_end: float
 
 
 @dataclass(frozen=True)
@@ -112,13 +112,15 @@ class Detection:
         starts, ends = [0, *edges.tolist()], [*(edges - 1).tolist(), len(status) - 1]
         found = [(a, b) for a, b in zip(starts, ends, strict=True) if len(status) and status[a] != Status.VALID]
         recording = self.operation.recording
-        way = (
+        position = (
             previous_value(recording["position"], time)[:, joint]
             if "position" in recording
             else np.full(len(time), np.nan)
         )
         return [
-            UnassessableSection(REASONS[int(status[a])], float(time[a]), float(time[b]), float(way[a]), float(way[b]))
+            UnassessableSection(
+                REASONS[int(status[a])], float(time[a]), float(time[b]), float(position[a]), float(position[b])
+            )
             for a, b in found
         ]
 
@@ -150,7 +152,7 @@ def detect_operations(
     thresholds: Sequence[FittedThreshold],
     activation: Activation,
     watched: Sequence[str] = (),
-    hold: float = HOLD,
+    grace: float = GRACE,
 ) -> list[Detection]:
     """Run the detector over a log and compare its signal with thresholds, for each of the log's operations.
 
@@ -160,7 +162,7 @@ def detect_operations(
     if not operations:
         return []
     signal = signal_of_log(operations[0], machine, detector, watched)
-    return judge_log(operations, detector.name, signal, thresholds, activation, hold)
+    return judge_log(operations, detector.name, signal, thresholds, activation, grace)
 
 
 def _lost_inputs(detector: Detector, recording: Recording, machine: Machine, signal: Signal) -> BoolArray | None:
@@ -185,7 +187,7 @@ def detect_operation(
     return detect_operations([operation], machine, detector, thresholds, activation, watched)[0]
 
 
-def judge(
+def judge_alone(
     operation: Operation,
     detector: str,
     signal: Signal,
@@ -194,7 +196,7 @@ def judge(
 ) -> Detection:
     """Compare a detector's signal of an operation with thresholds; the log around the operation is ignored."""
     alone = replace(operation, log=None, cut="whole")
-    (detection,) = judge_log([alone], detector, signal, thresholds, activation, HOLD)
+    (detection,) = judge_log([alone], detector, signal, thresholds, activation, GRACE)
     return replace(detection, operation=operation)
 
 
@@ -237,12 +239,12 @@ def judge_log(
     signal: Signal,
     thresholds: Sequence[FittedThreshold],
     activation: Activation,
-    hold: float,
+    grace: float,
 ) -> list[Detection]:
     """Compare a detector's signal of a whole log with thresholds; as `detect_operations`."""
     if not thresholds:
         return [_nothing_learned(item, detector, signal.part(_rows(signal, item))) for item in operations]
-    judgement = judged(operations[0].whole, signal, thresholds, operations[0].cut, hold)
+    judgement = judgement_of(operations[0].whole, signal, thresholds, operations[0].cut, grace)
     statistic, band = judgement.evaluated
     inner = judgement.narrower(1.0 - activation.hysteresis) if activation.hysteresis else None
     begins = [stroke.applies for stroke in judgement.strokes[1:]]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.formats.columns import as_float64
-from cdtool.recordings.clock import EPOCH
+from cdtool.recordings.clock import THREE_YEARS
 from cdtool.recordings.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
 
 # The first stamps may be missing: so many are searched.
@@ -50,7 +50,7 @@ class EpochClock:
     @property
     def is_since_1970(self) -> bool:
         """Return whether the stamps are known to count from 1970."""
-        return self.start is not None and (self.dated or self.start > EPOCH)
+        return self.start is not None and (self.dated or self.start > THREE_YEARS)
 
     def times(self, start: int, end: int, origin: Fraction) -> FloatArray:
         """Return times [s] after `origin` if the stamps count from 1970; NaN where the stamp is missing."""

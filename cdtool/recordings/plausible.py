@@ -100,8 +100,8 @@ class PlausibleRanges:
     ) -> Recording:
         """Return the recording without implausible values, and a loss for each joint with such values.
 
-        `factors` convert a channel's logged numbers to SI, per joint. The section `to_learn` from [s] has no contact,
-        so its spikes are masked too.
+        `factors` convert a channel's logged numbers to SI, per joint. `to_learn`: start and end [s] of a section
+        without a contact, whose spikes are masked too; None: the log is assessed.
         """
         recording = recording if to_learn else self.without_contradicted(recording)
         channels, findings = dict(recording.channels), list(recording.findings)
@@ -113,7 +113,7 @@ class PlausibleRanges:
                 findings.append(Finding("learned_in_other_unit", name, {"logged": series.unit, "learned": known.unit}))
                 continue
             of_channel = factors.get(name, ())
-            if not to_learn and _is_usual(series, known, FAR.get(name, _FAR_ELSE)):
+            if not to_learn and _is_ordinary(series, known):
                 continue
             wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
             if to_learn and not name.endswith("position"):
@@ -216,9 +216,11 @@ def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
     if not medians:
         return None
     centre = np.median(np.array(medians), axis=0)
-    reach = _usual([max(_quantile(column, _SHARE) for column in np.abs(item.values - centre).T) for item in series])
-    rate = _usual([_rate(item) for item in series]) if moves else 0.0
-    extreme = _usual([_extreme(item.values - centre) for item in series])
+    reach = _of_four_fifths(
+        [max(_quantile(column, _SHARE) for column in np.abs(item.values - centre).T) for item in series]
+    )
+    rate = _of_four_fifths([_rate(item) for item in series]) if moves else 0.0
+    extreme = _of_four_fifths([_extreme(item.values - centre) for item in series])
     return ChannelRange(series[0].unit, tuple(centre.tolist()), reach, rate, extreme) if reach > 0.0 else None
 
 
@@ -239,7 +241,7 @@ def _rate(series: Series) -> float:
     return max(_quantile(column, _SHARE) for column in rates.T)
 
 
-def _usual(figures: Sequence[float]) -> float:
+def _of_four_fifths(figures: Sequence[float]) -> float:
     """Return the largest of the lowest four fifths of the runs; 0 without runs."""
     known = sorted(figure for figure in figures if np.isfinite(figure))
     return known[int(_RUNS * (len(known) - 1))] if known else 0.0
@@ -264,14 +266,14 @@ def _implausible(series: Series, known: ChannelRange, far: float, factors: Seque
     return wrong
 
 
-def _is_usual(series: Series, known: ChannelRange, far: float) -> bool:
+def _is_ordinary(series: Series, known: ChannelRange) -> bool:
     """Return True only if no value can be implausible and no step a leap: a quick look, as most channels have neither.
 
     Near the centre neither an end of a range nor a step from one end to the other is possible.
     """
     with np.errstate(invalid="ignore"):
         distance = np.abs(series.values - np.array(known.centre))
-        is_near = distance <= min(far * known.reach, _FAR_ENDS * known.reach)
+        is_near = distance <= _FAR_ENDS * known.reach  # below every FAR
         steps = np.abs(np.diff(series.values, axis=0)) if known.rate > 0.0 else np.empty(0)
         return bool(is_near.all() and (steps <= known.reach).all())
 

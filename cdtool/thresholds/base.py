@@ -14,7 +14,7 @@ from cdtool.recordings.recording import Recording
 from cdtool.thresholds.comparison_kernel import factors_met
 
 
-class KnownBand(Protocol):
+class Evaluable(Protocol):
     """What a signal is compared with: a band that is evaluated sample by sample.
 
     Notes
@@ -58,7 +58,7 @@ class KnownBand(Protocol):
         ...
 
 
-class FittedThreshold(KnownBand, Protocol):
+class FittedThreshold(Evaluable, Protocol):
     """The contract of a fitted threshold: a known band that can be stored."""
 
     def to_dict(self) -> dict[str, Any]:
@@ -123,12 +123,12 @@ class Threshold(Protocol):
         ...
 
 
-def is_per_run(threshold: Threshold | KnownBand | type) -> bool:
+def is_per_run(threshold: Threshold | Evaluable | type) -> bool:
     """Return whether a threshold determines its limits in each run itself, so that it needs no impact-free runs.
 
     Parameters
     ----------
-    threshold : Threshold, KnownBand or type
+    threshold : Threshold, Evaluable or type
         A rule, what it has fitted, or the class of one.
 
     Returns
@@ -147,7 +147,7 @@ def is_per_run(threshold: Threshold | KnownBand | type) -> bool:
 
 
 def exceedance(
-    threshold: KnownBand,
+    threshold: Evaluable,
     recording: Recording,
     signal: Signal,
     evaluated: tuple[Signal, Band] | None = None,
@@ -156,7 +156,7 @@ def exceedance(
 
     Parameters
     ----------
-    threshold : KnownBand
+    threshold : Evaluable
         The fitted threshold.
     recording : Recording
         The recording on the load side.

@@ -11,7 +11,7 @@ from cdtool.base.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.base.value_words import fault_and_place
 from cdtool.detectors.detection import Band, Signal, contiguous
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.base import FittedThreshold, KnownBand, Threshold, exceedance
+from cdtool.thresholds.base import Evaluable, FittedThreshold, Threshold, exceedance
 from cdtool.thresholds.comparison_kernel import unknown_but_valid
 
 _HINT = "an error in the threshold: see docs/own-detector.md"
@@ -57,12 +57,12 @@ def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> F
     return fitted
 
 
-def checked_evaluation(threshold: KnownBand, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
+def checked_evaluation(threshold: Evaluable, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
     """Return the statistic and band of a fitted threshold, after checking them against the contract.
 
     Parameters
     ----------
-    threshold : KnownBand
+    threshold : Evaluable
         Any known band; may come from a plug-in.
     recording : Recording
         The recording on the load side.
@@ -107,19 +107,19 @@ def checked_evaluation(threshold: KnownBand, recording: Recording, signal: Signa
     return statistic, band
 
 
-def checked_factor(threshold: KnownBand, factor: float) -> KnownBand:
+def checked_factor(threshold: Evaluable, factor: float) -> Evaluable:
     """Return the threshold with another safety factor.
 
     Parameters
     ----------
-    threshold : KnownBand
+    threshold : Evaluable
         Any known band; may come from a plug-in.
     factor : float
         The safety factor, above 0.
 
     Returns
     -------
-    KnownBand
+    Evaluable
         What `threshold.with_safety_factor` returned.
 
     Raises
@@ -142,7 +142,7 @@ def checked_factor(threshold: KnownBand, factor: float) -> KnownBand:
 
 
 def checked_exceedance(
-    threshold: KnownBand,
+    threshold: Evaluable,
     recording: Recording,
     signal: Signal,
     evaluated: tuple[Signal, Band] | None = None,
@@ -151,7 +151,7 @@ def checked_exceedance(
 
     Parameters
     ----------
-    threshold : KnownBand
+    threshold : Evaluable
         Any known band.
     recording : Recording
         The recording on the load side.

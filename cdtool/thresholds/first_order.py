@@ -15,10 +15,10 @@ def filtered_slope(values: FloatArray, step: FloatArray, time_constant: float) -
     between two samples, for any T_k. Times tau it is the high-pass s tau / (1 + s tau).
     """
     going = np.isfinite(step)
-    forget = np.where(going, np.exp(-step / time_constant), 0.0)
+    keep = np.where(going, np.exp(-step / time_constant), 0.0)
     slope = np.zeros(len(values))
     slope[1:] = np.where(going[1:], np.diff(values) / step[1:], 0.0)
-    return recursion(forget, (1.0 - forget) * slope)
+    return recursion(keep, (1.0 - keep) * slope)
 
 
 def low_passed(values: FloatArray, step: FloatArray, time_constant: float) -> FloatArray:
@@ -27,22 +27,22 @@ def low_passed(values: FloatArray, step: FloatArray, time_constant: float) -> Fl
     y_k = a y_{k-1} + (1 - a) (u_k + u_{k-1}) / 2, a = exp(-T_k / tau).
     """
     going = np.isfinite(step)
-    forget = np.where(going, np.exp(-step / time_constant), 0.0)
+    keep = np.where(going, np.exp(-step / time_constant), 0.0)
     mean = values.copy()
     mean[1:] = np.where(going[1:], 0.5 * (values[1:] + values[:-1]), values[1:])
-    return recursion(forget, (1.0 - forget) * mean)
+    return recursion(keep, (1.0 - keep) * mean)
 
 
-def recursion(forget: FloatArray, drive: FloatArray) -> FloatArray:
+def recursion(keep: FloatArray, drive: FloatArray) -> FloatArray:
     """Return y_k = forget_k y_{k-1} + drive_k (m,), from y = 0."""
     result = np.empty(len(drive))
-    _recursion(np.ascontiguousarray(forget), np.ascontiguousarray(drive), result)
+    _recursion(np.ascontiguousarray(keep), np.ascontiguousarray(drive), result)
     return result
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, float64[::1])")
-def _recursion(forget: FloatArray, drive: FloatArray, result: FloatArray) -> None:
+def _recursion(keep: FloatArray, drive: FloatArray, result: FloatArray) -> None:
     y = 0.0
     for k in range(len(drive)):
-        y = forget[k] * y + drive[k]
+        y = keep[k] * y + drive[k]
         result[k] = y

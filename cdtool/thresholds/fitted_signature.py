@@ -22,6 +22,7 @@ from cdtool.recordings.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_S
 from cdtool.recordings.motion.speed_course import SpeedCourse
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.running_level_kernel import follow_level
+from cdtool.thresholds.settings import SIDES, watched_side
 from cdtool.thresholds.signature_curve import Curve, resample
 
 PlaceArray = npt.NDArray[np.int32]
@@ -31,23 +32,8 @@ _PLACES = "Array(int32, 1, 'C', readonly=True)"
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 
 
-class Grids(NamedTuple):
-    """The grids of a signature's curves over time and over travel; a curve that is not used has no `points`.
-
-    The points over time are the first `time_points`; `time_end`: the last one that enough runs have reached.
-    """
-
-    points: FloatArray
-    time_points: float
-    time_step: float
-    time_end: float
-    travel_step: float
-
-
-Rule = Literal["pooled", "thesis"]
-Sides = Literal["one", "two"]
-RULES: tuple[Rule, ...] = get_args(Rule)
-SIDES: tuple[Sides, ...] = get_args(Sides)
+SpreadRule = Literal["pooled", "thesis"]
+SPREAD_RULES: tuple[SpreadRule, ...] = get_args(SpreadRule)
 
 
 @dataclass(frozen=True)
@@ -66,7 +52,7 @@ class FittedSignature(SendsFields):
     signed: bool
     joints: tuple[str, ...]
     by_time: Curve
-    by_position: Curve
+    by_travel: Curve
     adaptive_level: float = 0.0
     speed_range: bool = False
 
@@ -99,14 +85,14 @@ class FittedSignature(SendsFields):
             learned, given = (str(item.shape[1]) for item in (self.by_time.count, signal.values))
             raise SignatureError(f"learned for {learned} joints, not for {given}", "learn a signature for these")
 
-    def normal(self, where: Progress, status: StatusArray) -> tuple[FloatArray, FloatArray]:
+    def normal(self, at: Progress, status: StatusArray) -> tuple[FloatArray, FloatArray]:
         """Return mean and spread (n, J) at each location; NaN where too few runs were. `status` (n J,) is not changed.
 
-        The location is the time while `where` does not run, and the travel from there on.
+        The location is the time until `at.running`, and the travel from there on.
         """
-        shape = len(where.elapsed), self.by_time.count.shape[1]
+        shape = len(at.elapsed), self.by_time.count.shape[1]
         mean, spread = np.empty(shape), np.empty(shape)
-        limits_at(*self._located(where), *self._mean, *self._spread, status, mean, spread, np.empty_like(status))
+        limits_at(*self._located(at), *self._mean, *self._spread, status, mean, spread, np.empty_like(status))
         return mean, spread
 
     def _places(self, recording: Recording, clock: FloatArray) -> tuple[PlaceArray, PlaceArray, FloatArray]:
@@ -119,28 +105,28 @@ class FittedSignature(SendsFields):
     @cached_property
     def _content_of_grids(self) -> tuple[object, ...]:
         """What decides where a sample is on the grids: the motion and the grids themselves."""
-        motion, time, travel = self.motion, self.by_time, self.by_position
+        motion, time, travel = self.motion, self.by_time, self.by_travel
         grids = (self.alignment, time.step, len(time.count), time.end, travel.step, len(travel.count))
         return "places", motion.direction, motion.nominal_speed, motion.joint, *grids
 
-    def _located(self, where: Progress) -> tuple[PlaceArray, PlaceArray, FloatArray]:
-        place, nearest = (np.empty(len(where.elapsed), dtype=np.int32) for _ in range(2))
-        beyond = np.empty(len(where.elapsed))
-        locate(where.elapsed, where.travel, where.running, self._grids, place, nearest, beyond)
+    def _located(self, at: Progress) -> tuple[PlaceArray, PlaceArray, FloatArray]:
+        place, nearest = (np.empty(len(at.elapsed), dtype=np.int32) for _ in range(2))
+        beyond = np.empty(len(at.elapsed))
+        locate(at.elapsed, at.travel, at.running, self._grids, place, nearest, beyond)
         return place, nearest, beyond
 
     @cached_property
     def _used(self) -> tuple[Curve, ...]:
         """The curves that the alignment uses, that over time first."""
-        curves = {"time": (self.by_time,), "position": (self.by_position,)}
-        return curves.get(self.alignment, (self.by_time, self.by_position))
+        curves = {"time": (self.by_time,), "position": (self.by_travel,)}
+        return curves.get(self.alignment, (self.by_time, self.by_travel))
 
     @cached_property
-    def _grids(self) -> Grids:
-        time, travel = self.by_time, self.by_position
+    def _grids(self) -> _KernelGrids:
+        time, travel = self.by_time, self.by_travel
         points = read_only(np.concatenate([curve.grid for curve in self._used]))
         time_points = float(len(time.count)) if self.alignment != "position" else 0.0
-        return Grids(points, time_points, float(time.step), float(time.end), float(travel.step))
+        return _KernelGrids(points, time_points, float(time.step), float(time.end), float(travel.step))
 
     @cached_property
     def _lower(self) -> tuple[FloatArray, FloatArray, bool]:
@@ -176,41 +162,41 @@ class FittedSignature(SendsFields):
         mean, spread = curve.band(self.pooled)
         reach = self.safety_factor * spread
         lower, upper = mean - reach, mean + reach
-        if self.watched < 0:
+        if self.side < 0:
             upper = np.where(np.isnan(upper), np.nan, np.inf)
-        elif self.watched > 0:
+        elif self.side > 0:
             lower = np.where(np.isnan(lower), np.nan, -np.inf)
         return lower, upper
 
     def with_run(
-        self, recording: Recording, signal: Signal, forget: float | None = None, cap: float | None = None
+        self, recording: Recording, signal: Signal, effective_runs: float | None = None, cap: float | None = None
     ) -> FittedSignature:
-        """Return the signature with one more impact-free run: Welford's update, or forgetting with N_eff = `forget`.
+        """Return the signature with one more impact-free run: Welford's update, or one of weight 1 / `effective_runs`.
 
         `cap`: at each grid point the run counts as no further than that many spreads from the mean (see `guarded`).
         """
-        by_time, by_position = self.samples(recording, signal)
+        by_time, by_travel = self.samples(recording, signal)
         if cap is not None:
             by_time = self.by_time.clipped(by_time, cap, self.pooled)
-            by_position = self.by_position.clipped(by_position, cap, self.pooled)
+            by_travel = self.by_travel.clipped(by_travel, cap, self.pooled)
         return replace(
             self,
-            by_time=self.by_time.updated(by_time, forget),
-            by_position=self.by_position.updated(by_position, forget),
+            by_time=self.by_time.updated(by_time, effective_runs),
+            by_travel=self.by_travel.updated(by_travel, effective_runs),
         )
 
     def without_run(self, recording: Recording, signal: Signal) -> FittedSignature:
         """Return the signature as learned from all its runs except this one, on the same grid; not after forgetting."""
-        by_time, by_position = self.samples(recording, signal)
-        return replace(self, by_time=self.by_time.without(by_time), by_position=self.by_position.without(by_position))
+        by_time, by_travel = self.samples(recording, signal)
+        return replace(self, by_time=self.by_time.without(by_time), by_travel=self.by_travel.without(by_travel))
 
     def samples(self, recording: Recording, signal: Signal) -> tuple[FloatArray, FloatArray]:
-        """Return the values of one run on the grids of `by_time` and `by_position`, each (g, J); NaN without a value"""
-        where = self.progress(recording, signal.time)
-        by_time, by_position = (
-            resample(signal, where, curve, axis) for curve, axis in axes_of(self.by_time, self.by_position, where)
+        """Return the values of one run on the grids of `by_time` and `by_travel`, each (g, J); NaN without a value"""
+        at = self.progress(recording, signal.time)
+        by_time, by_travel = (
+            resample(signal, at, curve, axis) for curve, axis in axes_of(self.by_time, self.by_travel, at)
         )
-        return by_time, by_position
+        return by_time, by_travel
 
     def with_safety_factor(self, factor: float) -> FittedSignature:
         """Return the signature with its limits at `factor` spreads from the mean."""
@@ -222,11 +208,9 @@ class FittedSignature(SendsFields):
         return replace(self, safety_factor=2.0 * self.safety_factor)
 
     @property
-    def watched(self) -> int:
+    def side(self) -> int:
         """The side with a limit: +1 above, -1 below, 0 both."""
-        if self.sides == "two":
-            return 0
-        return -1 if self.signed and self.motion.direction < 0 else 1
+        return watched_side(self.sides, self.motion, self.signed)
 
     @property
     def pooled(self) -> bool:
@@ -236,7 +220,7 @@ class FittedSignature(SendsFields):
     @property
     def runs(self) -> int:
         """The largest number of runs at any grid point."""
-        return int(max(self.by_time.count.max(initial=0), self.by_position.count.max(initial=0)))
+        return int(max(self.by_time.count.max(initial=0), self.by_travel.count.max(initial=0)))
 
     def changes_curve(self, recording: Recording, clock: FloatArray) -> BoolArray:
         """Return True (n,) at the sample from which travel counts instead of time: mean and spread may jump there."""
@@ -261,7 +245,7 @@ class FittedSignature(SendsFields):
             "signed": self.signed,
             "joints": list(self.joints),
             "by_time": self.by_time.to_dict(),
-            "by_position": self.by_position.to_dict(),
+            "by_position": self.by_travel.to_dict(),
             "adaptive_level": self.adaptive_level,
             "speed_range": self.speed_range,
         }
@@ -278,13 +262,13 @@ class FittedSignature(SendsFields):
                 str(values.get("speed_unit", "")),
             ),
             alignment=known("alignment", values["alignment"], ALIGNMENTS),
-            rule=known("rule", values["rule"], RULES),
+            rule=known("rule", values["rule"], SPREAD_RULES),
             sides=known("sides", values["sides"], SIDES),
             safety_factor=float(values["safety_factor"]),
             signed=bool(values["signed"]),
             joints=tuple(map(str, values["joints"])),
             by_time=Curve.from_dict(values["by_time"]),
-            by_position=Curve.from_dict(values["by_position"]),
+            by_travel=Curve.from_dict(values["by_position"]),
             adaptive_level=float(values.get("adaptive_level", 0.0)),
             speed_range=bool(values.get("speed_range", False)),
         )
@@ -300,9 +284,9 @@ def progress_of(recording: Recording, clock: FloatArray, motion: MotionClass) ->
     return progress(recording, clock, motion.direction, start, running, motion.joint)
 
 
-def axes_of(by_time: Curve, by_position: Curve, where: Progress) -> tuple[tuple[Curve, FloatArray], ...]:
+def axes_of(by_time: Curve, by_travel: Curve, at: Progress) -> tuple[tuple[Curve, FloatArray], ...]:
     """Return each curve with its axis."""
-    return ((by_time, where.elapsed), (by_position, where.travel))
+    return ((by_time, at.elapsed), (by_travel, at.travel))
 
 
 def known(what: str, value: Any, allowed: Sequence[str]) -> str:
@@ -337,16 +321,30 @@ def known(what: str, value: Any, allowed: Sequence[str]) -> str:
     return str(value)
 
 
+class _KernelGrids(NamedTuple):
+    """The grids of a signature's curves over time and over travel; a curve that is not used has no `points`.
+
+    The points over time are the first `time_points`: a float, the only type of number that `fields_of` has.
+    `time_end`: the last one that enough runs have reached.
+    """
+
+    points: FloatArray
+    time_points: float
+    time_step: float
+    time_end: float
+    travel_step: float
+
+
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(Grids)}, int32[::1], int32[::1], "
-    "float64[::1])",
+    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(_KernelGrids)}, int32[::1], "
+    "int32[::1], float64[::1])",
     exact=True,
 )
 def locate(  # noqa: C901  a kernel: one loop, arrays one by one
     elapsed: FloatArray,
     travel: FloatArray,
     running: BoolArray,
-    grids: Grids,
+    grids: _KernelGrids,
     place: PlaceArray,
     nearest: PlaceArray,
     beyond: FloatArray,
@@ -446,12 +444,12 @@ def limits_at(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     status: StatusArray,
     lower: FloatArray,
     upper: FloatArray,
-    limited: StatusArray,
+    new_status: StatusArray,
 ) -> None:
-    """Fill both limits (n, J), and `limited` (n J,): `status` with NO_LIMIT where a valid sample's limit is unknown."""
+    """Fill both limits (n, J), and `new_status` (n J,): `status`, NO_LIMIT where a valid sample's limit is unknown."""
     _limit_at(place, nearest, beyond, lower_table, lower_slope, lower_has_infinite, lower)
     _limit_at(place, nearest, beyond, upper_table, upper_slope, upper_has_infinite, upper)
     low, high = lower.reshape(lower.size), upper.reshape(upper.size)
     for i in range(len(status)):
-        unlimited = (status[i] == Status.VALID) & ((low[i] != low[i]) | (high[i] != high[i]))
-        limited[i] = Status.NO_LIMIT.value if unlimited else status[i]
+        unknown = (status[i] == Status.VALID) & ((low[i] != low[i]) | (high[i] != high[i]))
+        new_status[i] = Status.NO_LIMIT.value if unknown else status[i]

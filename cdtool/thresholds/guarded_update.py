@@ -29,7 +29,7 @@ def guarded(
     current: FittedSignature,
     recording: Recording,
     signal: Signal,
-    forget: float | None = None,
+    effective_runs: float | None = None,
     cap: float = CAP,
     reserve: float = RESERVE,
 ) -> FittedSignature:
@@ -45,8 +45,9 @@ def guarded(
         The run, on the load side.
     signal : Signal
         The detector's signal of the run.
-    forget : float, optional
-        Effective number of runs: the weight of the run is w = 1 / forget. By default Welford's update, w = 1 / (n + 1).
+    effective_runs : float, optional
+        How many runs are remembered: the weight of this one is w = 1 / effective_runs. By default Welford's update,
+        w = 1 / (n + 1).
     cap : float
         The deviation of the run from the mean is clipped to this many spreads; see `largest_move` for the effect.
     reserve : float
@@ -72,10 +73,10 @@ def guarded(
         if not value > 0.0:
             raise UsageError(f"{name} is {value:g}", "a number of spreads above 0")
     check_complete(current, recording, signal)
-    updated = current.with_run(recording, signal, forget, cap)
-    where = current.progress(recording, signal.time)
+    updated = current.with_run(recording, signal, effective_runs, cap)
+    at = current.progress(recording, signal.time)
     unit = recording["position"].unit
-    for part in _parts(first.with_safety_factor(updated.safety_factor), updated, where):
+    for part in _parts(first.with_safety_factor(updated.safety_factor), updated, at):
         part.check(reserve, unit)
     return updated
 
@@ -94,9 +95,9 @@ def largest_move(safety_factor: float, weight: float, cap: float) -> float:
 
 def check_complete(signature: FittedSignature, recording: Recording, signal: Signal) -> None:
     """Raise SignatureError, with the share that was covered, if a run ends before the stroke that was learned."""
-    where = signature.progress(recording, signal.time)
+    at = signature.progress(recording, signal.time)
     by_time = signature.alignment == "time"
-    reached, end = (where.elapsed, signature.by_time.end) if by_time else (where.travel, signature.by_position.end)
+    reached, end = (at.elapsed, signature.by_time.end) if by_time else (at.travel, signature.by_travel.end)
     share = float(np.nanmax(reached, initial=0.0)) / end if end > 0.0 else 1.0
     if share < _COMPLETE:
         raise SignatureError(
@@ -142,18 +143,18 @@ class _CurveLimits:
         return f"at {at:.2f} {unit}" if self.axis == "travel" else f"{at:.2f} s after the motion began"
 
 
-def _parts(first: FittedSignature, updated: FittedSignature, where: Progress) -> list[_CurveLimits]:
+def _parts(first: FittedSignature, updated: FittedSignature, at: Progress) -> list[_CurveLimits]:
     """Return the part that counts of each curve: of time until this run had accelerated, of travel from then."""
-    running = np.flatnonzero(where.running)
-    begun = int(running[0]) if len(running) else len(where.elapsed) - 1
+    running = np.flatnonzero(at.running)
+    begun = int(running[0]) if len(running) else len(at.elapsed) - 1
     mixed = first.alignment == "time_then_position"
     parts = []
     if first.alignment != "position":
-        until = float(where.elapsed[begun]) if mixed else np.inf
+        until = float(at.elapsed[begun]) if mixed else np.inf
         parts.append(_part("time", first, updated, first.by_time, updated.by_time, (0.0, until)))
     if first.alignment != "time":
-        since = float(where.travel[begun]) if mixed else 0.0
-        parts.append(_part("travel", first, updated, first.by_position, updated.by_position, (since, np.inf)))
+        since = float(at.travel[begun]) if mixed else 0.0
+        parts.append(_part("travel", first, updated, first.by_travel, updated.by_travel, (since, np.inf)))
     return parts
 
 

@@ -86,17 +86,17 @@ class NormalMotion:
 
     def _compared(self, recording: Recording, channel: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         curve, signal = self.channels[channel], _signal(recording, channel, self.motion)
-        where = curve.progress(recording, signal.time)
-        mean, spread = curve.normal(where, np.zeros(signal.values.size, dtype=np.uint8))
+        at = curve.progress(recording, signal.time)
+        mean, spread = curve.normal(at, np.zeros(signal.values.size, dtype=np.uint8))
         share = SMALLEST_OF_COMMAND if channel in REFERENCES else SMALLEST_SPREAD
-        largest = np.max([np.abs(part.mean).max(axis=0) for part in (curve.by_time, curve.by_position)], axis=0)
+        largest = np.max([np.abs(part.mean).max(axis=0) for part in (curve.by_time, curve.by_travel)], axis=0)
         return signal.values, mean, np.maximum(spread, share * largest)
 
-    def with_run(self, recording: Recording, cap: float, forget: float | None = None) -> NormalMotion:
+    def with_run(self, recording: Recording, cap: float, effective_runs: float | None = None) -> NormalMotion:
         """Return the bands with one more impact-free run, updated and clipped like a signature."""
         return NormalMotion(
             {
-                name: curve.with_run(recording, _signal(recording, name, self.motion), forget, cap)
+                name: curve.with_run(recording, _signal(recording, name, self.motion), effective_runs, cap)
                 if name in recording
                 else curve
                 for name, curve in self.channels.items()

@@ -27,7 +27,7 @@ class SequentialRule(Threshold, Protocol):
 
     @property
     def sides(self) -> str | None:
-        """One or two; None is two."""
+        """One or two; None, not filled in by `with_context`, is two."""
         ...
 
     @property

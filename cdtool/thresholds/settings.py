@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Annotated, TypeVar
+from typing import Annotated, Literal, TypeVar, get_args
 
 from msgspec import Meta
 
 from cdtool.base.settings import Positive, setting
 from cdtool.recordings.motion import MotionClass
 from cdtool.thresholds.base import Threshold
-from cdtool.thresholds.fitted_signature import Sides
 from cdtool.thresholds.limit import FittedLimit
 
 Rule = TypeVar("Rule", bound=Threshold)
+Sides = Literal["one", "two"]
+SIDES: tuple[Sides, ...] = get_args(Sides)
 
 SafetyFactor = Annotated[Positive, setting("k: spreads from the learned mean, or from 0, to the limit")]
+# None: not filled in by `with_context` or `Signature.sided`. `fit` then monitors two sides, that of a signature one.
 SidesOfMachine = Annotated[
     Sides | None,
     setting("the side that opposes the motion, or both; default: one for a single joint, two for several"),
 ]
-#: A differential of a higher order amplifies noise more than it whitens.
+#: A model of a higher order fits the noise of the runs that it is learned from.
 LARGEST_ORDER = 20
 Order = Annotated[
     Annotated[int, Meta(ge=1, le=LARGEST_ORDER)], setting("order of the model that predicts the next sample")

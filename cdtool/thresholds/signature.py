@@ -18,12 +18,11 @@ from cdtool.recordings.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
     FittedSignature,
-    Rule,
-    Sides,
+    SpreadRule,
     axes_of,
     progress_of,
 )
-from cdtool.thresholds.settings import SidesOfMachine
+from cdtool.thresholds.settings import Sides, SidesOfMachine
 from cdtool.thresholds.signature_curve import Curve, resample
 
 ENOUGH_RUNS = 10
@@ -76,7 +75,7 @@ class Signature:
         setting("location along the stroke: time while accelerating, then travel; or one of them"),
     ] = "time_then_position"
     rule: Annotated[
-        Rule,
+        SpreadRule,
         setting(
             "pooled: spread over neighbours within the window, with the deviation of the mean from its smoothed curve; "
             "thesis: mean + 1 standard deviation at each point, which raises an alarm in almost every run"
@@ -126,7 +125,7 @@ class Signature:
         return 1.0 if self.rule == "thesis" else 5.5
 
     def sided(self, default: Sides) -> Signature:
-        """Return the rule with the sides of the machine, unless it states its own."""
+        """Return the rule with the sides of the machine, unless it states its own; `fit` without either: one side."""
         return self if self.sides else replace(self, sides=default)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedSignature:
@@ -136,13 +135,13 @@ class Signature:
 
     def fit_class(self, pairs: Sequence[tuple[Recording, Signal]], motion: MotionClass) -> FittedSignature:
         """Learn from impact-free runs that are known to be of one class of motion; raises as `fit`."""
-        wheres = [progress_of(recording, signal.time, motion) for recording, signal in pairs]
+        places = [progress_of(recording, signal.time, motion) for recording, signal in pairs]
         joints = pairs[0][1].values.shape[1]
         # In time the grid and the window are what they are in position at the nominal speed.
         pace = 1.0 / motion.nominal_speed
         step, window = pace * self.position_step, pace * self.position_window
-        lasting = self._longest_time(wheres)
-        longest = max((float(np.nanmax(where.travel, initial=0.0)) for where in wheres), default=0.0)
+        lasting = self._longest_time(places)
+        longest = max((float(np.nanmax(at.travel, initial=0.0)) for at in places), default=0.0)
         if max(longest / self.position_step, lasting / step) > MOST_PLACES:
             unit = pairs[0][0]["position"].unit
             raise UsageError(
@@ -151,11 +150,11 @@ class Signature:
                 "correct it, or set a larger position_step in [signature]",
             )
         by_time = Curve.empty(step, window, lasting, joints)
-        by_position = Curve.empty(self.position_step, self.position_window, longest, joints)
+        by_travel = Curve.empty(self.position_step, self.position_window, longest, joints)
         samples: tuple[list[FloatArray], list[FloatArray]] = ([], [])
-        for (_, signal), where in zip(pairs, wheres, strict=True):
-            for store, (curve, axis) in zip(samples, axes_of(by_time, by_position, where), strict=True):
-                store.append(resample(signal, where, curve, axis))
+        for (_, signal), at in zip(pairs, places, strict=True):
+            for store, (curve, axis) in zip(samples, axes_of(by_time, by_travel, at), strict=True):
+                store.append(resample(signal, at, curve, axis))
         fitted = FittedSignature(
             motion=motion,
             alignment=self.alignment,
@@ -165,11 +164,11 @@ class Signature:
             signed=pairs[0][1].signed,
             joints=pairs[0][1].joints,
             by_time=by_time.learned(np.array(samples[0])),
-            by_position=by_position.learned(np.array(samples[1])),
+            by_travel=by_travel.learned(np.array(samples[1])),
             adaptive_level=self.adaptive_level,
             speed_range=self.speed_range,
         )
-        if not any(np.isfinite(curve.band(True)[0]).any() for curve in (fitted.by_time, fitted.by_position)):
+        if not any(np.isfinite(curve.band(True)[0]).any() for curve in (fitted.by_time, fitted.by_travel)):
             reasons = pairs[0][1].why_not() if not pairs[0][1].valid.any() else "valid in too few runs at a time"
             raise NothingValidError(
                 f"the runs share no part of the stroke where the signal is assessable ({reasons})",
@@ -187,10 +186,10 @@ class Signature:
                 f"{runs} impact-free {many} of one class: {more}", "add runs" if self.force else f"add runs; {fewer}"
             )
 
-    def _longest_time(self, wheres: Sequence[Progress]) -> float:
+    def _longest_time(self, places: Sequence[Progress]) -> float:
         lasting = []
-        for where in wheres:
-            part = where.elapsed if self.alignment == "time" else where.elapsed[~where.running]
+        for at in places:
+            part = at.elapsed if self.alignment == "time" else at.elapsed[~at.running]
             lasting.append(float(np.nanmax(part, initial=0.0)))
         reserve = 1.0 if self.alignment == "time" else _TIME_RESERVE
         return reserve * max(lasting, default=0.0)

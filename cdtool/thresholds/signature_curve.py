@@ -68,17 +68,17 @@ class Curve(SendsFields):
         squares = np.where(present, (samples - mean) ** 2, 0.0).sum(axis=0)
         return replace(self, count=count, mean=mean, squares=squares)
 
-    def updated(self, sample: FloatArray, forget: float | None) -> Curve:
-        """Return the curve with one more run (g, J): Welford's update, or forgetting with N_eff = `forget`."""
+    def updated(self, sample: FloatArray, effective_runs: float | None) -> Curve:
+        """Return the curve with one more run (g, J): Welford's update, or one of weight 1 / `effective_runs`."""
         present = np.isfinite(sample)
         deviation = np.where(present, sample - self.mean, 0.0)
-        if forget is None:
+        if effective_runs is None:
             count = self.count + present
             mean = self.mean + np.divide(deviation, count, out=np.zeros_like(deviation), where=count > 0)
             squares = self.squares + deviation * np.where(present, sample - mean, 0.0)
             return replace(self, count=count, mean=mean, squares=squares)
         known = present & (self.count >= 2)
-        weight = 1.0 / forget
+        weight = 1.0 / effective_runs
         variance = self._variance()
         moved = (1.0 - weight) * (variance + weight * deviation**2)
         squares = np.where(known, moved * np.maximum(self.count - 1.0, 1.0), self.squares)
@@ -158,21 +158,21 @@ class Curve(SendsFields):
         return self.squares / np.maximum(self.count - 1.0, 1.0)
 
 
-def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) -> FloatArray:
+def resample(signal: Signal, at: Progress, curve: Curve, axis: FloatArray) -> FloatArray:
     """Return the values of one run (g, J) on the grid of a curve: the sample that first passes each grid point, or NaN.
 
     A sample, not a value between two: interpolation would average their noise and make the spread too small. In a log
     with fewer samples than grid points, each sample represents those that it has passed since the last one.
     """
     result = np.full((len(curve.count), signal.values.shape[1]), np.nan)
-    located = np.isfinite(where.elapsed) & np.isfinite(axis)
+    located = np.isfinite(at.elapsed) & np.isfinite(axis)
     along, values = np.empty((2, len(axis)))
     for j in range(result.shape[1]):
         count = first_passes(axis, signal.values[:, j], signal.valid[:, j] & located, along, values)
         # After an interval without valid samples the next sample is too far away to represent the grid point.
         usual = float(np.median(np.diff(along[:count]))) if count > 1 else 0.0
-        nearest = _FURTHEST_STEPS * max(curve.step, usual)
-        fill_passed(curve.grid, along[:count], values[:count], nearest, result[:, j])
+        furthest = _FURTHEST_STEPS * max(curve.step, usual)
+        fill_passed(curve.grid, along[:count], values[:count], furthest, result[:, j])
     return result
 
 
@@ -192,11 +192,11 @@ def first_passes(axis: FloatArray, samples: FloatArray, use: BoolArray, along: F
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64, float64[:])", exact=True)
-def fill_passed(grid: FloatArray, along: FloatArray, values: FloatArray, nearest: float, result: FloatArray) -> None:
-    """Fill the value of the first location at or after each grid point, if it is within `nearest` of it."""
+def fill_passed(grid: FloatArray, along: FloatArray, values: FloatArray, furthest: float, result: FloatArray) -> None:
+    """Fill the value of the first location at or after each grid point, if it is at most `furthest` beyond it."""
     at = 0
     for k in range(len(grid)):
         while at < len(along) and along[at] < grid[k]:
             at += 1
-        if at < len(along) and along[at] - grid[k] <= nearest:
+        if at < len(along) and along[at] - grid[k] <= furthest:
             result[k] = values[at]

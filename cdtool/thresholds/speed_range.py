@@ -32,7 +32,7 @@ from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.recordings.motion.progress import Progress
 from cdtool.recordings.motion.speed_range import SpeedRange, in_ranges
 from cdtool.recordings.recording import Recording
-from cdtool.thresholds.base import KnownBand
+from cdtool.thresholds.base import Evaluable
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.running_level_kernel import follow_level
 
@@ -74,9 +74,9 @@ class SignatureOverSpeeds(SendsFields):
         flat = np.ascontiguousarray(signal.status).reshape(-1)
         means, spreads = np.empty((2, len(self.signatures), *shape))
         for number, item in enumerate(self.signatures):
-            where = item.progress(recording, signal.time)
-            running = where.elapsed >= self.motion.running_from(number)
-            means[number], spreads[number] = item.normal(Progress(where.elapsed, where.travel, running), flat)
+            at = item.progress(recording, signal.time)
+            running = at.elapsed >= self.motion.running_from(number)
+            means[number], spreads[number] = item.normal(Progress(at.elapsed, at.travel, running), flat)
             if not number:
                 slowest_runs = running
         speed = self.motion.speed_so_far(recording, signal.time)
@@ -86,9 +86,9 @@ class SignatureOverSpeeds(SendsFields):
         lower, upper = lowest - reach, highest + reach
         known = np.isfinite(spread)
         status = np.where(known | (signal.status != Status.VALID), signal.status, np.uint8(Status.NO_LIMIT))
-        if slowest.watched > 0:
+        if slowest.side > 0:
             lower[known] = -np.inf
-        elif slowest.watched < 0:
+        elif slowest.side < 0:
             upper[known] = np.inf
         if slowest.adaptive_level > 0.0:
             teaches = np.where(np.isnan(speed)[:, np.newaxis], np.uint8(Status.NO_LIMIT), status)
@@ -101,17 +101,17 @@ class SignatureOverSpeeds(SendsFields):
         return np.array([item.motion.nominal_speed for item in self.signatures])
 
 
-def over_speeds(thresholds: Sequence[KnownBand]) -> tuple[KnownBand, ...]:
+def over_speeds(thresholds: Sequence[Evaluable]) -> tuple[Evaluable, ...]:
     """Return the thresholds that apply to a log: signatures of neighbouring speeds with `speed_range` become one.
 
     Parameters
     ----------
-    thresholds : sequence of KnownBand
+    thresholds : sequence of Evaluable
         The fitted thresholds of a signature file, one per class of motion.
 
     Returns
     -------
-    tuple of KnownBand
+    tuple of Evaluable
         Those of a direction and joint with a single class, and those without `speed_range`, as they are.
 
     Examples
@@ -129,7 +129,7 @@ def over_speeds(thresholds: Sequence[KnownBand]) -> tuple[KnownBand, ...]:
             members = tuple(own[number] for number in numbers)
             made = SignatureOverSpeeds(members, members[0].safety_factor)
             ranges.update((id(item), made) for item in members)
-    applied: list[KnownBand] = []
+    applied: list[Evaluable] = []
     for item in thresholds:
         found = ranges.get(id(item), item)
         if not any(found is other for other in applied):

@@ -29,7 +29,7 @@ class StatisticRule(Threshold, Protocol):
 
     @property
     def sides(self) -> str | None:
-        """One or two; None is two."""
+        """One or two; None, not filled in by `with_context`, is two."""
         ...
 
     def statistic(self, signal: Signal, period: float) -> Signal:

@@ -40,17 +40,17 @@ class CellClock:
         """Return the longest step between samples that is not a hole [s]."""
         if len(self.time) < 2:
             return CLOSE_ENOUGH
-        period, usual = self._steps
-        return max(CLOSE_ENOUGH, _ONE_LOST * period, period + _MORE * usual)
+        period, long_step = self._steps
+        return max(CLOSE_ENOUGH, _ONE_LOST * period, period + _MORE * long_step)
 
     @property
     def batch_length(self) -> float:
         """Return how far a stamp may be behind its sample if samples are stamped in batches [s]; else 0.
 
-        In batches the step that one in 20 exceeds is many times the usual one.
+        In batches the step that one in 20 exceeds is many times the median one.
         """
-        period, usual = self._steps
-        return usual if usual > _BATCH * period else 0.0
+        period, long_step = self._steps
+        return long_step if long_step > _BATCH * period else 0.0
 
     @cached_property
     def _steps(self) -> tuple[float, float]:
@@ -66,8 +66,8 @@ class CellClock:
         low, high = float(steps[before]), float(steps[min(before + 1, last)])
         # As numpy interpolates: from the nearer of the two.
         weight = place - before
-        usual = high - (high - low) * (1.0 - weight) if weight >= 0.5 else low + (high - low) * weight
-        return period, usual
+        long_step = high - (high - low) * (1.0 - weight) if weight >= 0.5 else low + (high - low) * weight
+        return period, long_step
 
 
 @dataclass(frozen=True)

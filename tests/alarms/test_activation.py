@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.alarms.activation import Activation, begins_at, crossings_of
-from cdtool.alarms.pipeline import judge
+from cdtool.alarms.pipeline import judge_alone
 from cdtool.base.errors import UsageError
 from cdtool.detectors.detection import Band, Signal
 from cdtool.recordings.motion import MotionClass
@@ -64,7 +64,9 @@ def judged(values, activation):
     time = np.arange(len(values)) * 1e-3
     recording = Recording("r", "r", ("a",), {"speed": Series(time, np.ones(values.shape), "m/s")})
     signal = Signal(time, values, np.zeros(values.shape, dtype=np.uint8), "N", joints=("a",))
-    found = judge(Operation(recording, MotionClass(1, 1.0)), "d", signal, (Limit.given([1.0]),), activation).verdict
+    found = judge_alone(
+        Operation(recording, MotionClass(1, 1.0)), "d", signal, (Limit.given([1.0]),), activation
+    ).verdict
     return tuple([round(1e3 * alarm.time) for alarm in items] for items in (found.alarms, found.crossings))
 
 

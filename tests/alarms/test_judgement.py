@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from cdtool.alarms.judgement import Judgement, judged
+from cdtool.alarms.judgement import Judgement, judgement_of
 from cdtool.base.arrays import FloatArray
 from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.recordings.motion import MotionClass
-from cdtool.recordings.motion.applicable import HOLD, judging_classes, speed_is_recent
+from cdtool.recordings.motion.applicable import GRACE, applicable_classes, speed_is_recent
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import with_limits
 from tests.bits import assert_same_bits
@@ -43,14 +43,14 @@ def merged_by_arrays(judgement: Judgement, share_of_factor: float) -> tuple[Floa
     """Values, status and band of all classes that judge, by the rule for whole arrays."""
     signal, shape = judgement.signal, judgement.signal.values.shape
     values = signal.values.copy()
-    recent = speed_is_recent(judgement.recording, judgement.classes, signal.time, judgement.hold)[:, np.newaxis]
+    recent = speed_is_recent(judgement.recording, judgement.classes, signal.time, judgement.grace)[:, np.newaxis]
     status = np.where(signal.valid, np.where(recent, Status.OTHER_SPEED, Status.GAP), signal.status).astype(np.uint8)
     lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
     open_below, open_above, limited = (np.zeros(shape, dtype=bool) for _ in range(3))
-    for share in judgement._shares:
-        factor = share_of_factor * share.threshold.safety_factor
-        statistic, band = share.threshold.with_safety_factor(factor).evaluate(share.recording, share.signal)
-        rows, judges = share.rows, share.judges[:, np.newaxis]
+    for part in judgement._evaluations:
+        factor = share_of_factor * part.threshold.safety_factor
+        statistic, band = part.threshold.with_safety_factor(factor).evaluate(part.recording, part.signal)
+        rows, judges = part.rows, part.applies[:, np.newaxis]
         valid = statistic.valid & judges
         with np.errstate(invalid="ignore"):
             over = np.fmax(statistic.values - band.upper, band.lower - statistic.values)
@@ -71,11 +71,11 @@ def merged_by_arrays(judgement: Judgement, share_of_factor: float) -> tuple[Floa
 def met_at_by_arrays(judgement: Judgement) -> FloatArray:
     met = np.full(judgement.signal.values.shape, np.inf)
     judges = np.zeros(met.shape, dtype=bool)
-    for share in judgement._shares:
-        statistic, exceeded = share.met_at
-        use = statistic.valid & share.judges[:, np.newaxis]
-        met[share.rows] = np.where(use, np.minimum(met[share.rows], exceeded), met[share.rows])
-        judges[share.rows] |= use
+    for part in judgement._evaluations:
+        statistic, exceeded = part.met_at
+        use = statistic.valid & part.applies[:, np.newaxis]
+        met[part.rows] = np.where(use, np.minimum(met[part.rows], exceeded), met[part.rows])
+        judges[part.rows] |= use
     return np.where(judges, met, -np.inf)
 
 
@@ -96,8 +96,8 @@ def test_the_merged_band_and_its_factors_have_the_bits_of_the_rule_for_arrays(cl
         recording = log((0.3, 1.2), (0.0, 1.3), (-0.3, 1.2), (0.0, 1.5), seed=seed)
         signal = made_up_signal(recording, seed, 1 + seed % 2, shift)
         thresholds = [MadeUp(item, 10 * seed + number) for number, item in enumerate(classes)]
-        judgement = judged(recording, signal, thresholds, cut)
-        assert len(judgement._shares) >= len(classes)
+        judgement = judgement_of(recording, signal, thresholds, cut)
+        assert len(judgement._evaluations) >= len(classes)
         for share in (1.0, 0.9):
             values, status, band = merged_by_arrays(judgement, share)
             ours = judgement.narrower(share) if share < 1.0 else judgement.evaluated[1]
@@ -114,11 +114,11 @@ def test_detectors_that_learned_the_same_classes_share_where_they_judge(cut):
     recording = log((0.3, 1.2), (0.0, 1.3), (-0.3, 1.2), (0.0, 1.5))
     signals = [made_up_signal(recording, seed, 1, 0.0) for seed in (0, 1)]
     thresholds = [[MadeUp(replace(item), seed) for item in (FAST, BACK)] for seed in (0, 1)]
-    first, second = (judged(recording, *pair, cut) for pair in zip(signals, thresholds, strict=True))
+    first, second = (judgement_of(recording, *pair, cut) for pair in zip(signals, thresholds, strict=True))
     assert first.recording is second.recording
-    for one, other in zip(first._shares, second._shares, strict=True):
+    for one, other in zip(first._evaluations, second._evaluations, strict=True):
         assert one.recording is other.recording
-        assert one.judges.base is other.judges.base
-    other = judging_classes(recording, (SLOW,), first.strokes, signals[0].time)
-    again = judging_classes(recording, (SLOW,), first.strokes, signals[0].time, 2.0 * HOLD)
+        assert one.applies.base is other.applies.base
+    other = applicable_classes(recording, (SLOW,), first.strokes, signals[0].time)
+    again = applicable_classes(recording, (SLOW,), first.strokes, signals[0].time, 2.0 * GRACE)
     assert sum(item.where.sum() for item in again) > sum(item.where.sum() for item in other) > 0

@@ -16,7 +16,7 @@ import pytest
 from scipy.stats import binomtest
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge, run_detector
+from cdtool.alarms.pipeline import Detection, judge_alone, run_detector
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
 from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.detectors import DETECTORS
@@ -70,7 +70,7 @@ class Learned:
 
     def judged(self, detector: str, threshold: str, recording: Recording, activation: Activation) -> Detection:
         operation, signal = self.pair(detector, recording)
-        return judge(operation, detector, signal, [self.threshold(detector, threshold)], activation)
+        return judge_alone(operation, detector, signal, [self.threshold(detector, threshold)], activation)
 
     def threshold(self, detector: str, name: str) -> Any:
         """Fitted to some impact-free runs, its factor the largest that others reach."""
@@ -79,7 +79,7 @@ class Learned:
             known = [(operation.recording.without_ground_truth(), signal) for operation, signal in pairs]
             fitted = THRESHOLDS.load(name)().fit(known)
             others = [self.pair(detector, run("none", 100 + seed)) for seed in range(OTHERS)]
-            found = [judge(operation, detector, signal, [fitted], AT_ONCE) for operation, signal in others]
+            found = [judge_alone(operation, detector, signal, [fitted], AT_ONCE) for operation, signal in others]
             factor = max(critical_factor(item, AT_ONCE) for item in found)
             self.fitted[detector, name] = fitted.with_safety_factor(max(factor, 1.0))
         return self.fitted[detector, name]
@@ -211,7 +211,7 @@ def test_lost_samples_of_coupled_joints_are_no_contact(name, threshold, kind, tm
     def found(recording: Recording, fitted: Sequence[Any]) -> Detection:
         operation = Operation(recording, operations_of(base)[0].motion)
         signal = run_detector(operation, machine, detector)
-        return judge(operation, name, signal, fitted, AT_ONCE)
+        return judge_alone(operation, name, signal, fitted, AT_ONCE)
 
     detector = DETECTORS.load(name)()
     learned = [noisy(seed) for seed in range(LEARNED)]

@@ -18,7 +18,7 @@ from cdtool.thresholds import THRESHOLDS
 from tests.contracts.prefixes import PERIOD, Combination, learned, log, machine_of, on_own_clocks
 
 # Strokes of learned speeds and of others, which no class judges from so long on [s].
-SPEEDS, HOLD = (0.3, 0.22, 0.22, -0.3, -0.45, -0.45, 0.15), 0.2
+SPEEDS, GRACE = (0.3, 0.22, 0.22, -0.3, -0.45, -0.45, 0.15), 0.2
 # At this share of the safety factor nearly every sample is outside: only a status keeps it from an alarm.
 NARROW = 1e-3
 # A held value is too old after 5 periods of its channel, which are at most 1.5 of PERIOD long here; and one more.
@@ -75,7 +75,7 @@ def test_no_alarm_comes_out_of_a_section_that_is_not_assessable(detector, thresh
         operation = Operation(recording, motion_class(recording), 1, recording, how)
         activation = Activation(debounce, rearm=0.0)
         (found,) = detect_operations(
-            [operation], machine_of(machine), DETECTORS.load(detector)(), narrow, activation, hold=HOLD
+            [operation], machine_of(machine), DETECTORS.load(detector)(), narrow, activation, grace=GRACE
         )
         assert found.signal is not None and not found.statistic.valid.all()
         for alarm in {*found.verdict.alarms, *found.verdict.crossings}:

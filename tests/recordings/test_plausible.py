@@ -242,7 +242,7 @@ def test_wild_values_in_a_learned_log_are_a_loss_and_do_not_change_the_limits(ga
     done = learn(gate, after)
     assert done.status == 3
     assert "loss: " in done.err and "free/03.csv" in done.err and "2 values" in done.err
-    largest = [np.abs(read_signature(path).current[0].by_position.mean).max() for path in (before, after)]
+    largest = [np.abs(read_signature(path).current[0].by_travel.mean).max() for path in (before, after)]
     assert largest[1] == pytest.approx(largest[0], rel=0.2)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge
+from cdtool.alarms.pipeline import Detection, judge_alone
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.operations import Operation
@@ -30,4 +30,4 @@ def detection(seed: int, factor: float = 3.0, activation: Activation = ACTIVATIO
     status[1000:1050] = Status.GAP
     status[4000:4500] = Status.NOT_APPLICABLE
     signal = Signal(TIME, values, status, "N", joints=("a", "b"))
-    return judge(OPERATION, "d", signal, (LIMIT.with_safety_factor(factor),), activation)
+    return judge_alone(OPERATION, "d", signal, (LIMIT.with_safety_factor(factor),), activation)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import judge, run_detector
+from cdtool.alarms.pipeline import judge_alone, run_detector
 from cdtool.base.errors import SignatureError, UsageError
 from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.detectors.detection import Status
@@ -25,7 +25,7 @@ TRAVEL = CLEAN["position"].values[:, 0]
 FIRST = Signature(safety_factor=5.0, sides="two").fit(noise_runs(14))
 
 
-def moved(old: FittedSignature, new: FittedSignature, curve: str = "by_position") -> np.ndarray:
+def moved(old: FittedSignature, new: FittedSignature, curve: str = "by_travel") -> np.ndarray:
     """How far both limits moved (2, g) in the signal's unit, where both are known."""
     pairs = zip(old.limits(getattr(old, curve)), new.limits(getattr(new, curve)), strict=True)
     return np.array([np.nan_to_num(after - before)[:, 0] for before, after in pairs])
@@ -45,7 +45,7 @@ ODD_RUNS = st.builds(odd_run, st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st
 def test_one_run_moves_no_limit_further_than_is_stated(odd, forget, cap):
     updated = FIRST.with_run(CLEAN, odd, forget, cap)
     weight = 1.0 / forget if forget else 1.0 / 15.0
-    for curve in ("by_position", "by_time"):
+    for curve in ("by_travel", "by_time"):
         spread = np.nanmax(getattr(FIRST, curve).band(True)[1])
         assert np.abs(moved(FIRST, updated, curve)).max() <= largest_move(5.0, weight, cap) * spread * (1.0 + 1e-9)
 
@@ -59,14 +59,14 @@ def test_all_runs_together_move_no_limit_further_than_the_reserve(odd_runs, forg
             current = guarded(FIRST, current, CLEAN, odd, forget, CAP, reserve)
         except SignatureError as fault:
             assert "the limit would be" in fault.message
-    spread = FIRST.by_position.band(True)[1][:, 0]
-    running = FIRST.by_position.grid > 0.11  # before, time counts
+    spread = FIRST.by_travel.band(True)[1][:, 0]
+    running = FIRST.by_travel.grid > 0.11  # before, time counts
     assert (np.abs(moved(FIRST, current)) <= reserve * spread * (1.0 + 1e-9))[:, running].all()
 
 
 def test_a_run_off_by_the_cap_all_along_moves_an_even_limit_by_the_closed_form():
     weight, factor = 1.0 / 20.0, 5.0
-    spread = FIRST.by_position.band(True)[1][:, 0]
+    spread = FIRST.by_travel.band(True)[1][:, 0]
     updated = FIRST.with_run(CLEAN, signal(np.full(N, 1e6)), 20.0, CAP)
     grown = np.sqrt((1.0 - weight) * (1.0 + weight * CAP**2)) - 1.0
     expected = (weight * CAP + factor * grown) * spread
@@ -79,7 +79,7 @@ def test_a_run_within_the_cap_changes_what_a_plain_update_changes(forget):
     calm = signal(100.0 + 0.5 * np.sin(40.0 * TIME))
     plain, held = FIRST.with_run(CLEAN, calm, forget), guarded(FIRST, FIRST, CLEAN, calm, forget)
     for name in ("count", "mean", "squares"):
-        np.testing.assert_array_equal(getattr(held.by_position, name), getattr(plain.by_position, name))
+        np.testing.assert_array_equal(getattr(held.by_travel, name), getattr(plain.by_travel, name))
         np.testing.assert_array_equal(getattr(held.by_time, name), getattr(plain.by_time, name))
 
 
@@ -87,7 +87,7 @@ def test_without_drift_the_cap_costs_half_a_per_cent_of_the_spread():
     plain = held = FIRST
     for recording, item in noise_runs(150, seed=5):
         plain, held = plain.with_run(recording, item), guarded(FIRST, held, recording, item)
-    spreads = [item.by_position.band(True)[1][60:300, 0] for item in (plain, held)]
+    spreads = [item.by_travel.band(True)[1][60:300, 0] for item in (plain, held)]
     lost = 1.0 - np.median(spreads[1] / spreads[0])
     assert 0.001 < lost < 0.005
 
@@ -146,11 +146,11 @@ def test_a_slowly_growing_obstruction_is_not_learned_while_a_plain_update_learns
     for number in range(1, 81):
         cut, item = operation(ageing_run(number, 7, obstruction=number - 1.0), f"season{number}")
         bare = cut.recording.without_ground_truth()
-        if judge(cut, "", item, (plain,), activation).verdict.outcome == "alarm":
+        if judge_alone(cut, "", item, (plain,), activation).verdict.outcome == "alarm":
             alarms["plain"].append(number)
         else:
             plain = plain.with_run(bare, item, 20.0)
-        if judge(cut, "", item, (held,), activation).verdict.outcome == "alarm":
+        if judge_alone(cut, "", item, (held,), activation).verdict.outcome == "alarm":
             alarms["guarded"].append(number)
             continue
         try:

@@ -108,10 +108,10 @@ def test_a_run_of_another_speed_or_direction_is_refused_by_name():
 def test_the_thesis_rule_is_the_mean_plus_one_standard_deviation_point_by_point():
     pairs = runs(15)
     fitted = Signature(rule="thesis", alignment="position").fit(pairs)
-    _, upper = fitted.limits(fitted.by_position)
+    _, upper = fitted.limits(fitted.by_travel)
     point = 150
     travel = pairs[0][0]["position"].values[:, 0] - pairs[0][0]["position"].values[402, 0]
-    passed = np.flatnonzero(travel >= fitted.by_position.grid[point])[0]
+    passed = np.flatnonzero(travel >= fitted.by_travel.grid[point])[0]
     values = [s.values[passed, 0] for _, s in pairs]
     assert upper[point, 0] == pytest.approx(np.mean(values) + np.std(values, ddof=1), rel=1e-6)
 
@@ -168,7 +168,7 @@ def flat_signature() -> FittedSignature:
 
 def test_signatures_with_other_grids_on_the_same_motion_have_their_own_limits():
     first, motion = flat_signature(), stroke()
-    coarse = replace(first, by_position=replace(first.by_position, step=0.2))
+    coarse = replace(first, by_travel=replace(first.by_travel, step=0.2))
     for signature in (first, coarse, replace(first, alignment="time")):
         _, band = signature.evaluate(motion, signal(np.zeros(N)))
         _, alone = signature.evaluate(stroke(), signal(np.zeros(N)))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.alarms.judgement import judged
+from cdtool.alarms.judgement import judgement_of
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import SignatureError, UsageError
 from cdtool.detectors.detection import Signal, Status
@@ -49,7 +49,7 @@ def learned(speed: float, direction: int = 1, **changed) -> FittedSignature:
     rule = Signature(**{"sides": "two", "speed_range": True, **changed})
     fitted = rule.fit([(item, force(item, 100.0, 1.0, i)) for i, item in enumerate(strokes)])
     mean, spread = RATES.get(speed, (105.0, 1.5))
-    parts = {name: constant(getattr(fitted, name), mean, spread) for name in ("by_time", "by_position")}
+    parts = {name: constant(getattr(fitted, name), mean, spread) for name in ("by_time", "by_travel")}
     return replace(fitted, **parts)
 
 
@@ -105,12 +105,12 @@ def test_until_the_speed_is_known_the_band_holds_those_of_both_speeds(between):
 @pytest.mark.parametrize(("speed", "assessed"), [(0.25, True), (0.21, True), (0.15, False), (0.37, False)])
 def test_speeds_between_are_assessed_and_others_are_not(slow, fast, speed, assessed):
     recording = stroke(speed)
-    statistic, _ = judged(recording, force(recording, 105.0), [slow, fast]).evaluated
+    statistic, _ = judgement_of(recording, force(recording, 105.0), [slow, fast]).evaluated
     time, status = statistic.time, statistic.status[:, 0]
     running = (time > 2.5) & (time < 0.4 + 0.8 / speed)
     assert running.any() and (status[running] == (Status.VALID if assessed else Status.OTHER_SPEED)).all()
     without = [replace(item, speed_range=False) for item in (slow, fast)]
-    plain, _ = judged(recording, force(recording, 105.0), without).evaluated
+    plain, _ = judgement_of(recording, force(recording, 105.0), without).evaluated
     assert (plain.status[running, 0] == Status.OTHER_SPEED).all() or speed == 0.21
 
 
@@ -134,7 +134,7 @@ def test_each_direction_and_joint_has_its_own_range_and_other_thresholds_stay(sl
 def test_a_stroke_backward_is_assessed_by_the_classes_backward(slow, fast):
     recording = stroke(-0.25)
     thresholds = [slow, fast, *(learned(speed, -1, sides="one") for speed in SPEEDS)]
-    statistic, band = judged(recording, force(recording, 105.0), thresholds).evaluated
+    statistic, band = judgement_of(recording, force(recording, 105.0), thresholds).evaluated
     running = (statistic.time > 2.5) & (statistic.time < 3.5)
     assert (statistic.status[running] == Status.VALID).all()
     # An obstacle opposes the motion: the limit is below.
@@ -175,7 +175,7 @@ def test_a_contact_that_slows_the_axis_does_not_move_the_band_before_the_guard(b
 
 
 def test_a_location_that_one_class_does_not_know_has_no_limit(between, slow, fast):
-    shorter = replace(fast, by_position=replace(fast.by_position, count=_until(fast.by_position, 0.5)))
+    shorter = replace(fast, by_travel=replace(fast.by_travel, count=_until(fast.by_travel, 0.5)))
     (made,) = over_speeds([slow, shorter])
     recording = stroke(0.25)
     _, _, status = band_of(made, recording)

@@ -117,7 +117,7 @@ def test_an_axis_at_its_stop_is_seen_although_the_magnitude_changes():
         reduced = with_scalar_force(recording(time, REST + vector), GATE)
         curves.append(force_time_curve(reduced, find_contacts(reduced, GATE)[0]))
     assert [curve.saturated for curve in curves] == [False, True]
-    assert curves[1].time[curves[1].clipped].min() == pytest.approx(0.09, abs=0.03)
+    assert curves[1].time[curves[1].at_stop].min() == pytest.approx(0.09, abs=0.03)
 
 
 def test_a_vector_is_never_mistaken_for_its_first_axis():

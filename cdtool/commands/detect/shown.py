@@ -151,8 +151,8 @@ def _show_not_assessable(detections: list[Detection]) -> None:
         parts = []
         for item in sorted(longest, key=lambda item: item.start):
             where = (
-                f" ({_place(item.way_start)} to {_place(item.way_end)} {unit})"
-                if math.isfinite(item.way_start + item.way_end)
+                f" ({_place(item.position_start)} to {_place(item.position_end)} {unit})"
+                if math.isfinite(item.position_start + item.position_end)
                 else ""
             )
             parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")

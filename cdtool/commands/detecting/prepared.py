@@ -35,7 +35,7 @@ from cdtool.detectors.base import Detector
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.log_section import LogSection
-from cdtool.recordings.motion.applicable import HOLD
+from cdtool.recordings.motion.applicable import GRACE
 from cdtool.recordings.operations import RunCut, operations_of
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.recordings.recording import Recording
@@ -107,9 +107,9 @@ class PreparedDetector:
             whole = without_contradicted(whole, machine, rules.onset)
         recording = self.section.of(whole)
         parts = operations_of(recording, self.operations)
-        hold = max(HOLD, rules.window)
+        grace = max(GRACE, rules.window)
         detections = tuple(
-            detect_operations(parts, machine, self.detector, self.thresholds, self.activation, self.joints, hold)
+            detect_operations(parts, machine, self.detector, self.thresholds, self.activation, self.joints, grace)
         )
         contacts = any_contacts(whole, rules)
         contacts = list(self.section.contacts_of(whole, contacts)) if self.section else contacts

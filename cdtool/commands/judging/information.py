@@ -38,7 +38,7 @@ from cdtool.truth.force_vector import with_scalar_force
 
 if TYPE_CHECKING:
     from cdtool.formats.channels.log_statistics import LogStatistics
-    from cdtool.truth.synchronisation.latency import ChannelLatency
+    from cdtool.truth.synchronisation.channel_delay import ChannelDelay
 
 
 _KEY = re.compile(r"^\s*([A-Za-z_]\w*)\s*=")
@@ -141,7 +141,7 @@ class Info:
     channels: tuple[ChannelInfo, ...]
     findings: tuple[Finding, ...]
     dialect: str = ""
-    latencies: tuple[ChannelLatency, ...] = ()
+    latencies: tuple[ChannelDelay, ...] = ()
     origin: float = 0.0
 
     def __repr__(self) -> str:

@@ -7,32 +7,32 @@ from collections.abc import Sequence
 
 from cdtool.base.findings import Finding
 from cdtool.statistics.interval import Interval
-from cdtool.truth.synchronisation.latency import ChannelLatency, pooled, preferred
+from cdtool.truth.synchronisation.channel_delay import ChannelDelay, pooled, preferred
 
 
-def latency_findings(latencies: Sequence[ChannelLatency]) -> list[Finding]:
+def latency_findings(latencies: Sequence[ChannelDelay]) -> list[Finding]:
     """Return one finding per channel and reference; a log without a contact says nothing about its load cell."""
     return [
         _finding(item) for item in preferred(latencies) if item.assessable or item.events or item.channel != "force"
     ]
 
 
-def pooled_latencies(logs: Sequence[Sequence[ChannelLatency]], origins: Sequence[float]) -> tuple[ChannelLatency, ...]:
+def pooled_latencies(logs: Sequence[Sequence[ChannelDelay]], origins: Sequence[float]) -> tuple[ChannelDelay, ...]:
     """Return the latencies over several logs, of every pair of channels that more than one log shows.
 
     Parameters
     ----------
-    logs : sequence of sequence of ChannelLatency
+    logs : sequence of sequence of ChannelDelay
         Those of each log.
     origins : sequence of float
         What is added to each log's times to obtain its own clock [s]; 0 if that is not an epoch.
 
     Returns
     -------
-    tuple of ChannelLatency
+    tuple of ChannelDelay
         With a drift between the clocks only if all logs are on an epoch: otherwise each log may start its clocks again.
     """
-    pairs: dict[tuple[str, str, str, str], list[tuple[ChannelLatency, float]]] = {}
+    pairs: dict[tuple[str, str, str, str], list[tuple[ChannelDelay, float]]] = {}
     for latencies, origin in zip(logs, origins, strict=True):
         for item in latencies:
             if item.has_delays:
@@ -47,7 +47,7 @@ def pooled_latencies(logs: Sequence[Sequence[ChannelLatency]], origins: Sequence
     return tuple(found)
 
 
-def _finding(item: ChannelLatency) -> Finding:
+def _finding(item: ChannelDelay) -> Finding:
     about = {"joint": item.joint, "reference": item.reference, "examined": len(item.events)}
     if not item.assessable:
         return Finding("shift_not_assessable", item.channel, {**about, "reason": item.reason})

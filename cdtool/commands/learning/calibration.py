@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge
+from cdtool.alarms.pipeline import Detection, judge_alone
 from cdtool.base.errors import SignatureError, UsageError
 from cdtool.commands.judging.log_groups import Split, split_names
 from cdtool.commands.learning.fitting import Fit, Fitted, Pair
@@ -62,7 +62,7 @@ def calibrate(
             raise _too_few(budget, detector, fitted.skipped[0].reason)
         held_out = [pair for own, pair in zip(fold_of, pairs, strict=True) if own == fold]
         detections += [
-            judge(operation, detector, signal, fitted.thresholds, activation) for operation, signal in held_out
+            judge_alone(operation, detector, signal, fitted.thresholds, activation) for operation, signal in held_out
         ]
     return set_factor(budget, detector, detections, activation)
 

@@ -131,11 +131,11 @@ def _course(run: _ClassedRun, nominal: float) -> tuple[FloatArray, FloatArray]:
     """Return the averaged forward speed over increasing travel."""
     motion, recording = run.motion, run.operation.recording
     series = recording["speed"]
-    where = stroke_progress(recording, motion.direction, nominal, motion.joint)
+    at = stroke_progress(recording, motion.direction, nominal, motion.joint)
     speed = motion.direction * series.values[:, motion.joint]
-    use = np.isfinite(where.travel) & np.isfinite(speed)
+    use = np.isfinite(at.travel) & np.isfinite(speed)
     travel, smooth = (
-        where.travel[use],
+        at.travel[use],
         averaged(series.time[use], speed[use], max(_AVERAGED_SECONDS, _AVERAGED_SAMPLES * series.period)),
     )
     rising = np.concatenate(([True], np.diff(travel) > 0.0)) if len(travel) else np.empty(0, dtype=bool)

@@ -34,7 +34,7 @@ from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.force_rows import force_rows
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.recordings.log_section import LogSection
-from cdtool.recordings.motion.applicable import HOLD
+from cdtool.recordings.motion.applicable import GRACE
 from cdtool.recordings.operations import Operation, RunCut, operations_of
 from cdtool.recordings.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recordings.recording import Contact, Recording
@@ -127,7 +127,7 @@ def detect_with(
     `unusable` cannot be used, for the given reason; none of their samples is assessable. A class of motion is monitored
     for the longest matching window.
     """
-    hold = max(HOLD, *(group.window for group in setup.impacts.values()))
+    grace = max(GRACE, *(group.window for group in setup.impacts.values()))
     machine = setup.machine_file.machine
 
     def detect(log: Path, operations: Sequence[Operation]) -> Detections:
@@ -143,7 +143,7 @@ def detect_with(
                 known = thresholds[detector.name]
                 try:
                     made = detect_operations(
-                        operations, machine, detector, known, setup.activation, setup.watched, hold
+                        operations, machine, detector, known, setup.activation, setup.watched, grace
                     )
                 except CdtoolError as fault:
                     failed[detector.name] = tuple(Skipped(item.whole.name, str(fault)) for item in operations)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import judge
+from cdtool.alarms.pipeline import judge_alone
 from cdtool.base.errors import SignatureError, UsageError
 from cdtool.base.plain_text import counted, digits
 from cdtool.commands.signature.drift import Axis
@@ -138,7 +138,7 @@ def check_coverage(
     left_out: list[LeftOutRun] = []
     refused: list[str] = []
     for (operation, signal), (recording, _) in zip(pairs, bare, strict=True):
-        detection = judge(operation, "", signal, (fitted.without_run(recording, signal),), activation)
+        detection = judge_alone(operation, "", signal, (fitted.without_run(recording, signal),), activation)
         critical = critical_factor(detection, activation)
         if math.isfinite(critical):
             left_out.append(LeftOutRun(operation.name, critical, detection.verdict.outcome == "alarm"))
@@ -206,8 +206,8 @@ def _changeover(signature: FittedSignature, runs: Sequence[tuple[Recording, Sign
     """Return the latest time and the nearest travel at which travel counts instead of time; all of both if one does."""
     changes = []
     for recording, signal in runs if signature.alignment == "time_then_position" else ():
-        where = signature.progress(recording, signal.time)
-        changes += [(where.elapsed[k], where.travel[k]) for k in np.flatnonzero(where.running)[:1]]
+        at = signature.progress(recording, signal.time)
+        changes += [(at.elapsed[k], at.travel[k]) for k in np.flatnonzero(at.running)[:1]]
     return (
         (float(max(time for time, _ in changes)), float(min(way for _, way in changes))) if changes else (np.inf, 0.0)
     )
@@ -225,7 +225,7 @@ def gaps_of(signature: FittedSignature, change: tuple[float, float] = (np.inf, 0
 
 
 def _gaps(signature: FittedSignature, axis: Axis, joint: int, span: tuple[float, float]) -> list[NoLimit]:
-    curve = signature.by_time if axis == "time" else signature.by_position
+    curve = signature.by_time if axis == "time" else signature.by_travel
     count, grid = curve.count[:, joint], curve.grid
     lacking = (count < curve.enough) & (grid >= span[0]) & (grid <= span[1])
     edges = np.flatnonzero(np.diff(np.concatenate(([False], lacking, [False]))))

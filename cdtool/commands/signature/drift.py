@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge
+from cdtool.alarms.pipeline import Detection, judge_alone
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import SignatureError
 from cdtool.detectors.detection import Signal, Status
@@ -156,7 +156,7 @@ def audit_drift(
     detections: list[Detection] = []
     refused: list[tuple[str, str]] = []
     for operation, signal in pairs:
-        detection = judge(operation, "", signal, (signature,), activation)
+        detection = judge_alone(operation, "", signal, (signature,), activation)
         if detection.verdict.outcome == "not_assessable":
             refused.append((operation.name, detection.verdict.reason))
         else:
@@ -192,7 +192,7 @@ class _JointAudit:
         course = change_over_runs(self.found.overall[:, self.joint], len(self.signature.joints))
         return JointDrift(
             joint=self.signature.joints[self.joint],
-            two_sided=not self.signature.watched,
+            two_sided=not self.signature.side,
             axis=self.found.axis,
             unit=self.unit,
             runs=tuple(self._run(i) for i in range(len(self.detections))),
@@ -204,7 +204,7 @@ class _JointAudit:
     def _run(self, index: int) -> AuditedRun:
         detection, factor = self.detections[index], self.signature.safety_factor
         beyond = self.found.beyond[index, :, self.joint]
-        size = beyond if self.signature.watched else np.abs(beyond)
+        size = beyond if self.signature.side else np.abs(beyond)
         known = np.isfinite(size)
         at = int(np.argmax(np.where(known, size, -np.inf))) if known.any() else -1
         critical = critical_of(detection, self.activation, self.joint)
@@ -227,7 +227,7 @@ class _JointAudit:
             if not may_change(values, comparisons):
                 continue
             course = change_over_runs(values, comparisons)
-            size = course.change if self.signature.watched else abs(course.change)
+            size = course.change if self.signature.side else abs(course.change)
             own = size > _OWN_SHARE * abs(overall.change)
             if course.kind != "steady" and own and size > (best[0] if best else 0.0):
                 best = (size, place, course)
@@ -235,7 +235,7 @@ class _JointAudit:
 
     def _shown(self, course: ChangeOverRuns, place: float | None) -> Shown:
         outward = course.change > 0.0
-        if not self.signature.watched:
+        if not self.signature.side:
             # Of two limits the one counts towards which the signal goes, if it is not on its way back to the middle.
             values = self.found.overall[:, self.joint]
             if place is not None:
@@ -273,9 +273,9 @@ def deviations_of(signature: FittedSignature, detections: Sequence[Detection]) -
     Travel counts along the whole stroke here, while accelerating too.
     """
     axis = axis_of(signature)
-    curve = signature.by_time if axis == "time" else signature.by_position
+    curve = signature.by_time if axis == "time" else signature.by_travel
     mean, spread = curve.band(signature.pooled)
-    sign = float(signature.watched or 1)
+    sign = float(signature.side or 1)
     samples = [_sample(signature, item, axis) for item in detections]
     shift = sign * (np.array(samples).reshape(len(samples), *mean.shape) - mean)
     typical = _median(shift, axis=1)  # (r, J) in the signal's unit
@@ -294,8 +294,8 @@ def critical_of(detection: Detection, activation: Activation, joint: int) -> flo
 
 def _sample(signature: FittedSignature, detection: Detection, axis: Axis) -> FloatArray:
     """Return a run's values (g, J) on the grid of that axis, where it is assessable."""
-    by_time, by_position = signature.samples(detection.operation.recording.without_ground_truth(), detection.statistic)
-    return by_time if axis == "time" else by_position
+    by_time, by_travel = signature.samples(detection.operation.recording.without_ground_truth(), detection.statistic)
+    return by_time if axis == "time" else by_travel
 
 
 def _pooled(values: FloatArray, curve: Curve) -> tuple[FloatArray, FloatArray]:

@@ -58,12 +58,12 @@ def summarise_signature(current: FittedSignature, first: FittedSignature) -> Sig
     --------
     `cdtool.learn_signature` learns one; `cdtool signature show` shows the summary.
     """
-    along = [("travel", current.by_position, first.by_position), ("time", current.by_time, first.by_time)]
+    along = [("travel", current.by_travel, first.by_travel), ("time", current.by_time, first.by_time)]
     parts = [
         part for part in along if current.alignment in (part[0].replace("travel", "position"), "time_then_position")
     ]
-    limited = np.isfinite(current.by_position.band(current.pooled)[0]).any(axis=1)
-    grid = current.by_position.grid[limited]
+    limited = np.isfinite(current.by_travel.band(current.pooled)[0]).any(axis=1)
+    grid = current.by_travel.grid[limited]
     return SignatureSummary(
         motion=current.motion.without_course,
         runs=current.runs,

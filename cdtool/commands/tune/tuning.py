@@ -43,7 +43,7 @@ from cdtool.commands.tune.search.tuned import (
     settings_of,
 )
 from cdtool.execution.workers import Workers, in_order
-from cdtool.recordings.motion.applicable import HOLD
+from cdtool.recordings.motion.applicable import GRACE
 from cdtool.results.results import Skipped
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
@@ -272,10 +272,10 @@ class _TuningOf:
 
     def _measuring(self, recordings: TuningRecordings, activations: tuple[Activation, ...]) -> Measuring:
         setup = self.setup
-        hold = max(HOLD, *(log.window for log in recordings.struck))
+        grace = max(GRACE, *(log.window for log in recordings.struck))
         machine = setup.machine_file.machine
         return Measuring(
-            recordings, machine, self._detector, setup.watched, self.options.budget, activations, learned, hold
+            recordings, machine, self._detector, setup.watched, self.options.budget, activations, learned, grace
         )
 
     def _result(

@@ -21,7 +21,7 @@ from cdtool.base.findings import Finding
 from cdtool.formats.columns import Piece
 from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
 from cdtool.formats.pieces import PieceRun, Pieces
-from cdtool.recordings.clock import EPOCH
+from cdtool.recordings.clock import THREE_YEARS
 from cdtool.recordings.units import find_unit
 
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-z]|$)", re.IGNORECASE)
@@ -159,7 +159,7 @@ def pieces_by_own_clock(
 def _epoch_origin(clocks: Iterable[FloatArray]) -> float:
     """Return the earliest first time [s] of clocks that count from an epoch; 0 for other clocks."""
     starts = [float(time[np.isfinite(time)][0]) for time in clocks if np.isfinite(time).any()]
-    return min(starts) if starts and min(starts) > EPOCH else 0.0
+    return min(starts) if starts and min(starts) > THREE_YEARS else 0.0
 
 
 def _step(stamps: FloatArray) -> float:

@@ -32,7 +32,7 @@ from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
-from cdtool.recordings.clock.stamps import EPOCH, count_leading_strays
+from cdtool.recordings.clock.stamps import THREE_YEARS, count_leading_strays
 
 # Days since 1899-12-30, as counted by Excel, of 1970-01-01, and of the start of the years 2000 and 2100.
 _DAY_1970, _FIRST_DAY, _LAST_DAY = 25569.0, 36526.0, 73051.0
@@ -85,7 +85,7 @@ def exact_differences(
         return None
     known = np.isfinite(stamps)
     finite, scale = stamps[known], 10**decimals
-    first_row = count_leading_strays(finite, EPOCH / factor)
+    first_row = count_leading_strays(finite, THREE_YEARS / factor)
     if not (finite[first_row:] * factor > _FIRST)[:1].any() or np.abs(finite).max() * factor >= _LAST:
         return None
     whole = np.rint(finite)

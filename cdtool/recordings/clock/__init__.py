@@ -14,13 +14,13 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.recordings.clock.held_samples import HOLD_PERIODS, hold_last, previous_value
-from cdtool.recordings.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start
+from cdtool.recordings.clock.stamps import GAP_PERIODS, THREE_YEARS, CleanTime, clean_time, epoch_start
 from cdtool.recordings.recording import Series
 
 __all__ = [
-    "EPOCH",
     "GAP_PERIODS",
     "HOLD_PERIODS",
+    "THREE_YEARS",
     "CleanTime",
     "clean_time",
     "differentiate",

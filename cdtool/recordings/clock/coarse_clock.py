@@ -39,13 +39,13 @@ def fit_line(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
     distinct = np.ascontiguousarray(stamps[first])
     counts = np.diff(np.concatenate((first, [len(stamps)]))).astype(np.float64)
     steps = np.diff(distinct)
-    usual = float(steps[:2].min())
-    step = np.concatenate(([usual], recent_medians(steps, usual)))
+    shorter = float(steps[:2].min())
+    step = np.concatenate(([shorter], recent_medians(steps, shorter)))
     time = np.full(len(stamps), np.nan)
     # The log may begin within a stamp, with too few samples: of the first two stamps, the shorter period counts.
-    near = steps[:2] <= _PAUSE * usual
+    near = steps[:2] <= _PAUSE * shorter
     periods = steps[:2][near] / counts[: len(steps)][:2][near]
-    last = [usual / counts[1]] if len(distinct) == 2 else []
+    last = [shorter / counts[1]] if len(distinct) == 2 else []
     _follow(distinct, counts, step, float(min(*periods, *last, np.inf)), time)
     return time, np.isfinite(time)
 

@@ -34,12 +34,14 @@ _COUNTER_BITS = (16, 32)
 _LISTED = 3
 # A jump ahead spans at most this many rows; fewer at the edges of a log, where one side is unknown.
 STRAY_ROWS, EDGE_ROWS = 50, 3
-# A step of about 3 years [s] at an edge of a log is not a pause: the time stamps beyond it are from another clock.
-EPOCH = 1e8
-# A jump is longer than this many usual steps; the usual step is taken from this many rows before it.
+# A step of about 3 years [s] at an edge of a log is not a pause: the time stamps beyond it are from another clock. A
+# clock that begins later than this counts from an epoch.
+THREE_YEARS = 1e8
+# A jump is longer than this many times the shortest step between this many rows before it.
 _JUMP, _STEPS_BEFORE = 2.5, 9
 # The start of a log can be stray if this many time stamps in order follow it; logs below 8 rows are not checked.
 _IN_ORDER, _SHORTEST = 3, 8
+# Rows after which a mark is known, and rows that are kept for it.
 _AHEAD, _BEHIND = 2 * STRAY_ROWS, 4 * STRAY_ROWS
 
 
@@ -69,7 +71,7 @@ def clean_time(
     if _is_clean(stamps):  # the usual case
         return CleanTime(stamps.copy(), np.ones(len(stamps), dtype=bool), ())
     cleaner = ClockCleaner()
-    _, rows = cleaner.sort_out(stamps, stamps if counted is None else np.asarray(counted, dtype=np.float64), final=True)
+    _, rows = cleaner.classify(stamps, stamps if counted is None else np.asarray(counted, dtype=np.float64), final=True)
     index = rows.index[~rows.backward]
     rising = stamps[index]
     if sampled and len(rising) > 1 and rising[0] == rising[-1]:
@@ -97,11 +99,11 @@ def _is_clean(stamps: FloatArray) -> bool:
         return False
     with np.errstate(invalid="ignore", over="ignore"):
         steps = np.diff(stamps)
-    return bool(steps.min() > 0.0 and steps.max() <= EPOCH)  # False for a step that is NaN
+    return bool(steps.min() > 0.0 and steps.max() <= THREE_YEARS)  # False for a step that is NaN
 
 
 @dataclass(frozen=True)
-class _SortedRows:
+class _ClassifiedRows:
     """The rows of a piece, by their `index`, that are neither missing nor stray, and which repeat or run backward."""
 
     index: npt.NDArray[np.intp]
@@ -133,10 +135,12 @@ class ClockCleaner:
 
     def times(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> FloatArray:
         """Return the times of the rows that are decided and kept; `counted` are the time stamps as in the file."""
-        decided, rows = self.sort_out(stamps, counted, final)
+        decided, rows = self.classify(stamps, counted, final)
         return decided[rows.kept(len(decided))]
 
-    def sort_out(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> tuple[FloatArray, _SortedRows]:
+    def classify(
+        self, stamps: FloatArray, counted: FloatArray, final: bool = False
+    ) -> tuple[FloatArray, _ClassifiedRows]:
         """Return the time stamps that are decided, and which of them are to be kept."""
         is_stray = self._stray_marker.add(stamps[np.isfinite(stamps)], final)
         stamps, counted = np.concatenate((self._waiting[0], stamps)), np.concatenate((self._waiting[1], counted))
@@ -154,7 +158,7 @@ class ClockCleaner:
         kept, raw = stamps[index], counted[index]
         highest = np.maximum.accumulate(np.concatenate(([self._highest], kept)))
         self._highest = float(highest[-1])
-        rows = _SortedRows(index, kept == highest[:-1], kept < highest[:-1])
+        rows = _ClassifiedRows(index, kept == highest[:-1], kept < highest[:-1])
         self._backward.add(index[rows.backward], before)
         self._repeated.add(index[rows.repeated], before)
         steps = np.diff(np.concatenate((self._last, raw)))
@@ -183,15 +187,15 @@ def epoch_start(stamps: FloatArray, factor: float) -> float:
     `factor` converts to seconds. Subtract the result before scaling, so that no digit is lost. Stray time stamps are
     skipped.
     """
-    if factor > 0.0 and np.fmax.reduce(stamps, initial=-np.inf) * factor <= EPOCH:  # the usual case
+    if factor > 0.0 and np.fmax.reduce(stamps, initial=-np.inf) * factor <= THREE_YEARS:  # the usual case
         return 0.0
     finite = stamps[np.isfinite(stamps)]
-    first = finite[count_leading_strays(finite, EPOCH / factor) :][:1]
-    return float(first[0]) if len(first) and first[0] * factor > EPOCH else 0.0
+    first = finite[count_leading_strays(finite, THREE_YEARS / factor) :][:1]
+    return float(first[0]) if len(first) and first[0] * factor > THREE_YEARS else 0.0
 
 
 def missing_findings(absent: int, values: int, channel: str, masked: int = 0) -> list[Finding]:
-    """Return the finding on `absent` ones of `values`, without the `masked` ones, which have a separate finding."""
+    """Return the finding on missing values: `absent` of `values`, less the `masked` ones, which have their own."""
     missing = absent - masked
     return [Finding("missing_values", channel, {"count": missing, "values": values})] if missing else []
 
@@ -213,18 +217,18 @@ class GapStatistics:
         gaps = np.flatnonzero(steps > GAP_PERIODS * self._period)
         self._count += len(gaps)
         self._first += [{"time": float(time[i]), "length": float(steps[i])} for i in gaps[: _LISTED - len(self._first)]]
-        usual = steps[steps <= GAP_PERIODS * self._period]
-        if len(usual):
-            share = len(usual) / (self._regular + len(usual))
-            shift = float(usual.mean()) - self._mean
-            self._squares += float(usual.var()) * len(usual) + shift * shift * self._regular * share
-            self._regular, self._mean = self._regular + len(usual), self._mean + shift * share
+        regular = steps[steps <= GAP_PERIODS * self._period]
+        if len(regular):
+            share = len(regular) / (self._regular + len(regular))
+            shift = float(regular.mean()) - self._mean
+            self._squares += float(regular.var()) * len(regular) + shift * shift * self._regular * share
+            self._regular, self._mean = self._regular + len(regular), self._mean + shift * share
         self._last = time[-1:]
 
     def findings(self) -> list[Finding]:
         """Return the findings on gaps and jitter."""
         findings: list[Finding] = []
-        if self._total <= 2:  # too few for a usual step
+        if self._total <= 2:  # too few for a period
             return findings
         if self._count:
             findings.append(Finding("sample_gaps", self._channel, {"count": self._count, "first": tuple(self._first)}))
@@ -332,10 +336,10 @@ def _median_step(stamps: FloatArray) -> float:
 class StrayStampMarker:
     """Marks the stray time stamps of a clock piece by piece; the mark of a row is known 100 rows later.
 
-    Stray rows are up to 50 rows between a time stamp g and the next one n >= g if all of them are above n by more than
-    2.5 usual steps, and at least as many rows with time stamps below them follow: dropping n and its successors instead
-    would lose more rows. Up to 3 rows at the start of a log are stray if they are above the next ones, and up to 3 rows
-    at either edge if they are 3 years off.
+    Stray rows are up to 50 rows between a time stamp g and the next one n >= g if all of them are above g by more than
+    2.5 times both n - g and the shortest of the 9 steps before g, and at least as many rows with time stamps below them
+    follow: dropping n and its successors instead would lose more rows. Up to 3 rows at the start of a log are stray if
+    they are above the next ones, and up to 3 rows at either edge if they are 3 years off.
     """
 
     def __init__(self) -> None:
@@ -351,7 +355,7 @@ class StrayStampMarker:
         self._total += len(stamps)
         count = len(self._stamps)
         if starts and (final or self._total >= _SHORTEST):
-            leading = count_leading_strays(self._stamps, EPOCH)
+            leading = count_leading_strays(self._stamps, THREE_YEARS)
             self._stray[:leading] = True
             self._next = max(self._next, leading + 1)
         until = count if final else max(count - STRAY_ROWS, self._next)
@@ -383,20 +387,20 @@ class StrayStampMarker:
             if not stray[i]:
                 lowest, rows = min(lowest, before[i]), rows + 1
             i -= 1
-        if i < 0 or not 0 < rows <= STRAY_ROWS or first + i < 0:
+        if i < 0 or not 0 < rows <= STRAY_ROWS:
             return
-        usual = _usual_step([x for x, off in zip(before[: i + 1], stray[: i + 1], strict=True) if not off])
-        if lowest - before[i] <= _JUMP * max(back - before[i], usual):
+        shortest = _shortest_step([x for x, off in zip(before[: i + 1], stray[: i + 1], strict=True) if not off])
+        if lowest - before[i] <= _JUMP * max(back - before[i], shortest):
             return
         after = self._stamps[step_back : step_back + rows]
         if len(after) == rows and bool(np.all(after < lowest)):
             self._stray[first + i + 1 : step_back] = True
 
 
-def count_leading_strays(stamps: FloatArray, years: float) -> int:
+def count_leading_strays(stamps: FloatArray, no_pause: float) -> int:
     """Return how many finite time stamps at the start of a log, up to 3, are stray.
 
-    `years` is a step, in the unit of the time stamps, that is too long for a pause.
+    `no_pause` is a step, in the unit of the time stamps, that is too long for a pause.
     """
     begin = stamps[: 2 * EDGE_ROWS + _IN_ORDER]
     for rows in range(1, EDGE_ROWS + 1):
@@ -407,18 +411,18 @@ def count_leading_strays(stamps: FloatArray, years: float) -> int:
             return rows
         if len(stamps) < _SHORTEST:
             continue
-        if following[0] - begin[:rows].max() > years and following[-1] - following[0] < years:
+        if following[0] - begin[:rows].max() > no_pause and following[-1] - following[0] < no_pause:
             return rows
     return 0
 
 
 def _count_trailing_strays(stamps: FloatArray) -> int:
     """Return how many of the last time stamps are 3 years ahead of the one before them."""
-    jumps = np.flatnonzero(np.diff(stamps) > EPOCH)
+    jumps = np.flatnonzero(np.diff(stamps) > THREE_YEARS)
     return len(stamps) - 1 - int(jumps[0]) if len(jumps) else 0
 
 
-def _usual_step(stamps: list[float]) -> float:
+def _shortest_step(stamps: list[float]) -> float:
     """Return the shortest forward step among the last time stamps; 0 if there is no forward step."""
     last = stamps[-_STEPS_BEFORE - 1 :]
     return min((b - a for a, b in pairwise(last) if b > a), default=0.0)

@@ -22,45 +22,47 @@ from cdtool.recordings.recording import Recording, Series
 # What a threshold was learned for: one class, or several and the speeds between them.
 Motion = MotionClass | SpeedRange
 # How long a class still applies after a departure that began while it fitted [s]: the matching window.
-HOLD = 1.0
+GRACE = 1.0
 # A class that has fitted this long [s] before its stroke came to rest or turned round, or later, has completed it.
 _COMPLETED = 0.05
 
 
 @dataclass(frozen=True)
-class Judging:
-    """One class in one stroke: `stroke` is its number, `motion` that of the class, and where it applies (n,)."""
+class Applicability:
+    """Where (n,) a class applies in a stroke: `stroke` and `motion` are the numbers of stroke and class."""
 
     stroke: int
     motion: int
     where: BoolArray
 
 
-def judging_classes(
+def applicable_classes(
     recording: Recording,
     classes: Sequence[Motion],
     strokes: Sequence[Stroke],
     clock: FloatArray,
-    hold: float = HOLD,
-) -> list[Judging]:
+    grace: float = GRACE,
+) -> list[Applicability]:
     """Return where on `clock` (n,) [s] each class applies in each stroke; a class that applies nowhere is left out.
 
     Until a class has begun its stroke all of them apply. Then those apply that have fitted since they began; one that
-    has departed applies for `hold` [s] more, also beyond the end of its stroke; one that has completed its stroke
+    has departed applies for `grace` [s] more, also beyond the end of its stroke; one that has completed its stroke
     applies to the rest after it for as long. It applies again once it fits and no other class does, or has fitted for
-    `hold`. Where there was no speed for `hold`, none applies. On the clock of one of the recording's channels it is
+    `grace`. Where there was no speed for `grace`, none applies. On the clock of one of the recording's channels it is
     decided once, for all detectors that learned the same classes.
     """
     own = recording.own_clock(clock)
     if own is None:
-        return _judging_classes(recording, classes, strokes, clock, hold)
-    key = ("judging classes", tuple(item.content for item in classes), tuple(strokes), hold)
-    return list(recording.derived(key, lambda: tuple(_judging_classes(recording, classes, strokes, own, hold)), own))
+        return _applicable_classes(recording, classes, strokes, clock, grace)
+    key = ("applicable classes", tuple(item.content for item in classes), tuple(strokes), grace)
+    return list(
+        recording.derived(key, lambda: tuple(_applicable_classes(recording, classes, strokes, own, grace)), own)
+    )
 
 
-def _judging_classes(
-    recording: Recording, classes: Sequence[Motion], strokes: Sequence[Stroke], clock: FloatArray, hold: float
-) -> list[Judging]:
+def _applicable_classes(
+    recording: Recording, classes: Sequence[Motion], strokes: Sequence[Stroke], clock: FloatArray, grace: float
+) -> list[Applicability]:
     speed = recording["speed"]
     if not len(speed):
         return []
@@ -86,31 +88,31 @@ def _judging_classes(
     opposed = np.array(
         [[one.joint == other.joint and one.direction != other.direction for other in classes] for one in classes]
     )
-    _judge(speed.time, begun, fits, known, fresh, completed_by, opposed, hold, now, before)
-    recent = speed_is_recent(recording, classes, clock, hold)
+    _decide(speed.time, begun, fits, known, fresh, completed_by, opposed, grace, now, before)
+    recent = speed_is_recent(recording, classes, clock, grace)
     return _on_clock(speed.time, now, now & begun, before, firsts, clock, recent)
 
 
 def speed_is_recent(
-    recording: Recording, classes: Sequence[Motion], clock: FloatArray, hold: float = HOLD
+    recording: Recording, classes: Sequence[Motion], clock: FloatArray, grace: float = GRACE
 ) -> BoolArray:
-    """Return where on `clock` (n,) [s] the last `hold` [s] contain a speed of every joint that leads a class."""
+    """Return where on `clock` (n,) [s] the last `grace` [s] contain a speed of every joint that leads a class."""
     own, joints = recording.own_clock(clock), tuple(sorted({motion.joint for motion in classes}))
     if own is None:
-        return _speed_is_recent(recording["speed"], joints, clock, hold)
+        return _speed_is_recent(recording["speed"], joints, clock, grace)
     speed = recording["speed"]
-    return speed.derived(("speed is recent", joints, hold), lambda: _speed_is_recent(speed, joints, own, hold), own)
+    return speed.derived(("speed is recent", joints, grace), lambda: _speed_is_recent(speed, joints, own, grace), own)
 
 
-def _speed_is_recent(speed: Series, joints: Sequence[int], clock: FloatArray, hold: float) -> BoolArray:
+def _speed_is_recent(speed: Series, joints: Sequence[int], clock: FloatArray, grace: float) -> BoolArray:
     known = _known(speed, joints)
-    if clock is speed.time and known.all() and hold >= 0.0:
+    if clock is speed.time and known.all() and grace >= 0.0:
         return known
     last = speed.time[known]
     if not len(last):
         return np.zeros(len(clock), dtype=bool)
     at = np.searchsorted(last, clock, side="right") - 1
-    recent: BoolArray = (at >= 0) & (clock - last[np.maximum(at, 0)] <= hold)
+    recent: BoolArray = (at >= 0) & (clock - last[np.maximum(at, 0)] <= grace)
     return recent
 
 
@@ -122,12 +124,12 @@ def _known(speed: Series, joints: Sequence[int]) -> BoolArray:
 def _on_clock(
     time: FloatArray,
     now: BoolArray,
-    started: BoolArray,
+    begun_now: BoolArray,
     before: BoolArray,
     firsts: Sequence[int],
     clock: FloatArray,
     recent: BoolArray,
-) -> list[Judging]:
+) -> list[Applicability]:
     """Return the decision at the last speed sample at or before each time of `clock`, where one is `recent`."""
     if len(firsts) == 1 and firsts[0] == 0:
         return _in_the_only_stroke(time, now, clock, recent)
@@ -137,26 +139,26 @@ def _on_clock(
     found = []
     for j in range(now.shape[1]):
         # A class that departed in an earlier stroke: the last one that it had begun and applied to.
-        held_from = np.maximum.accumulate(np.where(started[:, j], stroke_of, -1))[at]
+        held_from = np.maximum.accumulate(np.where(begun_now[:, j], stroke_of, -1))[at]
         own = now[at, j] & recent
         held = before[at, j] & recent & (held_from >= 0) & (held_from < stroke)
         for number in np.union1d(stroke[own], held_from[held]).tolist():
             where = (own & (stroke == number)) | (held & (held_from == number))
-            found.append(Judging(number, j, where))
+            found.append(Applicability(number, j, where))
     return found
 
 
-def _in_the_only_stroke(time: FloatArray, now: BoolArray, clock: FloatArray, recent: BoolArray) -> list[Judging]:
+def _in_the_only_stroke(time: FloatArray, now: BoolArray, clock: FloatArray, recent: BoolArray) -> list[Applicability]:
     """Return `_on_clock` for a log of a single stroke: no class departed in an earlier one."""
     at = slice(None) if clock is time else np.maximum(np.searchsorted(time, clock, side="right") - 1, 0)
     where = now[at] & recent[:, np.newaxis]
-    return [Judging(0, j, np.ascontiguousarray(where[:, j])) for j in range(now.shape[1]) if where[:, j].any()]
+    return [Applicability(0, j, np.ascontiguousarray(where[:, j])) for j in range(now.shape[1]) if where[:, j].any()]
 
 
 @kernel(
     f"void({READ_ONLY}, b1[:,::1], b1[:,::1], b1[::1], b1[::1], float64[::1], b1[:,::1], float64, b1[:,::1], b1[:,::1])"
 )
-def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by one
+def _decide(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by one
     time: FloatArray,
     begun: BoolArray,
     fits: BoolArray,
@@ -164,7 +166,7 @@ def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one b
     fresh: BoolArray,
     completed_by: FloatArray,
     opposed: BoolArray,
-    hold: float,
+    grace: float,
     now: BoolArray,
     before: BoolArray,
 ) -> None:
@@ -202,7 +204,7 @@ def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one b
             continue
         any_held = False
         for j in range(count):
-            if time[k] - held_since[j] > hold:
+            if time[k] - held_since[j] > grace:
                 held[j] = False
                 resting[j] = False
             any_held = any_held or held[j]
@@ -214,7 +216,7 @@ def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one b
             elif fitting[j]:
                 departed[j] = time[k]
             fitting[j] = fits[k, j]
-            if member[j] and not fitting[j] and time[k] - departed[j] > hold:
+            if member[j] and not fitting[j] and time[k] - departed[j] > grace:
                 member[j] = False
         any_member = False
         for j in range(count):
@@ -230,7 +232,7 @@ def _judge(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one b
         for j in range(count):
             if not member[j] and fits[k, j]:
                 alone = not any_member and not any_held
-                if alone or (started[j] and time[k] - fitting_since[j] >= hold):
+                if alone or (started[j] and time[k] - fitting_since[j] >= grace):
                     member[j] = True
         any_started = False
         for j in range(count):

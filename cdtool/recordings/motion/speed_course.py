@@ -24,27 +24,6 @@ SPREADS = 5.5
 SLOW = 0.5
 
 
-class Curves(NamedTuple):
-    """Mean and spread of the speed over time and over travel; a curve that is not used has no points.
-
-    The points over time are the first `time_points`. `travel_end`: the last grid point over travel but one.
-    """
-
-    grid: FloatArray
-    mean: FloatArray
-    spread: FloatArray
-    time_points: float
-    travel_end: float
-
-
-class Expected(NamedTuple):
-    """Direction and nominal speed of a class; a deviation from the mean of at most `least` fits it."""
-
-    direction: float
-    nominal_speed: float
-    least: float
-
-
 # Grid points along the stroke, and how many neighbours to either side are pooled.
 _POINTS, _REACH = 400, 4
 # The time curve reaches this much beyond the slowest run's acceleration.
@@ -94,11 +73,11 @@ class SpeedCourse(SendsFields):
         return self.alignment, self.by_time.content, self.by_travel.content
 
     @cached_property
-    def curves(self) -> Curves:
+    def curves(self) -> _KernelCurves:
         """The curves that its alignment uses, one after the other, as the kernel needs them."""
         by_time, by_travel = self.alignment != "position", self.alignment != "time"
         used = [curve for curve, is_used in ((self.by_time, by_time), (self.by_travel, by_travel)) if is_used]
-        return Curves(
+        return _KernelCurves(
             read_only(np.concatenate([np.arange(len(curve.mean)) * curve.step for curve in used])),
             read_only(np.concatenate([curve.mean for curve in used])),
             read_only(np.concatenate([curve.spread for curve in used])),
@@ -132,18 +111,18 @@ def learn_course(
     """
     courses = []
     for recording in recordings:
-        where = stroke_progress(recording, direction, nominal_speed, joint)
+        at = stroke_progress(recording, direction, nominal_speed, joint)
         series = recording["speed"]
-        use = np.isfinite(where.elapsed) & np.isfinite(series.values[:, joint])
-        courses.append((where, direction * series.values[:, joint], use))
+        use = np.isfinite(at.elapsed) & np.isfinite(series.values[:, joint])
+        courses.append((at, direction * series.values[:, joint], use))
     whole = alignment == "time"
-    lasting = [float(np.max(where.elapsed[use & (whole | ~where.running)], initial=0.0)) for where, _, use in courses]
+    lasting = [float(np.max(at.elapsed[use & (whole | ~at.running)], initial=0.0)) for at, _, use in courses]
     longest = max(lasting, default=0.0) * (1.0 if whole else _TIME_RESERVE)
-    furthest = max((float(np.nanmax(where.travel[use], initial=0.0)) for where, _, use in courses), default=0.0)
+    furthest = max((float(np.nanmax(at.travel[use], initial=0.0)) for at, _, use in courses), default=0.0)
     return SpeedCourse(
         alignment,
-        _learned([(where.elapsed[use], speed[use]) for where, speed, use in courses], longest),
-        _learned([(where.travel[use], speed[use]) for where, speed, use in courses], furthest),
+        _learned([(at.elapsed[use], speed[use]) for at, speed, use in courses], longest),
+        _learned([(at.travel[use], speed[use]) for at, speed, use in courses], furthest),
     )
 
 
@@ -169,11 +148,11 @@ def fitting_samples(
     learned) every speed up to the nominal one fits while accelerating, and the nominal one alone from there on. Causal.
     """
     speed = np.ascontiguousarray(recording["speed"].values[:, joint])
-    where = stroke_progress(recording, direction, nominal_speed, joint)
+    at = stroke_progress(recording, direction, nominal_speed, joint)
     begun, fits = np.empty(len(speed), dtype=np.bool_), np.empty(len(speed), dtype=np.bool_)
-    expected = Expected(float(direction), float(nominal_speed), float(TOLERANCE * nominal_speed))
+    expected = _KernelClass(float(direction), float(nominal_speed), float(TOLERANCE * nominal_speed))
     curves = course.curves if course else _NO_CURVES
-    fit_course(speed, where.elapsed, where.travel, where.running, expected, curves, begun, fits)
+    fit_course(speed, at.elapsed, at.travel, at.running, expected, curves, begun, fits)
     return begun, fits
 
 
@@ -214,13 +193,35 @@ def _curve_from(values: Mapping[str, Any]) -> SpeedCurve:
     return SpeedCurve(step, mean, spread)
 
 
+class _KernelCurves(NamedTuple):
+    """Mean and spread of the speed over time and over travel; a curve that is not used has no points.
+
+    The points over time are the first `time_points`: a float, the only type of number that `fields_of` has.
+    `travel_end`: the last grid point over travel but one.
+    """
+
+    grid: FloatArray
+    mean: FloatArray
+    spread: FloatArray
+    time_points: float
+    travel_end: float
+
+
+class _KernelClass(NamedTuple):
+    """Direction and nominal speed of a class; a deviation from the mean of at most `least` fits it."""
+
+    direction: float
+    nominal_speed: float
+    least: float
+
+
 _NOTHING = read_only(np.empty(0))
-_NO_CURVES = Curves(_NOTHING, _NOTHING, _NOTHING, time_points=0.0, travel_end=0.0)
+_NO_CURVES = _KernelCurves(_NOTHING, _NOTHING, _NOTHING, time_points=0.0, travel_end=0.0)
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(Expected)}, "
-    f"{fields_of(Curves)}, b1[::1], b1[::1])",
+    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(_KernelClass)}, "
+    f"{fields_of(_KernelCurves)}, b1[::1], b1[::1])",
     exact=True,
 )
 def fit_course(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
@@ -228,8 +229,8 @@ def fit_course(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     elapsed: FloatArray,
     travel: FloatArray,
     running: BoolArray,
-    expected: Expected,
-    curves: Curves,
+    expected: _KernelClass,
+    curves: _KernelCurves,
     begun: BoolArray,
     fits: BoolArray,
 ) -> None:

@@ -49,7 +49,7 @@ _ALIKE, _ALIKE_PART, _MOVING, _RUNNING = 0.1, 0.3, 0.5, 0.9
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 
 
-class Courses(NamedTuple):
+class _KernelCourses(NamedTuple):
     """Nominal speeds (m,), the step of the grid over travel, and where on it (g,) the classes run `alike` (1, else 0).
 
     `direction` is +1 or -1.
@@ -119,14 +119,14 @@ class SpeedRange(SendsFields):
     def _follow(self, recording: Recording) -> tuple[BoolArray, BoolArray, FloatArray]:
         speed = np.ascontiguousarray(recording["speed"].values[:, self.joint])
         slowest = self.classes[0]
-        where = stroke_progress(recording, self.direction, slowest.nominal_speed, self.joint)
+        at = stroke_progress(recording, self.direction, slowest.nominal_speed, self.joint)
         begun, fits = np.empty(len(speed), dtype=np.bool_), np.empty(len(speed), dtype=np.bool_)
         found = np.empty(len(speed))
-        follow_speed(recording["speed"].time, speed, where.elapsed, where.travel, *self._courses, begun, fits, found)
+        follow_speed(recording["speed"].time, speed, at.elapsed, at.travel, *self._courses, begun, fits, found)
         return begun, fits, found
 
     @cached_property
-    def _courses(self) -> tuple[Courses, FloatArray, FloatArray]:
+    def _courses(self) -> tuple[_KernelCourses, FloatArray, FloatArray]:
         """The courses on one grid over travel, their means and their spreads (g, m)."""
         curves = [item.course.by_travel for item in self.classes if item.course is not None]
         step = min(curve.step for curve in curves)
@@ -146,7 +146,7 @@ class SpeedRange(SendsFields):
             first, last = (runs[0], runs[-1]) if len(runs) else (len(share), -1)
             alike[:first] = alike[last + 1 :] = False
         return (
-            Courses(read_only(nominal), read_only(alike.astype(np.float64)), step, float(self.direction)),
+            _KernelCourses(read_only(nominal), read_only(alike.astype(np.float64)), step, float(self.direction)),
             mean,
             spread,
         )
@@ -161,15 +161,15 @@ def in_ranges(classes: Sequence[MotionClass]) -> list[list[int]]:
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {fields_of(Courses)}, {_TABLE}, {_TABLE}, b1[::1], "
-    "b1[::1], float64[::1])",
+    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {fields_of(_KernelCourses)}, {_TABLE}, {_TABLE}, "
+    "b1[::1], b1[::1], float64[::1])",
 )
 def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
     measured: FloatArray,
     elapsed: FloatArray,
     travel: FloatArray,
-    courses: Courses,
+    courses: _KernelCourses,
     course: FloatArray,
     spread: FloatArray,
     begun: BoolArray,

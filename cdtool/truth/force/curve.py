@@ -41,7 +41,7 @@ _STANDSTILL = 0.05
 class ForceTimeCurve:
     """Contact force (n,) [N] at the times (n,) [s after the onset] of the existing samples.
 
-    `clipped` (n,): the load cell was at its stop, the true force was larger. `end`: how long the record continues after
+    `at_stop` (n,): the load cell was at its stop, the true force was larger. `end`: how long the record continues after
     the onset [s]. `clock`: that of the cell's samples in the whole record, if they are more. `before`: time
     from the preceding sample, at which the force was at rest, to the first sample [s]; NaN if unknown. `hole`: for how
     long samples are missing where the contact may have begun, up to `uncertainty` earlier [s].
@@ -49,7 +49,7 @@ class ForceTimeCurve:
 
     time: FloatArray
     force: FloatArray
-    clipped: BoolArray
+    at_stop: BoolArray
     end: float
     clock: CellClock | None = None
     before: float = float("nan")
@@ -59,7 +59,7 @@ class ForceTimeCurve:
     @property
     def saturated(self) -> bool:
         """Whether the load cell was at its stop at any time."""
-        return bool(self.clipped.any())
+        return bool(self.at_stop.any())
 
     @property
     def peak(self) -> float:
@@ -159,9 +159,10 @@ def force_time_curve(
     against the motion of the leading joint: F_contact = F_cell - m sign(v) a_measured. The acceleration is interpolated
     linearly to the cell's clock.
 
-    A sample is clipped if 5 consecutive readings, or 5 times as many as the cell usually repeats, equal the largest.
+    A sample is at the stop if 5 consecutive readings, or 5 times as many as the cell usually repeats, equal the
+    largest.
 
-    Fails: a coarse cell under a steady push looks clipped; a bias of the accelerometer appears multiplied by m.
+    Fails: a coarse cell under a steady push looks as at its stop; a bias of the accelerometer appears multiplied by m.
 
     Examples
     --------
@@ -190,7 +191,7 @@ def force_time_curve(
     pressing = (time <= contact.end) | (contact.end <= contact.start)
     largest = int(np.argmax(np.where(pressing, np.abs(over), -1.0)))
     force = over if over[largest] >= 0.0 else -over
-    clipped = _clipped(force) | _clipped_axis(recording["force"], first, last)
+    at_stop = _at_stop(force) | _axis_at_stop(recording["force"], first, last)
     if mass_before_cell > 0.0:
         force = force + mass_before_cell * _acceleration_with_contact(recording, contact.start, time)
     known = np.isfinite(force)
@@ -200,7 +201,7 @@ def force_time_curve(
     return ForceTimeCurve(
         time[known] - contact.start,
         force[known],
-        clipped[known],
+        at_stop[known],
         end,
         clock=samples.clock,
         before=float(time[0] - whole[first - 1]) if first and known[0] else float("nan"),
@@ -264,7 +265,7 @@ def _resolution(force: FloatArray) -> float:
     return smallest if is_grid else 0.0
 
 
-def _clipped(force: FloatArray) -> BoolArray:
+def _at_stop(force: FloatArray) -> BoolArray:
     """Return the samples at the largest reading, if it repeats more often than the cell usually repeats a reading.
 
     The rounded top of a smooth peak repeats, too: it is not at a stop.
@@ -297,7 +298,7 @@ def _is_rounded(force: FloatArray, start: int, count: int, cell: float) -> bool:
     return bool(np.count_nonzero(near < force[start]) >= _SLOW * count)
 
 
-def _clipped_axis(series: Series, first: int, last: int) -> BoolArray | bool:
+def _axis_at_stop(series: Series, first: int, last: int) -> BoolArray | bool:
     """Return the samples from `first` to `last` at which an axis of a magnitude is at its stop.
 
     Only of an axis that takes part in the contact: one at rest may repeat its reading.
@@ -307,12 +308,12 @@ def _clipped_axis(series: Series, first: int, last: int) -> BoolArray | bool:
     present = np.isfinite(series.values[:, 0])
     axes, readings = series.axes[present][first:last], series.readings[present][first:last]
     peak = float(np.max(series.values[present][first:last]))
-    clipped = np.zeros(len(axes), dtype=bool)
+    at_stop = np.zeros(len(axes), dtype=bool)
     for over, reading in zip(axes.T, readings.T, strict=True):
         largest = float(over[np.argmax(np.abs(over))])
         if abs(largest) >= _TAKES_PART * peak:
-            clipped |= _clipped(np.copysign(1.0, largest) * reading)
-    return clipped
+            at_stop |= _at_stop(np.copysign(1.0, largest) * reading)
+    return at_stop
 
 
 def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatArray) -> FloatArray:

@@ -259,7 +259,7 @@ def _judge_step(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepVerd
         cause = StepCause(kind, {"peak": peak, "limit": step.at_most_n, "after_ms": 1e3 * budget})
         return StepVerdict(step, "fail", peak, peak_at, budget, cause.sentence(), cause)
     unknown = _unseen(curve, step, ends) or _may_exceed(curve, step, ends)
-    if not unknown and curve.clipped[inside].any():
+    if not unknown and curve.at_stop[inside].any():
         unknown = StepCause("saturated", {"peak": peak, "limit": step.at_most_n})
     if unknown:
         return _unassessable(step, peak, peak_at, unknown)

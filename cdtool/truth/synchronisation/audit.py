@@ -17,9 +17,9 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.truth.synchronisation.channel_delay import ChannelDelay, RestsOn, TimedEvent, channel_delay_from
 from cdtool.truth.synchronisation.combination import clock_line
 from cdtool.truth.synchronisation.delay import LEAST_POINTS, EventDelay, SmoothSignal, delay_of
-from cdtool.truth.synchronisation.latency import ChannelLatency, RestsOn, TimedEvent, latency_from
 from cdtool.truth.synchronisation.smoothing import POINTS_PER_WIDTH, REACH, Grid, local_derivative
 
 # Delays up to this are found [s].
@@ -80,7 +80,7 @@ class _Window:
     rise: float = math.nan
 
 
-def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -> tuple[ChannelLatency, ...]:
+def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -> tuple[ChannelDelay, ...]:
     """Return the latency of every channel that physics connects with another one.
 
     Parameters
@@ -94,7 +94,7 @@ def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -
 
     Returns
     -------
-    tuple of ChannelLatency
+    tuple of ChannelDelay
         Per joint the speed against the position, and the acceleration against position or speed; the load cell against
         the balance with the position and with the speed. Each states why where it is not assessable. Channels that
         cdtool derived from others are not listed. The load cell is only compared here, never used by a detector.
@@ -121,7 +121,7 @@ def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -
     >>> found[0].channel, found[0].reference, round(found[0].offset.value, 4)
     ('speed', 'position', 0.004)
     """
-    found: list[ChannelLatency] = []
+    found: list[ChannelDelay] = []
     # Of implausibly large values squares are infinite: what they are part of is not assessable.
     with np.errstate(over="ignore", invalid="ignore"):
         for j, joint in enumerate(recording.joints):
@@ -142,25 +142,23 @@ def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _Predi
     return _Predicted(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
 
 
-def _motion_latencies(recording: Recording, joint: int, name: str, contacts: Sequence[Contact]) -> list[ChannelLatency]:
+def _motion_latencies(recording: Recording, joint: int, name: str, contacts: Sequence[Contact]) -> list[ChannelDelay]:
     found = []
     has_position, has_speed = _is_measured(recording, "position"), _is_measured(recording, "speed")
     if has_position and has_speed:
         observed = _part(recording["speed"], joint, 0)
         predictor = _part(recording["position"], joint, 1)
-        found.append(
-            _by_sections(ChannelLatency("speed", "position", "derivative", name), observed, predictor, math.inf)
-        )
+        found.append(_by_sections(ChannelDelay("speed", "position", "derivative", name), observed, predictor, math.inf))
     if _is_measured(recording, "acceleration") and (has_position or has_speed):
         base, order = ("position", 2) if has_position else ("speed", 1)
         # In a contact an elastic transmission separates the accelerometer on the load from the motor.
         until = min((contact.start for contact in contacts), default=math.inf)
         observed, predictor = _part(recording["acceleration"], joint, 0), _part(recording[base], joint, order)
-        found.append(_by_sections(ChannelLatency("acceleration", base, "derivative", name), observed, predictor, until))
+        found.append(_by_sections(ChannelDelay("acceleration", base, "derivative", name), observed, predictor, until))
     return found
 
 
-def _by_sections(empty: ChannelLatency, observed: _Predicted, predictor: _Predicted, until: float) -> ChannelLatency:
+def _by_sections(empty: ChannelDelay, observed: _Predicted, predictor: _Predicted, until: float) -> ChannelDelay:
     start = max(float(observed.time[0]), float(predictor.time[0]))
     end = min(float(observed.time[-1]), float(predictor.time[-1]), until)
     period = max(observed.period, predictor.period)
@@ -198,17 +196,17 @@ def _sections(start: float, end: float, period: float, predictor: _Predicted) ->
 
 
 def _load_cell_latencies(
-    recording: Recording, machine: Machine, contacts: Sequence[Contact], others: Sequence[ChannelLatency]
-) -> list[ChannelLatency]:
+    recording: Recording, machine: Machine, contacts: Sequence[Contact], others: Sequence[ChannelDelay]
+) -> list[ChannelDelay]:
     windows = _contact_windows(recording["force"], contacts) if len(recording["force"]) > 2 else []
     bases = [name for name in ("position", "speed") if _is_measured(recording, name)]
     if not bases or not windows:
         reason = "no contact that the load cell shows" if bases else "neither position nor speed is measured"
-        return [ChannelLatency("force", bases[0] if bases else "position", "deceleration", reason=reason)]
+        return [ChannelDelay("force", bases[0] if bases else "position", "deceleration", reason=reason)]
     found = []
     for base in bases:
         rests_on, sums = _balances(recording, machine, base, others)
-        found.append(_latency(ChannelLatency("force", base, rests_on), _part(recording["force"], 0, 0), sums, windows))
+        found.append(_latency(ChannelDelay("force", base, rests_on), _part(recording["force"], 0, 0), sums, windows))
     return found
 
 
@@ -235,7 +233,7 @@ def _rise_time(force: Series, contact: Contact) -> float:
 
 
 def _balances(
-    recording: Recording, machine: Machine, base: str, others: Sequence[ChannelLatency]
+    recording: Recording, machine: Machine, base: str, others: Sequence[ChannelDelay]
 ) -> tuple[RestsOn, list[list[_Predicted]]]:
     """Return what the balance rests on, and one sum of parts per joint that may feel the contact."""
     order = 2 if base == "position" else 1
@@ -272,7 +270,7 @@ def _balances(
     return rests_on, sums
 
 
-def _lateness(others: Sequence[ChannelLatency], base: str, joint: str) -> float | None:
+def _lateness(others: Sequence[ChannelDelay], base: str, joint: str) -> float | None:
     """Return how late the accelerometer is against `base` [s]; None if that is not known."""
     found = {item.channel: item for item in others if item.joint == joint and item.assessable}
     if "acceleration" not in found:
@@ -284,8 +282,8 @@ def _lateness(others: Sequence[ChannelLatency], base: str, joint: str) -> float 
 
 
 def _latency(
-    empty: ChannelLatency, observed: _Predicted, sums: Sequence[Sequence[_Predicted]], windows: Sequence[_Window]
-) -> ChannelLatency:
+    empty: ChannelDelay, observed: _Predicted, sums: Sequence[Sequence[_Predicted]], windows: Sequence[_Window]
+) -> ChannelDelay:
     """Return the latency with the narrowest interval of all smoothings, widened by its change at twice that."""
     period = max(observed.period, *(part.period for parts in sums for part in parts))
     shortest = min(window.end - window.start for window in windows)
@@ -301,9 +299,11 @@ def _latency(
     ]
     best = int(np.argmin(scores))
     if not math.isfinite(scores[best]):
-        return latency_from(replace(empty, width=widths[best]), trials[best])
+        return channel_delay_from(replace(empty, width=widths[best]), trials[best])
     beside = trials[best + 1] if best + 1 < len(trials) else _joint_events(observed, sums, windows, 2.0 * widths[best])
-    return latency_from(replace(empty, width=widths[best], dependence=_change(trials[best], beside)), trials[best])
+    return channel_delay_from(
+        replace(empty, width=widths[best], dependence=_change(trials[best], beside)), trials[best]
+    )
 
 
 def _joint_events(

@@ -88,7 +88,7 @@ def local_derivative(time: FloatArray, values: FloatArray, at: FloatArray, width
     result = np.full(len(at), np.nan)
     if len(time) < order + 3:
         return result
-    usual = width * math.sqrt(2.0 * math.pi) / float(np.median(np.diff(time)))
+    regular = width * math.sqrt(2.0 * math.pi) / float(np.median(np.diff(time)))
     first = np.searchsorted(time, at - REACH * width)
     count = np.searchsorted(time, at + REACH * width, side="right") - first
     begin = 0
@@ -97,7 +97,7 @@ def local_derivative(time: FloatArray, values: FloatArray, at: FloatArray, width
         longest = np.maximum.accumulate(count[begin : begin + _BLOCK])
         fitting = int(np.searchsorted(longest * np.arange(1, len(longest) + 1), _BLOCK, side="right"))
         part = slice(begin, begin + max(fitting, 1))
-        result[part] = _fitted(time, values, at[part], first[part], count[part], width, order, usual)
+        result[part] = _fitted(time, values, at[part], first[part], count[part], width, order, regular)
         begin = part.stop
     return result
 
@@ -110,7 +110,7 @@ def _fitted(  # noqa: PLR0913 (one block of local_derivative)
     count: IntArray,
     width: float,
     order: int,
-    usual: float,
+    regular: float,
 ) -> FloatArray:
     offsets = np.arange(max(int(count.max()), 1))
     index = np.minimum(first[:, np.newaxis] + offsets, len(time) - 1)
@@ -126,7 +126,7 @@ def _fitted(  # noqa: PLR0913 (one block of local_derivative)
         power *= distance
     before = np.einsum("ij,ij->i", weights, (distance < 0.0).astype(np.float64))
     total = moments[:, 0]
-    sound = (total >= _LEAST_WEIGHT * usual) & (count >= order + 3)
+    sound = (total >= _LEAST_WEIGHT * regular) & (count >= order + 3)
     sound &= np.minimum(before, total - before) >= _LEAST_SIDE * total
     matrix = moments[:, np.add.outer(np.arange(terms), np.arange(terms))]
     sound &= np.abs(np.linalg.det(matrix / np.maximum(total, 1e-300)[:, np.newaxis, np.newaxis])) > 1e-9

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import judge
+from cdtool.alarms.pipeline import judge_alone
 from cdtool.commands.detect.shown import as_rows, show_detected
 from cdtool.commands.detecting.detection import Detected
 from cdtool.detectors.detection import Signal
@@ -36,7 +36,7 @@ def detected(bursts: Sequence[tuple[int, float, float]], pressed: float = 0.4) -
     recording = Recording("arm", "arm.csv", ("shoulder", "elbow"), channels)
     (operation,) = operations_of(recording)
     signal = Signal(time, torque, np.zeros(torque.shape, dtype=np.uint8), "N m", joints=recording.joints)
-    detection = judge(operation, "pure_torque", signal, (Limit.given((40.0,)),), Activation())
+    detection = judge_alone(operation, "pure_torque", signal, (Limit.given((40.0,)),), Activation())
     contacts = tuple(find_contacts(recording, OnsetRule(above=20.0, back_to=8.0)))
     assert len(contacts) == 1
     matching = match(detection.verdict, contacts, detection.statistic)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import judge
+from cdtool.alarms.pipeline import judge_alone
 from cdtool.commands.explain.margin_plot import plot_explanation
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
@@ -50,7 +50,7 @@ def drawn(tmp_path: Path) -> Drawn:
         status[1990:] = Status.GAP if blind else Status.VALID
         signal = Signal(TIME, (0.1 * noise[2] + 10.0 * hit).reshape(-1, 1), status, "N m", joints=("hip",))
         operation = Operation(recording, MotionClass(1, 0.2))
-        detection = judge(operation, "momentum", signal, [Limit.given((limit,))], Activation(9))
+        detection = judge_alone(operation, "momentum", signal, [Limit.given((limit,))], Activation(9))
         matching = match(detection.verdict, contacts, detection.statistic)
         (event, *_) = explain_operation(detection, matching, Activation(9), ("torque", "speed"))
         plot_explanation(detection, event, tmp_path / path)

@@ -149,7 +149,7 @@ def test_each_run_of_a_budget_is_tested_with_thresholds_of_the_others(gate, monk
     from cdtool.commands.learning import calibration, fitting
 
     taught: list[tuple[set[str], set[str]]] = []
-    judge = calibration.judge
+    judge = calibration.judge_alone
     checked_fit = fitting.checked_fit
     latest: set[str] = set()
 
@@ -163,7 +163,7 @@ def test_each_run_of_a_budget_is_tested_with_thresholds_of_the_others(gate, monk
         return judge(operation, *others)
 
     monkeypatch.setattr(fitting, "checked_fit", fit)
-    monkeypatch.setattr(calibration, "judge", seen)
+    monkeypatch.setattr(calibration, "judge_alone", seen)
     run(gate, 'false_alarm_budget = "1/4op"\n', HEAD, LEARN, ONSET, STIFF)
     assert len(taught) == 24 and not any(judged & learned for judged, learned in taught)
 

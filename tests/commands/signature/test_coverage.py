@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.alarms.pipeline import judge
+from cdtool.alarms.pipeline import judge_alone
 from cdtool.base.errors import SignatureError, UsageError
 from cdtool.commands.signature.coverage import LeftOutRun, SignatureCoverage, check_coverage
 from cdtool.detectors.detection import Status
@@ -35,7 +35,7 @@ def test_removing_a_run_equals_learning_from_the_others(alignment):
     whole = rule.fit(bare)
     for index in (0, 7, 13):
         without, refitted = whole.without_run(*bare[index]), rule.fit(bare[:index] + bare[index + 1 :])
-        for one, other in ((without.by_time, refitted.by_time), (without.by_position, refitted.by_position)):
+        for one, other in ((without.by_time, refitted.by_time), (without.by_travel, refitted.by_travel)):
             np.testing.assert_allclose(one.count, other.count)
             np.testing.assert_allclose(one.mean, other.mean, atol=1e-9)
             np.testing.assert_allclose(one.squares, other.squares, atol=1e-7)
@@ -46,7 +46,7 @@ def test_each_run_has_the_critical_factor_that_a_signature_of_the_others_gives_i
     assert [run.name for run in found.runs] == [item.name for item, _ in RUNS]
     for index in (2, 9):
         fitted = learned(RUNS[:index] + RUNS[index + 1 :])
-        expected = critical_factor(judge(*_judged(index, fitted)), ACTIVATION)
+        expected = critical_factor(judge_alone(*_judged(index, fitted)), ACTIVATION)
         assert found.runs[index].critical_factor == pytest.approx(expected, rel=1e-9)
     prediction = prediction_of([run.critical_factor for run in found.runs])
     assert found.chance == prediction.chance_above(5.5)
@@ -61,7 +61,7 @@ def _judged(index: int, fitted):
 def test_a_run_unlike_the_others_alarms_when_it_is_left_out_though_not_when_it_was_learned():
     odd = season(14, lambda number, travel: 4.0 * (number == 5) * (np.abs(travel - 0.4) < 0.03))
     whole = learned(odd, safety_factor=3.0)
-    assert judge(odd[5][0], "", odd[5][1], (whole,), ACTIVATION).verdict.outcome == "no alarm"
+    assert judge_alone(odd[5][0], "", odd[5][1], (whole,), ACTIVATION).verdict.outcome == "no alarm"
     found = check_coverage(odd, replace(RULE, safety_factor=3.0), ACTIVATION)
     assert [run.name for run in found.runs if run.alarm] == ["run5"]
     assert found.alarms == 1 and not found.enough

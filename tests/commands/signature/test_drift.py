@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.alarms.pipeline import judge
+from cdtool.alarms.pipeline import judge_alone
 from cdtool.base.errors import SignatureError
 from cdtool.commands.signature.coverage import check_coverage
 from cdtool.commands.signature.drift import audit_drift
@@ -45,7 +45,7 @@ def test_a_drift_of_the_whole_stroke_is_reported_with_its_slope():
     (joint,) = audited(lambda number, _: 0.04 * number).joints
     assert joint.local is None
     slope = joint.overall.course.trend.slope
-    spread = float(np.nanmedian(FITTED.by_position.band(True)[1]))
+    spread = float(np.nanmedian(FITTED.by_travel.band(True)[1]))
     assert slope.low < 0.04 / spread < slope.high
     (line,) = verdicts(joint)
     assert line.startswith("drifts by +0.0") and line.endswith("): relearn")
@@ -86,7 +86,7 @@ def test_each_run_has_its_critical_factor_and_its_alarm():
     found = audit_drift(FITTED, late, ACTIVATION)
     (joint,) = found.joints
     for run, (operation, signal) in zip(joint.runs, late, strict=True):
-        detection = judge(operation, "", signal, (FITTED,), ACTIVATION)
+        detection = judge_alone(operation, "", signal, (FITTED,), ACTIVATION)
         assert run.critical_factor == pytest.approx(critical_factor(detection, ACTIVATION))
         assert run.margin_used == pytest.approx(run.critical_factor / 5.5)
         assert run.alarm == (detection.verdict.outcome == "alarm")

@@ -9,13 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
-from cdtool.recordings.clock import EPOCH, clean_time, previous_value, stamps
+from cdtool.recordings.clock import THREE_YEARS, clean_time, previous_value, stamps
 from cdtool.recordings.clock.coarse_clock import recent_medians
 from cdtool.recordings.clock.held_samples import hold_last
 from cdtool.recordings.recording import Series
 
-STEP = st.sampled_from([1e-3, 1e-3, 1e-3, 0.02, 1.0, 0.0, -1e-3, -5.0, 2e8, EPOCH, 1e9, math.nan, math.inf, -math.inf])
-USUAL = st.sampled_from([1e-3, 2e-3, 0.5, 2e8, EPOCH])
+STEP = st.sampled_from(
+    [1e-3, 1e-3, 1e-3, 0.02, 1.0, 0.0, -1e-3, -5.0, 2e8, THREE_YEARS, 1e9, math.nan, math.inf, -math.inf]
+)
+USUAL = st.sampled_from([1e-3, 2e-3, 0.5, 2e8, THREE_YEARS])
 
 
 @st.composite

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.alarms.judgement import judged
+from cdtool.alarms.judgement import judgement_of
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
-from cdtool.recordings.motion.applicable import HOLD, judging_classes
+from cdtool.recordings.motion.applicable import GRACE, applicable_classes
 from cdtool.recordings.motion.speed_course import stroke_progress
 from cdtool.recordings.motion.strokes import strokes_so_far
 from cdtool.recordings.recording import Recording, Series
@@ -29,7 +29,7 @@ def judges(recording: Recording, *classes: MotionClass, how: str = "whole") -> n
     """(n, classes) where each judges, in whichever stroke."""
     time = recording["speed"].time
     found = np.zeros((len(time), len(classes)), dtype=bool)
-    for item in judging_classes(recording, classes, strokes_so_far(recording, how, classes), time):
+    for item in applicable_classes(recording, classes, strokes_so_far(recording, how, classes), time):
         found[:, item.motion] |= item.where
     return found
 
@@ -45,24 +45,24 @@ def test_while_two_classes_fit_both_judge_and_then_the_one_that_still_fits():
     both = slice(at(recording, 0.6), at(recording, 0.95))
     assert found[both].all()
     assert found[:, 1].all()
-    assert not found[at(recording, 1.1 + HOLD) :, 0].any()
+    assert not found[at(recording, 1.1 + GRACE) :, 0].any()
 
 
 def test_a_contact_that_slows_the_axis_is_judged_by_the_class_before_it_and_by_no_slower_one():
     recording = log((0.3, 2.0), (0.2, 2.0), seed=2)
     found = judges(recording, SLOW, FAST)
     departs = at(recording, 2.5)
-    within = slice(departs + 100, at(recording, 2.5 + 0.9 * HOLD))
+    within = slice(departs + 100, at(recording, 2.5 + 0.9 * GRACE))
     assert found[within, 1].all() and not found[within, 0].any()
-    # Behind the hold the slower class fits: judging goes on.
+    # After the grace period the slower class fits: judging goes on.
     assert found[at(recording, 4.0) :, 0].all() and not found[at(recording, 4.0) :, 1].any()
 
 
 def test_an_axis_that_a_contact_stops_is_judged_for_the_matching_window_and_no_longer():
     recording = log((0.3, 2.0), (0.0, 4.0), seed=3)
     found = judges(recording, FAST)[:, 0]
-    assert found[: at(recording, 2.5 + HOLD)].all()
-    assert not found[at(recording, 2.7 + HOLD) :].any()
+    assert found[: at(recording, 2.5 + GRACE)].all()
+    assert not found[at(recording, 2.7 + GRACE) :].any()
 
 
 def test_without_a_speed_for_the_matching_window_nothing_judges():
@@ -82,7 +82,7 @@ def test_a_log_without_a_single_sample_of_speed_is_judged_by_no_class(how):
     nothing = Series(np.empty(0), np.empty((0, 1)), "m/s")
     silent = Recording("silent", "made up", ("axis",), {**recording.channels, "speed": nothing})
     clock = recording["position"].time
-    assert judging_classes(silent, (FAST, BACK), strokes_so_far(silent, how, (FAST, BACK)), clock) == []
+    assert applicable_classes(silent, (FAST, BACK), strokes_so_far(silent, how, (FAST, BACK)), clock) == []
 
 
 @pytest.mark.parametrize("place", [0.05, 0.1, 0.2, 0.3])
@@ -128,8 +128,8 @@ def test_a_stroke_behind_a_sudden_stop_begins_with_its_own_motion():
     second = strokes_so_far(both, "motion", (FAST,))[1]
     assert stop < second.start <= second.applies < stop + 0.4
     part = both.section(second.start, np.inf)
-    where = stroke_progress(part, FAST.direction, FAST.nominal_speed, FAST.joint)
-    begins = float(part["speed"].time[np.flatnonzero(np.isfinite(where.elapsed))[0]])
+    at = stroke_progress(part, FAST.direction, FAST.nominal_speed, FAST.joint)
+    begins = float(part["speed"].time[np.flatnonzero(np.isfinite(at.elapsed))[0]])
     assert begins == pytest.approx(stop + 0.5 + 0.1 * 0.3 / RAMP, abs=0.05)
 
 
@@ -148,6 +148,6 @@ def test_where_no_speed_came_samples_are_missing_and_not_of_another_speed():
     speed[1500:3800] = np.nan
     series = Series(recording["speed"].time, speed, "m/s")
     holed = Recording("holed", "made up", ("axis",), {**recording.channels, "speed": series})
-    statistic, _ = judged(holed, signal_of(holed), [fitted]).evaluated
+    statistic, _ = judgement_of(holed, signal_of(holed), [fitted]).evaluated
     assert (statistic.status[2600:3800] == Status.GAP).all()
     assert not (statistic.status == Status.OTHER_SPEED).any()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge
+from cdtool.alarms.pipeline import Detection, judge_alone
 from cdtool.base.errors import CdtoolError, OutputError, UsageError
 from cdtool.commands.detect import plot as detection_plot
 from cdtool.commands.detect.plot import plot_detected
@@ -147,7 +147,7 @@ def five_alarms() -> Detected:
     recording = Recording("axis", "axis.csv", ("axis",), channels)
     (operation,) = operations_of(recording)
     signal = Signal(time, torque, np.zeros(torque.shape, dtype=np.uint8), "N m", joints=("axis",))
-    detection = judge(operation, "pure_torque", signal, (Limit.given((40.0,)),), Activation())
+    detection = judge_alone(operation, "pure_torque", signal, (Limit.given((40.0,)),), Activation())
     return Detected(recording, (detection,), (), (match(detection.verdict, (), detection.statistic),), "limit 40 N m")
 
 

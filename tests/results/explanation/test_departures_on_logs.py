@@ -12,7 +12,7 @@ import pytest
 
 import cdtool
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import judge, run_detector
+from cdtool.alarms.pipeline import judge_alone, run_detector
 from cdtool.commands.judging.runs import RunReading, load_runs
 from cdtool.commands.learning.normal_runs import normal_motions
 from cdtool.formats.machine_file import MachineFile, read_machine_file
@@ -66,7 +66,7 @@ def explained(
     instance = file.detector(detector)
     limits = [limit] * len(recording.joints)
     signal = run_detector(operation, file.machine, instance)
-    detection = judge(operation, instance.name, signal, [Limit.given(limits)], activation)
+    detection = judge_alone(operation, instance.name, signal, [Limit.given(limits)], activation)
     return Explainer(detection, activation, instance.needs, normals).alarm(detection.verdict.alarms[0], None, "alarm")
 
 
@@ -156,7 +156,9 @@ def test_rows_that_are_missing_right_before_an_alarm_are_named_with_their_number
     signal = run_detector(operation, file.machine, file.detector("pure_torque"))
     values = np.zeros_like(signal.values)
     values[after:] = 9.0
-    detection = judge(operation, "pure_torque", replace(signal, values=values), [Limit.given([5.0])], Activation(1))
+    detection = judge_alone(
+        operation, "pure_torque", replace(signal, values=values), [Limit.given([5.0])], Activation(1)
+    )
     item = Explainer(detection, Activation(1), ("torque",), gate).alarm(detection.verdict.alarms[0], None, "alarm")
     (found,) = item.glitches
     assert (found.kind, found.channel) == ("dropout", "torque") and found.samples == pytest.approx(20, abs=1)

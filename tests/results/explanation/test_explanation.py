@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge
+from cdtool.alarms.pipeline import Detection, judge_alone
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.operations import Operation
@@ -45,7 +45,7 @@ def detection(
     recording = Recording("log", "log", joints, {name: Series(time, part, "1") for name, part in given.items()})
     marks = np.column_stack([np.zeros(len(time)) if status is None else status] * len(joints)).astype(np.uint8)
     signal = Signal(time, columns, marks, "N m", joints=joints)
-    return judge(
+    return judge_alone(
         Operation(recording, MotionClass(1, 1.0)), "momentum", signal, [threshold or Limit.given(limits)], activation
     )
 

@@ -120,9 +120,9 @@ def test_a_few_lost_samples_and_a_slow_sample_rate_are_not_a_hole():
 def test_a_cell_at_its_stop_is_marked_there_and_nowhere_else():
     curve = force_time_curve(recording(np.minimum(half_sine(TIME), 2000.0)), CONTACT)
     assert curve.saturated
-    np.testing.assert_array_equal(curve.clipped, half_sine(curve.time + ONSET) >= 2000.0)
+    np.testing.assert_array_equal(curve.at_stop, half_sine(curve.time + ONSET) >= 2000.0)
     negative = force_time_curve(recording(7.0 - np.minimum(half_sine(TIME), 2000.0)), CONTACT)
-    np.testing.assert_array_equal(negative.clipped, curve.clipped)
+    np.testing.assert_array_equal(negative.at_stop, curve.at_stop)
 
 
 def test_four_equal_readings_or_repeated_readings_are_not_a_stop():

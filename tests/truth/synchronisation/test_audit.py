@@ -9,16 +9,16 @@ import pytest
 
 from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.truth.synchronisation.audit import audit
-from cdtool.truth.synchronisation.latency import ChannelLatency, pooled, preferred
+from cdtool.truth.synchronisation.channel_delay import ChannelDelay, pooled, preferred
 from tests.synthetic.shifted_clocks import Clocks, axis, collisions
 
 
-def load_cell(found: tuple[ChannelLatency, ...]) -> ChannelLatency:
+def load_cell(found: tuple[ChannelDelay, ...]) -> ChannelDelay:
     (own,) = [item for item in preferred(found) if item.channel == "force"]
     return own
 
 
-def contains(found: ChannelLatency, clocks: Clocks) -> bool:
+def contains(found: ChannelDelay, clocks: Clocks) -> bool:
     return found.offset.low <= clocks.at(found.at) <= found.offset.high
 
 

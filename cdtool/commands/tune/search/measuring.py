@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.alarms.activation import Activation
-from cdtool.alarms.pipeline import Detection, judge, judge_log, run_detector, signal_of_log
+from cdtool.alarms.pipeline import Detection, judge_alone, judge_log, run_detector, signal_of_log
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import CdtoolError, SignatureError
 from cdtool.base.plain_text import counted
@@ -55,7 +55,7 @@ class Measuring:
     budget: Budget
     activations: tuple[Activation, ...]
     learn: Learn
-    hold: float
+    grace: float
     _signals: dict[Any, tuple[list[Pair], list[Signal]]] = field(default_factory=dict, compare=False, repr=False)
 
     def __call__(self, item: Candidate | Choice) -> Measured | HeldOut:
@@ -112,7 +112,7 @@ class Measuring:
             thresholds = self._learned(candidate.rule, free, (fold,))
             for number, run in enumerate(recordings.free):
                 if run.fold == fold:
-                    detection = judge(*_named(free[number], self.detector.name), thresholds, self.activations[0])
+                    detection = judge_alone(*_named(free[number], self.detector.name), thresholds, self.activations[0])
                     for of_debounce, made in zip(runs, MonitoredRun.of_each(detection, self.activations), strict=True):
                         of_debounce[number] = made
             for number, log in enumerate(recordings.struck):
@@ -124,7 +124,7 @@ class Measuring:
     def _detections(
         self, log: StruckLog, signal: Signal, thresholds: Sequence[FittedThreshold], activation: Activation
     ) -> list[Detection]:
-        return judge_log(log.operations, self.detector.name, signal, thresholds, activation, self.hold)
+        return judge_log(log.operations, self.detector.name, signal, thresholds, activation, self.grace)
 
     def _held_out(self, choice: Choice) -> HeldOut:
         """Set the limit by cross-validation without the fold, and assess the fold with it."""
@@ -133,7 +133,7 @@ class Measuring:
         free, struck = self._signals_of(choice.candidate)
 
         def monitored(number: int, thresholds: tuple[FittedThreshold, ...]) -> MonitoredRun:
-            detection = judge(*_named(free[number], name), thresholds, activation)
+            detection = judge_alone(*_named(free[number], name), thresholds, activation)
             return MonitoredRun.of_each(detection, [activation])[0]
 
         inner: list[MonitoredRun] = []

@@ -56,7 +56,7 @@ PLAN = TestPlan(
 
 
 def curve(force: np.ndarray, time: np.ndarray = TIME, **more: object) -> ForceTimeCurve:
-    values = {"clipped": np.zeros(len(time), dtype=bool), "end": float(time[-1]), **more}
+    values = {"at_stop": np.zeros(len(time), dtype=bool), "end": float(time[-1]), **more}
     return ForceTimeCurve(time, force, **values)
 
 
@@ -95,7 +95,7 @@ EDGE_CASES = {
         [],
     ),
     "ringing": (curve(300.0 * np.exp(-TIME / 0.1) * np.cos(60.0 * TIME)), (0.0, 0.0), "pass", []),
-    "clipped sensor": (curve(CLIPPED, clipped=STOPPED), (0.0, 0.0), "incomplete", ["not_assessable"]),
+    "clipped sensor": (curve(CLIPPED, at_stop=STOPPED), (0.0, 0.0), "incomplete", ["not_assessable"]),
     "beyond the range": (curve(sine()), (1800.0, 0.0), "incomplete", ["beyond_range"]),
     "baseline drift that decides": (curve(sine()), (0.0, 5.0), "incomplete", ["drift_decides"]),
     "baseline drift that does not": (curve(sine()), (0.0, 0.5), "pass", []),
@@ -130,8 +130,8 @@ def test_edge_cases_have_the_intended_answer(name):
 @given(st.floats(50.0, 390.0), st.floats(0.1, 0.99))
 def test_a_clipped_sensor_is_never_a_pass(peak, share):
     force = np.minimum(sine(peak), share * peak)
-    clipped = force == share * peak
-    assert outcome(three(curve(force, clipped=clipped)))[0] != "pass"
+    at_stop = force == share * peak
+    assert outcome(three(curve(force, at_stop=at_stop)))[0] != "pass"
 
 
 @given(st.integers(0, 2))

@@ -43,7 +43,7 @@ class TimedEvent:
 
 
 @dataclass(frozen=True)
-class ChannelLatency:
+class ChannelDelay:
     """How late a channel is against a reference, with a 95 % interval, or why that is not assessable.
 
     Parameters
@@ -102,25 +102,25 @@ class ChannelLatency:
         return any(event.delay.known for event in self.events)
 
 
-def latency_from(empty: ChannelLatency, events: Sequence[TimedEvent]) -> ChannelLatency:
+def channel_delay_from(empty: ChannelDelay, events: Sequence[TimedEvent]) -> ChannelDelay:
     """Return the latency that events show.
 
     Parameters
     ----------
-    empty : ChannelLatency
+    empty : ChannelDelay
         The channel, reference and `dependence`, without a result.
     events : sequence of TimedEvent
         All events that were examined.
 
     Returns
     -------
-    ChannelLatency
+    ChannelDelay
         The offset, its interval widened by `dependence`; without any known delay, the most frequent reason.
 
     Examples
     --------
     >>> shown = [TimedEvent(EventDelay(10.0 * i, 3e-3 + 1e-5 * (-1) ** i, 1e-5, 0.99)) for i in range(6)]
-    >>> late = latency_from(ChannelLatency("force", "position", "momentum balance"), shown)
+    >>> late = channel_delay_from(ChannelDelay("force", "position", "momentum balance"), shown)
     >>> round(late.offset.value, 4), late.reason
     (0.003, '')
     """
@@ -155,25 +155,25 @@ def latency_from(empty: ChannelLatency, events: Sequence[TimedEvent]) -> Channel
     )
 
 
-def pooled(latencies: Sequence[ChannelLatency], starts: Sequence[float]) -> ChannelLatency:
+def pooled(latencies: Sequence[ChannelDelay], starts: Sequence[float]) -> ChannelDelay:
     """Return the latency of a channel over several logs that have the same clocks.
 
     Parameters
     ----------
-    latencies : sequence of ChannelLatency
+    latencies : sequence of ChannelDelay
         Those of one channel and joint against the same reference, one per log.
     starts : sequence of float
         What each log's times count from, on one clock [s]; 0 if that is unknown.
 
     Returns
     -------
-    ChannelLatency
+    ChannelDelay
         The offset of all events together, and, if the logs' starts are known, the drift between the clocks.
 
     Examples
     --------
     >>> shown = [TimedEvent(EventDelay(1.0, 3e-3 + 1e-5 * i, 1e-5, 0.99)) for i in range(5)]
-    >>> each = [latency_from(ChannelLatency("force", "speed", "deceleration"), [event]) for event in shown]
+    >>> each = [channel_delay_from(ChannelDelay("force", "speed", "deceleration"), [event]) for event in shown]
     >>> round(pooled(each, [0.0] * 5).offset.value, 6)
     0.00302
     """
@@ -184,31 +184,31 @@ def pooled(latencies: Sequence[ChannelLatency], starts: Sequence[float]) -> Chan
     )
     first = latencies[0]
     dependence = max(item.dependence for item in latencies)
-    empty = ChannelLatency(first.channel, first.reference, first.rests_on, first.joint, dependence=dependence)
-    return latency_from(empty, events)
+    empty = ChannelDelay(first.channel, first.reference, first.rests_on, first.joint, dependence=dependence)
+    return channel_delay_from(empty, events)
 
 
-def preferred(latencies: Sequence[ChannelLatency]) -> tuple[ChannelLatency, ...]:
+def preferred(latencies: Sequence[ChannelDelay]) -> tuple[ChannelDelay, ...]:
     """Return one latency per channel and joint.
 
     Parameters
     ----------
-    latencies : sequence of ChannelLatency
+    latencies : sequence of ChannelDelay
         A load cell may have one against the position and one against the speed.
 
     Returns
     -------
-    tuple of ChannelLatency
+    tuple of ChannelDelay
         The one against the position, which is the least filtered channel; the one against the speed if its interval
         is clearly narrower, as with a position of coarse steps.
 
     Examples
     --------
-    >>> unknown = [ChannelLatency("force", name, "deceleration", reason="no contact") for name in ("position", "speed")]
+    >>> unknown = [ChannelDelay("force", name, "deceleration", reason="no contact") for name in ("position", "speed")]
     >>> [item.reference for item in preferred(unknown)]
     ['position']
     """
-    best: dict[tuple[str, str], ChannelLatency] = {}
+    best: dict[tuple[str, str], ChannelDelay] = {}
     for item in latencies:
         key = (item.channel, item.joint)
         if key not in best or _half(item) < _PREFERENCE * _half(best[key]):
@@ -216,7 +216,7 @@ def preferred(latencies: Sequence[ChannelLatency]) -> tuple[ChannelLatency, ...]
     return tuple(best.values())
 
 
-def _half(latency: ChannelLatency) -> float:
+def _half(latency: ChannelDelay) -> float:
     half = 0.5 * (latency.offset.high - latency.offset.low)
     return half if latency.assessable else math.inf
 
