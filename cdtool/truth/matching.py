@@ -138,9 +138,9 @@ def match(
     taken: set[Alarm] = set()
     matches = []
     spans = windows(of_log or contacts, window)
-    known = list(contacts)
+    starts = {contact.start for contact in contacts}  # a copy of a contact is not equal to it if a field is NaN
     for contact, opens, closes in spans:
-        if contact not in known:
+        if contact.start not in starts:
             continue
         if contact.in_progress:
             matches.append(Match(contact, "in_progress", reason=IN_PROGRESS))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -64,6 +65,14 @@ def test_a_second_alarm_in_the_window_is_neither_detection_nor_false():
 def test_each_contact_takes_its_own_alarm():
     matching = match([alarm(5.04), alarm(8.1)], [CONTACT, Contact(8.0, 8.2, 0.01)], statistic())
     assert [item.latency for item in matching.matches] == pytest.approx([0.04, 0.1])
+
+
+def test_a_contact_that_went_through_a_pickle_is_that_of_the_log():
+    copy = pickle.loads(pickle.dumps(CONTACT))
+    matching = match_verdict(
+        Verdict("alarm", (alarm(5.04),)), [copy], statistic(), of_log=[CONTACT], crossings=[alarm(5.04)]
+    )
+    assert copy != CONTACT and [item.outcome for item in matching.matches] == ["detected"]
 
 
 def test_never_valid_after_the_onset_is_not_assessable():
