@@ -89,7 +89,7 @@ class InertialMomentum:
 
     name: ClassVar[str] = "inertial_momentum"
     short_name: ClassVar[str] = "igm"
-    title: ClassVar[str] = "Inertial generalized momenta"
+    title: ClassVar[str] = "Inertial momentum"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed", "acceleration")
     signed: ClassVar[bool] = True
     contact_torque: ClassVar[bool] = True

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from cdtool.base.errors import ConfigurationError, nearest
 
-# The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8, and four more.
+# The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8, and five more.
 RED, GREEN, BLUE, VIOLET = "#D55E00", "#009E73", "#0072B2", "#B0569B"
 ORANGE, SKY, BROWN = "#E69F00", "#56B4E9", "#8C613C"
-NAVY, OLIVE, GREY = "#332288", "#7A7A00", "#595959"
+NAVY, OLIVE, GREY, UMBER = "#332288", "#7A7A00", "#595959", "#6B4E16"
 
 # Markers that both the figures and the HTML page can draw, named as in matplotlib.
-MARKERS = ("o", "s", "D", "^", "v", "<", ">", "p", "P", "X")
+MARKERS = ("o", "s", "D", "^", "v", "<", ">", "p", "h", "P", "X")
 
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 

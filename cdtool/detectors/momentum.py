@@ -70,7 +70,7 @@ class Momentum:
 
     name: ClassVar[str] = "momentum"
     short_name: ClassVar[str] = "gm"
-    title: ClassVar[str] = "Generalized momentum observer"
+    title: ClassVar[str] = "Momentum observer"
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = True
     contact_torque: ClassVar[bool] = True

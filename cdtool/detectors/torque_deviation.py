@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.detectors.base import require_channels
 from cdtool.detectors.detection import Signal, Status
-from cdtool.detectors.look import Look
+from cdtool.detectors.look import UMBER, Look
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.recording import Recording
@@ -50,7 +50,7 @@ class TorqueDeviation:
     needs: ClassVar[tuple[str, ...]] = ("torque", "reference_torque")
     signed: ClassVar[bool] = True
     contact_torque: ClassVar[bool] = False
-    look: ClassVar[Look] = Look("#6B4E16", "X")
+    look: ClassVar[Look] = Look(UMBER, "h")
 
     def unit(self, machine: Machine) -> str:
         """Return "N" or "N m"."""

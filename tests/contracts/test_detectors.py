@@ -88,9 +88,9 @@ def test_the_short_name_in_the_table_is_that_of_the_class(name):
     assert [short for short, full in DETECTORS.short_names.items() if full == name] == [DETECTORS.load(name).short_name]
 
 
-def test_no_two_detectors_of_cdtool_have_the_same_colour():
+def test_no_two_detectors_of_cdtool_have_the_same_colour_or_marker():
     looks = [DETECTORS.load(name).look for name in DETECTORS.table]
-    assert len({look.colour for look in looks}) == len(looks)
+    assert len({look.colour for look in looks}) == len({look.marker for look in looks}) == len(looks)
     assert all(look_of(name) is look for name, look in zip(DETECTORS.table, looks, strict=True))
 
 

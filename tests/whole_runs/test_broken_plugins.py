@@ -136,7 +136,7 @@ def test_the_others_are_listed_despite_an_unusable_package(install):
 def test_a_name_of_cdtool_itself_is_refused_and_cdtools_own_is_used(install):
     install(DETECTOR.replace('"odd"', '"momentum"'), "momentum")
     listed = cdtool("list", "detectors")
-    assert listed.status == 3 and listed.out.count("momentum (gm): Generalized momentum observer") == 1
+    assert listed.status == 3 and listed.out.count("momentum (gm): Momentum observer") == 1
     assert "'momentum' of package 'odd-things' has the name of a detector of cdtool itself" in listed.err
     assert detect("momentum").status == 0
 
