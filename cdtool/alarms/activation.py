@@ -102,12 +102,13 @@ class Activation:
         band: Band,
         inner: Band | None = None,
         begins: Sequence[float] = (),
-        needed: Callable[[], npt.NDArray[np.int64]] | None = None,
+        known_debounce: Callable[[], npt.NDArray[np.int64]] | None = None,
     ) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Return alarms and all crossings (debounced exits from the band, armed or not) of all joints, in time order.
 
         `inner`: the band within which an alarm is re-armed, with hysteresis; `begins` [s]: start of operations, at
-        which every alarm is re-armed. `needed` returns the debounce on the statistic's clock, if that is known.
+        which every alarm is re-armed. `known_debounce` returns `needed` on the statistic's clock if it is stored; it is
+        called where a value is outside.
         """
         alarms: list[Alarm] = []
         crossings: list[Alarm] = []
@@ -120,7 +121,7 @@ class Activation:
                 continue
             calm = ~(outside | (value > inner_upper) | (value < inner_lower))
             status = np.ascontiguousarray(statistic.status[:, joint])
-            debounce = needed() if needed else self.needed(time)
+            debounce = known_debounce() if known_debounce else self.needed(time)
             at, armed = crossings_of(time, outside, calm, status, debounce, self.wait, begins_at(time, begins))
             for k, was_armed in zip(at.tolist(), armed.tolist(), strict=True):
                 statistic_then, highest = float(value[k]), float(upper[k])

@@ -1,4 +1,7 @@
-"""Run one log through detector, threshold and activation, with the results for each of its operations."""
+"""Run one log through detector, threshold and activation, with the results for each of its operations.
+
+`signal_of_log`, then `judge_log`, returns a `Detection` per operation; the others are forms of these two.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +49,8 @@ class UnassessableSection:
 class Detection:
     """The result of a detector and its threshold for one operation, with its derivation.
 
-    `threshold` is None if none applies. `judgement` is that of the whole log; the operation is its `rows`.
+    `threshold` is the first one that was learned, for its settings; None if nothing was learned. Only `judgement`, that
+    of the whole log, knows which one applied to which sample. The operation is its `rows`.
     """
 
     operation: Operation
@@ -125,81 +129,6 @@ class Detection:
         ]
 
 
-def run_detector(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str] = ()) -> Signal:
-    """Return the detector's signal of an operation, for the watched joints (empty: all).
-
-    It runs over the whole log of the operation, without ground truth. Raises RecordingError, or ConfigurationError for
-    an unknown joint.
-    """
-    signal = signal_of_log(operation, machine, detector, watched)
-    return signal if operation.log is None else signal.part(_rows(signal, operation))
-
-
-def run_detector_on_each(
-    operations: Sequence[Operation], machine: Machine, detector: Detector, watched: Sequence[str] = ()
-) -> list[Signal]:
-    """Return the detector's signal of each operation of one log in one run; raises as `run_detector`."""
-    if not operations:
-        return []
-    whole = signal_of_log(operations[0], machine, detector, watched)
-    return [whole if item.log is None else whole.part(_rows(whole, item)) for item in operations]
-
-
-def detect_operations(
-    operations: Sequence[Operation],
-    machine: Machine,
-    detector: Detector,
-    thresholds: Sequence[FittedThreshold],
-    activation: Activation,
-    watched: Sequence[str] = (),
-    grace: float = GRACE,
-) -> list[Detection]:
-    """Run the detector over a log and compare its signal with thresholds, for each of the log's operations.
-
-    With several signatures, those for the motion so far apply, see `recordings.motion.applicable`; if none does, a
-    sample is not assessable. Raises RecordingError if a channel that the detector needs is missing.
-    """
-    if not operations:
-        return []
-    signal = signal_of_log(operations[0], machine, detector, watched)
-    return judge_log(operations, detector.name, signal, thresholds, activation, grace)
-
-
-def _lost_inputs(detector: Detector, recording: Recording, machine: Machine, signal: Signal) -> BoolArray | None:
-    """Return where the detector's inputs lost samples, for the columns of its signal; None without losses."""
-    channels = dict.fromkeys((*detector.needs, *(("position",) if machine.coupled else ())))
-    lost = lost_samples(recording, channels, signal.time)
-    # Coupled joints affect each other, and a signal of the whole machine depends on all of them.
-    if lost is not None and (machine.coupled or lost.shape != signal.values.shape):
-        lost = np.repeat(lost.any(axis=1, keepdims=True), signal.values.shape[1], axis=1)
-    return lost
-
-
-def detect_operation(
-    operation: Operation,
-    machine: Machine,
-    detector: Detector,
-    thresholds: Sequence[FittedThreshold],
-    activation: Activation,
-    watched: Sequence[str] = (),
-) -> Detection:
-    """Return the result of `detect_operations` for one operation of a log."""
-    return detect_operations([operation], machine, detector, thresholds, activation, watched)[0]
-
-
-def judge_alone(
-    operation: Operation,
-    detector: str,
-    signal: Signal,
-    thresholds: Sequence[FittedThreshold],
-    activation: Activation,
-) -> Detection:
-    """Compare a detector's signal of an operation with thresholds; the log around the operation is ignored."""
-    alone = replace(operation, log=None, cut="whole")
-    (detection,) = judge_log([alone], detector, signal, thresholds, activation, GRACE)
-    return replace(detection, operation=operation)
-
-
 def signal_of_log(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str]) -> Signal:
     """Return the detector's signal of the whole log of an operation, for the watched joints (empty: all).
 
@@ -220,17 +149,34 @@ def signal_of_log(operation: Operation, machine: Machine, detector: Detector, wa
     return signal.watching(watched)
 
 
-def _part(signal: Signal, rows: slice, recording: Recording) -> Signal:
-    """Return these rows of a signal; their period is computed once for all signals on this clock of the recording."""
-    part, own = signal.part(rows), recording.own_clock(signal.time)
-    if part is not signal and own is not None:
-        part.know_period(recording.derived(("period", rows.start, rows.stop), lambda: part.period, own))
-    return part
+def _lost_inputs(detector: Detector, recording: Recording, machine: Machine, signal: Signal) -> BoolArray | None:
+    """Return where the detector's inputs lost samples, for the columns of its signal; None without losses."""
+    channels = dict.fromkeys((*detector.needs, *(("position",) if machine.coupled else ())))
+    lost = lost_samples(recording, channels, signal.time)
+    # Coupled joints affect each other, and a signal of the whole machine depends on all of them.
+    if lost is not None and (machine.coupled or lost.shape != signal.values.shape):
+        lost = np.repeat(lost.any(axis=1, keepdims=True), signal.values.shape[1], axis=1)
+    return lost
 
 
-def _rows(signal: Signal, operation: Operation) -> slice:
-    part = operation.recording
-    return slice(None) if operation.log is None else signal.rows(part.start, part.end)
+def run_detector(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str] = ()) -> Signal:
+    """Return the detector's signal of an operation, for the watched joints (empty: all).
+
+    It runs over the whole log of the operation, without ground truth. Raises RecordingError, or ConfigurationError for
+    an unknown joint.
+    """
+    signal = signal_of_log(operation, machine, detector, watched)
+    return signal if operation.log is None else signal.part(_rows(signal, operation))
+
+
+def run_detector_on_each(
+    operations: Sequence[Operation], machine: Machine, detector: Detector, watched: Sequence[str] = ()
+) -> list[Signal]:
+    """Return the detector's signal of each operation of one log in one run; raises as `run_detector`."""
+    if not operations:
+        return []
+    whole = signal_of_log(operations[0], machine, detector, watched)
+    return [whole if item.log is None else whole.part(_rows(whole, item)) for item in operations]
 
 
 def judge_log(
@@ -248,8 +194,8 @@ def judge_log(
     statistic, band = judgement.evaluated
     inner = judgement.narrower(1.0 - activation.hysteresis) if activation.hysteresis else None
     begins = [stroke.applies for stroke in judgement.strokes[1:]]
-    needed = partial(_debounce, judgement.recording, activation, statistic.time)
-    alarms, crossings = activation.alarms(statistic, band, inner, begins, needed)
+    debounce = partial(_debounce, judgement.recording, activation, statistic.time)
+    alarms, crossings = activation.alarms(statistic, band, inner, begins, debounce)
     rearmed = dict(zip(alarms, activation.rearmed(statistic, band, alarms, inner, begins), strict=True))
     found = []
     for item in operations:
@@ -272,6 +218,64 @@ def judge_log(
             detection = replace(detection, verdict=replace(verdict, reason=f"{verdict.reason}; {words}"))
         found.append(detection)
     return found
+
+
+def judge_alone(
+    operation: Operation,
+    detector: str,
+    signal: Signal,
+    thresholds: Sequence[FittedThreshold],
+    activation: Activation,
+) -> Detection:
+    """Compare a detector's signal of an operation with thresholds; the log around the operation is ignored."""
+    alone = replace(operation, log=None, cut="whole")
+    (detection,) = judge_log([alone], detector, signal, thresholds, activation, GRACE)
+    return replace(detection, operation=operation)
+
+
+def detect_operations(
+    operations: Sequence[Operation],
+    machine: Machine,
+    detector: Detector,
+    thresholds: Sequence[FittedThreshold],
+    activation: Activation,
+    watched: Sequence[str] = (),
+    grace: float = GRACE,
+) -> list[Detection]:
+    """Run the detector over a log and compare its signal with thresholds, for each of the log's operations.
+
+    With several signatures, those for the motion so far apply, see `recordings.motion.applicable`; if none does, a
+    sample is not assessable. Raises RecordingError if a channel that the detector needs is missing.
+    """
+    if not operations:
+        return []
+    signal = signal_of_log(operations[0], machine, detector, watched)
+    return judge_log(operations, detector.name, signal, thresholds, activation, grace)
+
+
+def detect_operation(
+    operation: Operation,
+    machine: Machine,
+    detector: Detector,
+    thresholds: Sequence[FittedThreshold],
+    activation: Activation,
+    watched: Sequence[str] = (),
+) -> Detection:
+    """Return the result of `detect_operations` for one operation of a log."""
+    return detect_operations([operation], machine, detector, thresholds, activation, watched)[0]
+
+
+def _rows(signal: Signal, operation: Operation) -> slice:
+    part = operation.recording
+    return slice(None) if operation.log is None else signal.rows(part.start, part.end)
+
+
+def _part(signal: Signal, rows: slice, recording: Recording) -> Signal:
+    """Return these rows of a signal; their period is computed once for all signals on this clock of the recording."""
+    part, own = signal.part(rows), recording.own_clock(signal.time)
+    if part is not signal and own is not None:
+        part.know_period(recording.derived(("period", rows.start, rows.stop), lambda: part.period, own))
+    return part
 
 
 def _within(alarm: Alarm, part: Signal) -> bool:

@@ -105,7 +105,7 @@ def gain(default: float, unit: str, meaning: str, *, searched: bool = True) -> A
     Returns
     -------
     dataclasses.Field
-        The default value of the field.
+        The field, to be assigned to an annotated attribute.
 
     Examples
     --------

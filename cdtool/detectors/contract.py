@@ -76,7 +76,7 @@ def _breach(signal: Any, recording: Recording) -> str:
     wanted = time.dtype == np.float64 and values.dtype == np.float64 and status.dtype == np.uint8
     if not wanted or time.ndim != 1:
         kinds = f"times as {time.ndim}-dimensional {time.dtype}, values as {values.dtype}, status as {status.dtype}"
-        return f"returns {kinds}: a row of float64, float64 and uint8 are needed"
+        return f"returns {kinds}: a 1-dimensional float64 time, float64 values and a uint8 status are needed"
     lost = signal.lost
     if lost is not None and (np.shape(lost) != shape or np.asarray(lost).dtype != np.bool_):
         return f"returns marks of lost samples that are not {shape} of bool, samples by joints"

@@ -116,8 +116,8 @@ class DesiredDynamics:
         started = started_at(time, waits, longest_gap(cutoff))
         status = np.full(started.shape, Status.VALID, dtype=np.uint8)
         status[time[:, np.newaxis] < started + settle] = Status.START_UP
-        lost = np.abs(error) > per_joint(self.tracking_limit, error.shape[1])
-        status[for_every_joint(lost) if machine.coupled else lost] = Status.NOT_APPLICABLE
+        too_far = np.abs(error) > per_joint(self.tracking_limit, error.shape[1])
+        status[for_every_joint(too_far) if machine.coupled else too_far] = Status.NOT_APPLICABLE
         status[missing] = Status.GAP
         notes = _tracking_notes(error, recording.joints, machine.load_units["position"])
         return Signal(time, residual, status, self.unit(machine), self.signed, notes=notes)

@@ -73,7 +73,7 @@ class Signal:
 
     @cached_property
     def period(self) -> float:
-        """Return the median sample period [s]; 0 below two samples."""
+        """Return the median sample period [s]; 0 below two samples, where that of a `Series` is NaN."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
     def changed(self, **fields: Any) -> Signal:
@@ -129,7 +129,10 @@ class Signal:
         return {text: counts[code] / status.size for code, text in REASONS.items() if counts[code]}
 
     def why_not(self, start: float = -np.inf, end: float = np.inf) -> str:
-        """Return these reasons in words, the most frequent first, with their shares, from `start` to `end` [s]."""
+        """Return these reasons in words, the most frequent first, with their shares, from `start` to `end` [s].
+
+        "no samples" if no sample has a reason, also if all are valid.
+        """
         shares = dict(sorted(self.shares(start, end).items(), key=lambda item: -item[1]))
         return ", ".join(f"{text} {100.0 * share:.0f} %" for text, share in shares.items()) or "no samples"
 

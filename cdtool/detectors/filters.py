@@ -161,7 +161,7 @@ def _last_before(now: FloatArray, lost: BoolArray) -> FloatArray:
     return np.concatenate((np.full((1, lost.shape[1]), -np.inf), known[:-1]))
 
 
-def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | float) -> FloatArray:
+def started_at(time: FloatArray, missing: BoolArray, longest: FloatArray | float) -> FloatArray:
     """Return for each sample when its filter last started.
 
     Parameters
@@ -170,7 +170,7 @@ def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | f
         Strictly increasing times [s].
     missing : ndarray of bool, shape (n, J)
         Where there is no sample.
-    longest_gap : float or ndarray of float, shape (J,)
+    longest : float or ndarray of float, shape (J,)
         A filter restarts with the first sample after a longer gap than this [s].
 
     Returns
@@ -186,7 +186,7 @@ def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | f
     """
     now = time[:, np.newaxis]
     before = _last_before(now, missing)
-    begins = ~missing & (np.isinf(before) | (now - before > longest_gap))
+    begins = ~missing & (np.isinf(before) | (now - before > longest))
     starts = np.maximum.accumulate(np.where(begins, now, -np.inf))
     return np.where(np.isinf(starts), np.inf, starts)
 
@@ -236,16 +236,16 @@ def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     values: FloatArray,
     missing: BoolArray,
     usual: FloatArray,
-    cutoff: FloatArray,
-    longest_gap: FloatArray,
+    corner: FloatArray,
+    longest: FloatArray,
     last: npt.NDArray[np.int64],
     filtered: FloatArray,
     rate: FloatArray,
 ) -> None:
     """x1' = x2, x2' = w^2 (u - x1) - sqrt(2) w x2, trapezoid; w prewarped: (2 / T) tan(w T / 2).
 
-    `usual` (n,): the usual step up to each sample. A step of more than 5 of them is cut into as many as it contains.
-    `last` (J,) is overwritten.
+    `corner` w (J,) [rad/s]; after a gap over `longest` (J,) [s] it restarts. `usual` (n,): the usual step up to each
+    sample. A step of more than 5 of them is cut into as many as it contains. `last` (J,) is overwritten.
     """
     root = math.sqrt(2.0)
     joints = values.shape[1]
@@ -262,15 +262,15 @@ def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
             before = last[j]
             if not missing[k, j]:
                 step = time[k] - time[before] if before >= 0 else math.inf
-                if step > longest_gap[j]:
+                if step > longest[j]:
                     y = values[k, j]
                     slope = 0.0
                 else:
                     parts = max(pieces, k - before)
                     own_half = 0.5 * step / parts
                     # Joints with the same cut-off and the same step share the coefficients.
-                    if cutoff[j] * own_half != angle or own_half != half:
-                        angle, half = cutoff[j] * own_half, own_half
+                    if corner[j] * own_half != angle or own_half != half:
+                        angle, half = corner[j] * own_half, own_half
                         # Above its Nyquist frequency a filter cannot be prewarped: it stays just below.
                         w = math.tan(min(angle, 1.4)) / half
                         square = w * w

@@ -126,7 +126,7 @@ def observe_velocity(
     missing: BoolArray,
     gains: FloatArray,
 ) -> tuple[FloatArray, StatusArray]:
-    """Return the residual res (n, J) and its status:
+    """Return the residual res (n, J) of an observer of the speed, and its status (n, J).
 
     res_k = A res_(k-1) + (I - A)(mean balance - M dv / T), A = exp(-K M^-1 T); M is the mean of the step's ends.
 

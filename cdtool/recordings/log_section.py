@@ -187,7 +187,7 @@ class LogSection:
         begin = self.begin.time_in(recording) if self.begin else -math.inf
         return begin, self.end.time_in(recording) if self.end else math.inf
 
-    def within(self, other: LogSection) -> LogSection:
+    def completed_by(self, other: LogSection) -> LogSection:
         """Return this section, with the marks of another one where it has none."""
         return replace(self, begin=self.begin or other.begin, end=self.end or other.end)
 

@@ -28,7 +28,7 @@ _RUN_CUTS = ("column:NAME", "clock-reset", "label:NAME")
 
 # A larger speed counts as this one, so that the quantile is finite.
 _LARGEST = float(np.finfo(np.float64).max)
-# Share of the peak speed below which the axis counts as at rest.
+# Share of the speed that 99 % of the samples do not exceed, below which the axis counts as at rest.
 _REST_SHARE = 0.05
 # A rest shorter than this [s] is a pause in a stroke; a motion shorter than this is not a stroke.
 _SHORTEST_REST = 0.2

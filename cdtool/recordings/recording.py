@@ -89,7 +89,7 @@ class Series(StoresDerived):
 
     @cached_property
     def period(self) -> float:
-        """Return the median sample period [s]; NaN below two samples."""
+        """Return the median sample period [s]; NaN below two samples, where that of a `Signal` is 0."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else float("nan")
 
     def between(self, start: float, end: float) -> Series:

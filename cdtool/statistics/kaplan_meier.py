@@ -192,7 +192,10 @@ def _reached(times: FloatArray, level: FloatArray, target: float) -> float:
 
 
 def _without_band(time: FloatArray, missed: BoolArray, value: float, share: float, level: float) -> Interval:
-    """All at one time, or none detected: P(n of n on one side of the quantile) > (1 - level) / 2 for the bounds."""
+    """Return the interval if all are detected at one time, or none is.
+
+    A bound is the value itself if all n of n on one side of the quantile have a chance below (1 - level) / 2.
+    """
     detected = time[~missed]
     watched = np.count_nonzero(time >= detected[0]) if len(detected) else len(time)
     certain = (0.5 - 0.5 * level) ** (1.0 / watched)

@@ -43,7 +43,7 @@ class Difference:
     n : int
         Number of values.
     clusters : int
-        Number of recordings or campaigns.
+        Number of recordings or campaigns; of both sets together if there are two.
     """
 
     mean: Interval

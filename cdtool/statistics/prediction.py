@@ -77,7 +77,10 @@ class Prediction:
         return _chance((limit - self.mean) / self.std, self.n, self.gumbel_share)
 
     def limit_for(self, chance: float) -> float:
-        """Return the limit that one more run exceeds with that chance: the inverse of `chance_above`."""
+        """Return the limit that one more run exceeds with that `chance`: the inverse of `chance_above`.
+
+        The chance is above 0 and below 1, and above the tail at its last tabulated deviation: below, no limit is found.
+        """
         if self.std == 0.0:
             return self.mean
         from scipy import optimize
@@ -193,8 +196,7 @@ def _log_tail(share: float) -> FloatArray:
         return np.asarray(stats.norm.logsf(_TABLE))
     nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
     reduced = (_TABLE[:, np.newaxis] - math.sqrt(1.0 - share) * nodes) / _gumbel_scale(share) + np.euler_gamma
-    tail = -np.expm1(-np.exp(-reduced)) @ (weights / weights.sum())
-    log_tail: FloatArray = np.log(tail)
+    log_tail: FloatArray = np.log(-np.expm1(-np.exp(-reduced)) @ (weights / weights.sum()))
     return log_tail
 
 

@@ -96,8 +96,8 @@ def median_of(
     Returns
     -------
     Interval
-        In the unit of the latencies. No interval with fewer than 6 contacts, nor if fewer than 10 recordings have
-        several contacts each, because those of one recording are similar.
+        In the unit of the latencies. No interval with fewer than 6 contacts, nor if the contacts are from fewer
+        than 10 recordings and one recording has several: contacts of one recording are similar.
 
     Raises
     ------

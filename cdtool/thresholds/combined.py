@@ -69,7 +69,7 @@ class FittedCombined:
         else:
             values = np.min(share, axis=0)
             judged = valid.all(axis=0)
-        # Codes rise from start-up to no limit: of several reasons the highest is reported.
+        # Of several reasons, the one with the highest code is reported.
         status = np.where(judged, Status.VALID, status.max(axis=0)).astype(np.uint8)
         values = np.where(judged, values, np.nan)
         limit = np.full(values.shape, self.safety_factor)

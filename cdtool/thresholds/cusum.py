@@ -35,9 +35,9 @@ class Cusum:
         g+_k = max(0, g+_{k-1} + nu_k - drift),   g-_k = max(0, g-_{k-1} - nu_k - drift)
 
     The statistic is g+, or -g- if that is larger; with one side monitored, only the sum of that side. The sum is kept
-    over a gap of up to 0.15 s or 20 samples and restarts after a longer one. A constant contact force F moves the
-    innovations by (1 - sum a_i) F. Fails if the normal mean has moved (payload, temperature): the sum grows without
-    limit; it clears slowly after an alarm.
+    over a gap of up to 0.15 s or 20 samples and restarts after a longer one. A constant shift F of the signal moves the
+    innovations by (1 - sum a_i) F / (s(x) sd(nu)). Fails if the normal mean has moved (payload, temperature): the sum
+    grows without limit; it clears slowly after an alarm.
 
     Examples
     --------

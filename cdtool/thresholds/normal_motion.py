@@ -1,6 +1,6 @@
 """Normal bands of every channel along a stroke, learned from impact-free runs as a detector's signature is.
 
-No detector and no threshold uses them: an explanation compares a run with them.
+Here because it is made of signatures. No detector and no threshold uses it: an explanation compares a run with it.
 """
 
 from __future__ import annotations

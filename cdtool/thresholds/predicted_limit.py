@@ -85,7 +85,8 @@ class PredictedLimit:
             _predict(values, step / period, self.forgetting, self.order, self.ahead, result)
             return result
 
-        # Behind a gap that leaves something of the samples before it they still count: it restarts behind a longer.
+        # After a gap in which some of their weight is left, earlier samples still count; after a longer one the fit
+        # restarts.
         start_up = period * np.log(_SETTLED) / np.log(self.forgetting)
         return filtered(signal, predict, start_up, start_up, signal.unit)
 

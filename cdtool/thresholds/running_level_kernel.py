@@ -7,7 +7,7 @@ The level m is the mean deviation of the signal from what was learned. It is lea
 
 c limits a deviation to 3 spreads once 0.3 s of motion have been learned from. While the signal is more than 4 spreads
 from the level, and for 0.3 s afterwards, nothing is learned. The level is never more than `reach` spreads from what was
-learned. In the first second of motion, in which the level is not yet known, the band is wider, twice at first.
+learned. Until 1 s of motion has been learned from, that is for about 1.3 s, the band is wider, twice at first.
 """
 
 from __future__ import annotations

@@ -2,18 +2,15 @@
 
 Its autoregressive model is fitted by Burg's recursion over several sections of the runs.
 
-What was learned lately from runs that are still in use: a search tries many rules on the same runs.
+The models learned last are kept (`_RECENT`): a search tries many rules on the same runs.
 """
 
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from threading import Lock
-from typing import Any, Self, TypeVar
-from weakref import ref
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +18,7 @@ import numpy.typing as npt
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import NothingValidError
 from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.base.recent import Recent
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.clock.lost_samples import lost_samples
 from cdtool.recordings.recording import Recording
@@ -28,53 +26,6 @@ from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.sections import filtered, section_bounds, sections
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
-
-Learned = TypeVar("Learned")
-
-
-class Recent:
-    """The latest values that were learned from runs, each under a key; it keeps no run in memory.
-
-    Parameters
-    ----------
-    most : int
-        So many values are kept, those used last.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from cdtool.detectors.detection import Signal
-    >>> runs = [Signal(np.zeros(2), np.zeros((2, 1)), np.zeros((2, 1), dtype=np.uint8), "N") for _ in range(3)]
-    >>> recent = Recent(2)
-    >>> recent.value("sum", runs, lambda: "learned"), recent.value("sum", runs, lambda: "learned again")
-    ('learned', 'learned')
-    >>> recent.value("sum", runs[:2], lambda: "of two runs")
-    'of two runs'
-    """
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._known: OrderedDict[Hashable, tuple[tuple[ref[Any], ...], Any]] = OrderedDict()
-        self._lock = Lock()
-
-    def value(self, key: Hashable, runs: Sequence[Any], learn: Callable[[], Learned]) -> Learned:
-        """Return what was learned under a key from these very objects; what `learn` returns if it is not known."""
-        whole = (key, tuple(map(id, runs)))
-        with self._lock:
-            known = self._known.get(whole)
-            # An identity is used again once its object is gone.
-            if known is not None and all(one() is run for one, run in zip(known[0], runs, strict=True)):
-                self._known.move_to_end(whole)
-                value: Learned = known[1]
-                return value
-        made = learn()
-        with self._lock:
-            self._known[whole] = (tuple(map(ref, runs)), made)
-            self._known.move_to_end(whole)
-            while len(self._known) > self._most:
-                self._known.popitem(last=False)
-        return made
-
 
 # A cumulative statistic is kept over this many missing samples, or this long [s]: the evidence of a growing contact
 # continues after a gap and does not restart.
@@ -242,7 +193,9 @@ def _whiten(  # noqa: C901  a kernel is one loop
     work: FloatArray,
     result: FloatArray,
 ) -> None:
-    """`slots`: periods since the sample before, 0 at a start. `work` (2 p, p) is overwritten.
+    """Fill the innovations over their normal spread; `work` (2 p, p) is overwritten.
+
+    `slots`: periods since the sample before: 0 at a start, 1, or 2 for more than one.
 
     The last p values of e are the state of a Kalman filter; where all of them were samples it is known exactly. After
     a lost sample it is not: the detector has missed it too, and deviates from the model. The state restarts from the

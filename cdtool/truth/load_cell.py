@@ -39,13 +39,13 @@ _RELEASED = 0.5
 
 
 def reading_step(force: FloatArray) -> float:
-    """The step in which a load cell (n,) reads [N]: the smallest distance between two of its readings; 0 of one alone.
+    """The step in which a load cell (n,) reads [N]: the smallest distance between two readings; 0 if all are equal.
 
     Where it is coarser than the cell's noise, the median absolute deviation is 0 although the reading flickers by a
     step: the noise is then no less than the rounding's own, step / sqrt(12) (Widrow and Kollar, Quantization Noise,
-    2008), so that 8 standard deviations are 2.3 steps. A cell that rests at one reading shows no step but those of its
-    contacts, and of a short one they are as large as it: more than 20 N counts only where readings prove it, four or
-    more of them, each on the grid of that step. `force` holds no missing samples.
+    2008), so that 8 standard deviations are 2.3 steps. A cell that rests at one reading shows no steps but those of its
+    contacts, which in a short contact may be as large as the contact: a step above 20 N counts only if four or more
+    readings prove it, all on its grid; otherwise 20 N are returned. `force` holds no missing samples.
     """
     ordered = np.sort(force)
     distances = np.diff(ordered)
@@ -206,7 +206,16 @@ class ContactSearch:
             span *= 4
 
     def _contact(self, rise: _Rise, at_start: float) -> tuple[Contact, int]:
-        """The contact that begins there, and its last sample."""
+        """The contact that begins there, and its last sample.
+
+        With the sample period T, the interval i before the onset (also of a hole or a batch of stamps) and the rise
+        time r from the onset to the upper level::
+
+            uncertainty = max(T / 2, i - T / 2) + r,    resolution = i + r + (noise + error of the rest level) / slope
+
+        The uncertainty reaches back to the touch: from there to the lower level a force that rises steadily takes no
+        longer than r, if the upper level is at least twice the lower one, as by default.
+        """
         onset, high, line = rise.onset, rise.high, rise.rest
         over = self.force[onset:] - line.value(self.time[onset:])
         last = onset + self._end(rise, over)
@@ -214,22 +223,22 @@ class ContactSearch:
         before = onset - 1
         # Where samples are missing before the onset, it may have come at any time in the hole.
         interval = max(self.period, start - float(self.time[before])) if before >= 0 else self.period
-        way = float(self.time[high]) - start
+        rise_time = float(self.time[high]) - start
         drifted = line.error_at(start)
-        finely = self._time_for(rise, self.noise) + self._time_for(rise, drifted)
+        blurred = self._time_for(rise, self.noise) + self._time_for(rise, drifted)
         level = line.value(float(self.time[onset]))
         hole, since_hole = self._hole(rise, over[: last - onset + 1])
         interval = max(interval, since_hole, self.clock.batch_length)
         contact = Contact(
             start=start,
             end=float(self.time[last]),
-            uncertainty=max(0.5 * self.period, interval - 0.5 * self.period) + way,
+            uncertainty=max(0.5 * self.period, interval - 0.5 * self.period) + rise_time,
             peak_force=float(np.max(np.abs(over[: last - onset + 1]))),
             found_by="load cell",
             rest=level,
             drift=line.drift,
             shift=level - at_start,
-            resolution=interval + way + finely,
+            resolution=interval + rise_time + blurred,
             hole=hole,
         )
         return contact, last
@@ -260,7 +269,7 @@ class ContactSearch:
         return force * time / climbed if climbed > 0.0 else 0.0
 
     def _end(self, rise: _Rise, over: FloatArray) -> int:
-        """The last sample of a stay off the rest level before none comes for the rule's separation.
+        """The last sample off the rest level before a pause as long as the rule's separation.
 
         A drift goes on in the meantime, or not: the lower level widens by it.
         """
@@ -273,7 +282,7 @@ class ContactSearch:
         return int(ends[pauses[0]] if len(pauses) else ends[-1])
 
     def _release(self, rise: _Rise, begin: int) -> tuple[int, float] | None:
-        """The last sample of a contact that lasted from the first on, and the rest level after it; None of another.
+        """The last sample of a contact that lasted from the first on, and the rest level after it; else None.
 
         It was one where the force does not come back to what it was at first, but settles at half of it or less, and
         closer to zero by more than the upper level. So a load cell that is not tared is at rest as long as it comes

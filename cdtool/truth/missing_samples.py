@@ -32,7 +32,7 @@ class CellClock:
 
     @property
     def period(self) -> float:
-        """Return the median step [s]; 0 below two samples."""
+        """Return the median step [s]; 0 below two samples, where the period of a `Series` is NaN."""
         return self._steps[0]
 
     @cached_property

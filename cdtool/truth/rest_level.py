@@ -133,12 +133,12 @@ class RunningRest:
                 return int(self._first[i]), float(np.median(part))
         return None
 
-    def reaches(self, first: int, last: int, level: float, lasting: float) -> bool:
-        """Whether samples `first` to `last` reach a level [N] on its side of zero, or for an interval `lasting` [N]."""
+    def reaches(self, first: int, last: int, level: float, lasting_level: float) -> bool:
+        """Whether samples `first` to `last` reach `level` on its side of zero, or an interval `lasting_level` [N]."""
         side = float(np.sign(level))
         intervals = self._median[self._interval_of(first) : self._interval_of(last) + 1]
         longest = float(np.max(side * intervals))
-        return float(np.max(side * self.force[first : last + 1])) > abs(level) or longest > abs(lasting)
+        return float(np.max(side * self.force[first : last + 1])) > abs(level) or longest > abs(lasting_level)
 
     def _interval_of(self, sample: int) -> int:
         """Return the interval that a sample belongs to."""

@@ -12,8 +12,11 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 
+# Readings are pooled over this long [s].
 INTERVAL = 0.05
+# The newest interval of a line ended at least this long before [s].
 GAP = 0.3
+# A line goes through this many intervals.
 WINDOW = 20
 # A line needs this many intervals and a slope of this many standard errors, more of them with few intervals n:
 # 3 (1 + 10 / n). Otherwise the level is constant.

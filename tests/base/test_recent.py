@@ -7,8 +7,8 @@ from weakref import ref
 
 import numpy as np
 
+from cdtool.base.recent import Recent
 from cdtool.detectors.detection import Signal
-from cdtool.thresholds.whitening import Recent
 
 
 def signals(count: int) -> list[Signal]:

@@ -45,7 +45,7 @@ def info(
 
     Example: cdtool info sample_logs/gate/stiff/03.csv --machine sample_logs/gate/machine.toml
     """
-    from cdtool.commands.judging.information import common_latencies
+    from cdtool.commands.judging.information import common_delays
     from cdtool.commands.judging.information import info as survey
 
     done: list[Info] = []
@@ -61,7 +61,7 @@ def info(
     else:
         for item in done:
             _show(item)
-        if common := common_latencies(done):
+        if common := common_delays(done):
             typer.echo(f"\nAll {len(done)} logs, if their clocks are the same:\n")
             for finding in common:
                 print_line(f"{finding.severity}: {plain(str(finding))}")

@@ -225,7 +225,7 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
 
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
-    from cdtool.commands.judging.synchronisation import latency_findings
+    from cdtool.commands.judging.synchronisation import delay_findings
     from cdtool.formats.channels.reading import read_as_logged
     from cdtool.truth.synchronisation.audit import audit
 
@@ -245,12 +245,12 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     findings += check_channels([before_contact(recording, contacts)], machine_file.machine)
     findings += placeholder_findings(recording, machine_file)
     findings += _steady_header(log, machine_file, findings)
-    latencies = audit(recording, machine_file.machine, contacts)
-    findings += latency_findings(latencies)
+    delays = audit(recording, machine_file.machine, contacts)
+    findings += delay_findings(delays)
     found = worst_first(findings)
     header, origin = logged.header, recording.origin
     details = in_words(header.details, header.topics)
-    return Info(str(log), header.format, details, tuple(channels), found, header.dialect, latencies, origin)
+    return Info(str(log), header.format, details, tuple(channels), found, header.dialect, delays, origin)
 
 
 def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Finding]) -> list[Finding]:
@@ -282,7 +282,7 @@ def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Find
     return [Finding("steady_header", ", ".join(jittery))] if is_steady else []
 
 
-def common_latencies(surveys: Sequence[Info]) -> list[Finding]:
+def common_delays(surveys: Sequence[Info]) -> list[Finding]:
     """Return how late channels are over several logs that were recorded with the same clocks.
 
     Parameters
@@ -297,10 +297,10 @@ def common_latencies(surveys: Sequence[Info]) -> list[Finding]:
     """
     if not any(survey.latencies for survey in surveys):
         return []
-    from cdtool.commands.judging.synchronisation import latency_findings, pooled_latencies
+    from cdtool.commands.judging.synchronisation import delay_findings, pooled_delays
 
     logs, origins = [survey.latencies for survey in surveys], [survey.origin for survey in surveys]
-    return latency_findings(pooled_latencies(logs, origins))
+    return delay_findings(pooled_delays(logs, origins))
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:

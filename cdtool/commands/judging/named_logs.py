@@ -42,7 +42,7 @@ class LogPart:
             with place.at(name):
                 marks.append(None if text is None else Mark.parse(text))
         with place.at("to"):
-            return LogSection(*marks).within(common)
+            return LogSection(*marks).completed_by(common)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,15 +10,13 @@ from cdtool.statistics.interval import Interval
 from cdtool.truth.synchronisation.channel_delay import ChannelDelay, pooled, preferred
 
 
-def latency_findings(latencies: Sequence[ChannelDelay]) -> list[Finding]:
+def delay_findings(delays: Sequence[ChannelDelay]) -> list[Finding]:
     """Return one finding per channel and reference; a log without a contact says nothing about its load cell."""
-    return [
-        _finding(item) for item in preferred(latencies) if item.assessable or item.events or item.channel != "force"
-    ]
+    return [_finding(item) for item in preferred(delays) if item.assessable or item.events or item.channel != "force"]
 
 
-def pooled_latencies(logs: Sequence[Sequence[ChannelDelay]], origins: Sequence[float]) -> tuple[ChannelDelay, ...]:
-    """Return the latencies over several logs, of every pair of channels that more than one log shows.
+def pooled_delays(logs: Sequence[Sequence[ChannelDelay]], origins: Sequence[float]) -> tuple[ChannelDelay, ...]:
+    """Return the delays over several logs, of every pair of channels that more than one log shows.
 
     Parameters
     ----------
@@ -33,8 +31,8 @@ def pooled_latencies(logs: Sequence[Sequence[ChannelDelay]], origins: Sequence[f
         With a drift between the clocks only if all logs are on an epoch: otherwise each log may start its clocks again.
     """
     pairs: dict[tuple[str, str, str, str], list[tuple[ChannelDelay, float]]] = {}
-    for latencies, origin in zip(logs, origins, strict=True):
-        for item in latencies:
+    for delays, origin in zip(logs, origins, strict=True):
+        for item in delays:
             if item.has_delays:
                 key = (item.channel, item.joint, item.reference, item.rests_on)
                 pairs.setdefault(key, []).append((item, origin))

@@ -1,8 +1,9 @@
 """Causal alignment of channels to a detector's clock, and the correction of faulty time stamps.
 
-No function uses later samples: a value at time t is computed from samples at or before t. stamps.py makes the time
-stamps of a log strictly increasing; coarse_clock.py does so for a clock that is coarser than the samples;
-held_samples.py aligns a channel to another clock.
+Alignment is causal: a value at time t is computed from samples at or before t. The correction of time stamps is not
+quite: see `stamps`, which makes them strictly increasing, and `coarse_clock`, for a clock that is coarser than the
+samples. `held_samples` aligns a channel to another clock, `lost_samples` marks what did not arrive, `recent_steps` is
+the step so far, `lower_rate` finds slow columns of a table, `plausible_unit` a wrong unit.
 """
 
 from __future__ import annotations

@@ -25,12 +25,8 @@ def previous_value(series: Series, clock: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray of float, shape (m, J)
-        The values; NaN where there is no sample before, it is missing, or it is too old to stand for the present.
-
-    Raises
-    ------
-    Nothing
-        A clock outside of the channel's time gives NaN.
+        The values; NaN where there is no sample before, also outside the channel's time, it is missing, or it is too
+        old to stand for the present.
 
     Examples
     --------

@@ -25,7 +25,8 @@ def lost_samples(recording: Recording, channels: Iterable[str], clock: FloatArra
 
     A sample is lost if the channel's newest value is NaN, if a channel that shares the clock has no sample at that
     time, or if a channel with its own clock is late: its newest sample is older than 1.5 times the longest of its last
-    9 steps. Before the first sample of a channel, none is lost. The result is causal.
+    9 steps, each counted as at most twice their median. A channel shares the clock if it has samples at 15 of its last
+    20 times. Before the first sample of a channel, none is lost. The result is causal.
     """
     lost: BoolArray | None = None
     own = recording.own_clock(clock)

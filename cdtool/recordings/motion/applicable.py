@@ -45,11 +45,14 @@ def applicable_classes(
 ) -> list[Applicability]:
     """Return where on `clock` (n,) [s] each class applies in each stroke; a class that applies nowhere is left out.
 
-    Until a class has begun its stroke all of them apply. Then those apply that have fitted since they began; one that
-    has departed applies for `grace` [s] more, also beyond the end of its stroke; one that has completed its stroke
-    applies to the rest after it for as long. It applies again once it fits and no other class does, or has fitted for
-    `grace`. Where there was no speed for `grace`, none applies. On the clock of one of the recording's channels it is
-    decided once, for all detectors that learned the same classes.
+    * Until a class has begun its stroke, all classes apply. Then a class applies that has fitted since it began.
+    * A class that has departed applies for `grace` [s] more, also beyond the end of its stroke.
+    * A class that has completed its stroke applies to the rest after it, for at most `grace`.
+    * A class that no longer applies does so again once it fits and no other class applies, or has fitted for `grace`.
+    * Where there was no speed for `grace`, no class applies.
+
+    On the clock of one of the recording's channels this is decided once, for all detectors that learned the same
+    classes.
     """
     own = recording.own_clock(clock)
     if own is None:
@@ -170,10 +173,14 @@ def _decide(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one 
     now: BoolArray,
     before: BoolArray,
 ) -> None:
-    """Fill `now`: classes that apply to their current stroke, and `before`: those that departed in an earlier one.
+    """Fill `now` (n, classes): classes that apply to their current stroke, and `before`: those of an earlier one.
 
-    If a stroke is `fresh`, a class that fitted until `completed_by` [s] has completed the one before. A class joins
-    when it begins, unless one of the `opposed` direction has departed: a contact throws an axis back.
+    `begun`, `fits` (n, classes): whether a class has begun this stroke, and its speed fits so far. Where a stroke is
+    `fresh` (n,), a class that fitted until `completed_by` [s] has completed the one before. A class joins when it
+    begins, unless one of the `opposed` direction has departed: a contact throws an axis back. Of each class: `member`:
+    it applies to the current stroke. `started`: it has begun this stroke. `held`: it departed in an earlier stroke and
+    still applies for `grace` [s]. `resting`: it completed an earlier stroke and applies to the rest after it, for
+    `grace`. `fitting`: its speed fits at the present sample.
     """
     count = begun.shape[1]
     member = np.zeros(count, dtype=np.bool_)

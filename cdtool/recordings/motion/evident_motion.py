@@ -1,4 +1,4 @@
-"""Where a log shows that a joint moves: its average speed so far differs from zero by more than its noise allows."""
+"""Where a log shows that a joint moves: its average speed over the last 0.1 s differs from zero by more than noise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ERRORS = 5.0
 
 
 def evident_speed(speed: Series) -> FloatArray:
-    """Return the average speed so far (n, J) where it shows motion, and 0 elsewhere.
+    """Return the average speed over the last 0.1 s (n, J) where it shows motion, and 0 elsewhere.
 
     Parameters
     ----------

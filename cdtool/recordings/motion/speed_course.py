@@ -157,7 +157,10 @@ def fitting_samples(
 
 
 def _learned(runs: Sequence[tuple[FloatArray, FloatArray]], end: float) -> SpeedCurve:
-    """Return the runs' speeds (axis, speed) at each grid point: of the first sample that reaches it."""
+    """Return mean and spread at each grid point up to `end` of runs (axis, speed).
+
+    A run counts with the first sample that reaches the point.
+    """
     step = end / _POINTS if end > 0.0 else 1.0
     grid = step * np.arange(_POINTS + 1)
     samples = np.full((len(runs), len(grid)), np.nan)

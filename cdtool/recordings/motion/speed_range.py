@@ -2,13 +2,13 @@
 
 At each location of the stroke the classes' learned speeds c_i(x) are compared with the measured one v::
 
-    s = n_i + (v - c_i) / (c_i+1 - c_i) (n_i+1 - n_i),    n_i: nominal speeds
+    s = n_i + (v - c_i) / (c_{i+1} - c_i) (n_{i+1} - n_i),    n_i: nominal speeds
 
-The mean of s over the last 2 s, of samples that are at least 0.3 s old, is the speed that the log runs at: a contact
-that slows the axis does not change it before its alarm. A sample counts by its precision, that is by how many of their
-spreads the two classes are apart there: close classes cannot be told from each other while both accelerate. It is
-looked for where the classes run alike, that is where c_i / n_i is the same for all: not while a faster class still
-accelerates, or already brakes.
+The exponentially weighted mean of s with a time constant of 2 s, of samples that are at least 0.3 s old, is the speed
+that the log runs at: a contact that slows the axis does not change it before its alarm. A sample counts by its
+precision, that is by how many of their spreads the two classes are apart there: close classes cannot be told from each
+other while both accelerate. It is looked for where the classes run alike, that is where c_i / n_i is the same for all:
+not while a faster class still accelerates, or already brakes.
 """
 
 from __future__ import annotations
@@ -31,19 +31,20 @@ from cdtool.recordings.recording import Recording
 
 # Age of a sample that is learned from, and time for which nothing is learned after a departure [s].
 GUARD = 0.3
-# The speed is the mean over about this time, and known after this much of it [s].
+# Time constant of the mean that is the speed, and time of samples after which it is known [s].
 MEMORY, KNOWN = 2.0, 0.1
-# The speed is known once its standard deviation is below this part of how far the fastest and the slowest class are
-# apart; of classes closer than the second, below this part of the second times the slowest speed. Errors of less than
-# `KNOWN` seconds go together.
+# `_DOUBT`: the speed is known once its standard deviation is below this share of fastest - slowest nominal speed.
+# `_CLOSE`: that difference counts as at least this share of the slowest speed. Errors of samples less than `KNOWN`
+# seconds apart are taken to be equal.
 _DOUBT, _CLOSE = 0.2, 0.2
 # A spread below this part of the nominal speed counts as this much: without noise every sample is as precise.
 _LEAST_SPREAD = 1e-3
 # A departure that lasts longer is another speed, which is learned again [s].
 FORGET = 1.0
-# Classes run alike where their shares of the nominal speed differ by at most this much, and by at most this part of
-# how far the nominal speeds are apart, and where none is below the third: between the first and the last location where
-# each of them has reached the fourth. Before that, all accelerate, and those that do so alike cannot be told apart.
+# Where classes run alike, by their shares c_i / n_i. `_ALIKE`: the shares differ by no more than this. `_ALIKE_PART`:
+# nor by more than this times the smallest difference of nominal speeds over the largest one. `_MOVING`: no share is
+# below this. `_RUNNING`: only from the first to the last location at which each share reaches this: before, all
+# accelerate, and classes that do so alike cannot be distinguished.
 _ALIKE, _ALIKE_PART, _MOVING, _RUNNING = 0.1, 0.3, 0.5, 0.9
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"

@@ -40,9 +40,10 @@ def strokes_so_far(recording: Recording, how: str, classes: Sequence[MotionClass
     """Return the strokes of a log, each decided at or before it applies; one of the whole log if it is not cut.
 
     By "motion" a stroke ends with a rest of 0.2 s after a motion, or where the motion turns round. A joint rests where
-    its speed, averaged over the last 0.1 s, is below 10 % of the nominal speed of the slowest class that it leads;
-    without classes, below 10 % of the highest speed of any joint so far. By "trigger" a stroke begins at each rising
-    edge. The strokes of a log are cut once for all detectors that learned the same classes.
+    its speed, averaged over the last 0.1 s, is below 10 % of the nominal speed of the slowest class that it leads.
+    Without classes it rests below 10 % of the highest speed of any joint so far, and a stroke ends only with a rest:
+    turning round needs the direction of a class's joint. By "trigger" a stroke begins at each rising edge. The strokes
+    of a log are cut once for all detectors that learned the same classes.
     """
     if how not in ("motion", "trigger"):
         return [Stroke(-np.inf, -np.inf)]
@@ -109,7 +110,10 @@ def _cut(
     applies: npt.NDArray[np.int64],
     turned: BoolArray,
 ) -> int:
-    """`level`: speed of the joint that moves most as a multiple of the one below which it rests."""
+    """Fill where strokes `start`, from where they apply, and whether the motion `turned`; return their number.
+
+    `level` (n,): speed of the `joint` that moves most, as a multiple of the speed below which it rests.
+    """
     count = 0
     direction = 0
     leads = -1

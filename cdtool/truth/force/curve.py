@@ -32,9 +32,9 @@ _TAKES_PART = 0.3
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
 # recording's top speed the axis is at rest.
 _BEFORE = 0.1
+_STANDSTILL = 0.05
 # A cell that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
 _TAIL = 0.1
-_STANDSTILL = 0.05
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ _PERIODS_PER_SECTION = 100.0
 # A long log is not cut into more sections than this, of which the ones to examine are chosen.
 _FINEST_CUT = 2000
 # A smoothing counts if at least this share of the events that another one shows have a delay.
-_MOST_EVENTS = 0.75
+_ENOUGH_EVENTS = 0.75
 # So many sections must agree: a single one may show the machine's elasticity, not the channel.
 _LEAST_AGREEING = 3
 # Contacts that are examined: spread over the log.
@@ -51,8 +51,8 @@ _LARGEST_ERROR = 0.05
 
 
 @dataclass(frozen=True)
-class _Predicted:
-    """A signal that is part of a prediction: its samples, the order of the derivative, and a factor (J,) or scalar."""
+class _SampledSignal:
+    """A signal, observed or part of a prediction: its samples (n,), the order of the derivative, and a factor."""
 
     time: FloatArray
     values: FloatArray
@@ -81,7 +81,7 @@ class _Window:
 
 
 def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -> tuple[ChannelDelay, ...]:
-    """Return the latency of every channel that physics connects with another one.
+    """Return the delay of every channel that physics connects with another one.
 
     Parameters
     ----------
@@ -125,9 +125,9 @@ def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -
     # Of implausibly large values squares are infinite: what they are part of is not assessable.
     with np.errstate(over="ignore", invalid="ignore"):
         for j, joint in enumerate(recording.joints):
-            found += _motion_latencies(recording, j, joint if len(recording.joints) > 1 else "", contacts)
+            found += _motion_delays(recording, j, joint if len(recording.joints) > 1 else "", contacts)
         if "force" in recording:
-            found += _load_cell_latencies(recording, machine, contacts, found)
+            found += _load_cell_delays(recording, machine, contacts, found)
     return tuple(found)
 
 
@@ -138,11 +138,11 @@ def _is_measured(recording: Recording, channel: str) -> bool:
     return derived is None or not any(item.kind == derived for item in recording.findings)
 
 
-def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _Predicted:
-    return _Predicted(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
+def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _SampledSignal:
+    return _SampledSignal(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
 
 
-def _motion_latencies(recording: Recording, joint: int, name: str, contacts: Sequence[Contact]) -> list[ChannelDelay]:
+def _motion_delays(recording: Recording, joint: int, name: str, contacts: Sequence[Contact]) -> list[ChannelDelay]:
     found = []
     has_position, has_speed = _is_measured(recording, "position"), _is_measured(recording, "speed")
     if has_position and has_speed:
@@ -158,21 +158,23 @@ def _motion_latencies(recording: Recording, joint: int, name: str, contacts: Seq
     return found
 
 
-def _by_sections(empty: ChannelDelay, observed: _Predicted, predictor: _Predicted, until: float) -> ChannelDelay:
+def _by_sections(
+    empty: ChannelDelay, observed: _SampledSignal, predictor: _SampledSignal, until: float
+) -> ChannelDelay:
     start = max(float(observed.time[0]), float(predictor.time[0]))
     end = min(float(observed.time[-1]), float(predictor.time[-1]), until)
     period = max(observed.period, predictor.period)
     windows = _sections(start, end, period, predictor)
     if not windows:
         return replace(empty, reason="the motion is too short, or at rest")
-    found = _latency(empty, observed, [[predictor]], windows)
+    found = _best_delay(empty, observed, [[predictor]], windows)
     if found.assessable and len(found.used) < _LEAST_AGREEING:
         reason = f"only {counted(len(found.used), 'section')} of {len(windows)} with a change of motion that both show"
         return replace(empty, events=found.events, reason=reason)
     return found
 
 
-def _sections(start: float, end: float, period: float, predictor: _Predicted) -> list[_Window]:
+def _sections(start: float, end: float, period: float, predictor: _SampledSignal) -> list[_Window]:
     """Return the sections of a motion in which it changes, at most `_MOST_SECTIONS`."""
     length = max(_SECTION, _PERIODS_PER_SECTION * period, (end - start) / _FINEST_CUT)
     if end - start < length:
@@ -195,7 +197,7 @@ def _sections(start: float, end: float, period: float, predictor: _Predicted) ->
     return [_Window(float(edges[number]), float(edges[number + 1])) for number in busy]
 
 
-def _load_cell_latencies(
+def _load_cell_delays(
     recording: Recording, machine: Machine, contacts: Sequence[Contact], others: Sequence[ChannelDelay]
 ) -> list[ChannelDelay]:
     windows = _contact_windows(recording["force"], contacts) if len(recording["force"]) > 2 else []
@@ -206,7 +208,7 @@ def _load_cell_latencies(
     found = []
     for base in bases:
         rests_on, sums = _balances(recording, machine, base, others)
-        found.append(_latency(ChannelDelay("force", base, rests_on), _part(recording["force"], 0, 0), sums, windows))
+        found.append(_best_delay(ChannelDelay("force", base, rests_on), _part(recording["force"], 0, 0), sums, windows))
     return found
 
 
@@ -234,7 +236,7 @@ def _rise_time(force: Series, contact: Contact) -> float:
 
 def _balances(
     recording: Recording, machine: Machine, base: str, others: Sequence[ChannelDelay]
-) -> tuple[RestsOn, list[list[_Predicted]]]:
+) -> tuple[RestsOn, list[list[_SampledSignal]]]:
     """Return what the balance rests on, and one sum of parts per joint that may feel the contact."""
     order = 2 if base == "position" else 1
     inertia = machine.nominal_inertia
@@ -252,7 +254,7 @@ def _balances(
         if _is_measured(recording, "acceleration") and not machine.coupled and reflected is not None:
             rests_on = "two masses"
             acceleration = recording["acceleration"]
-            load = _Predicted(
+            load = _SampledSignal(
                 acceleration.time - (lateness or 0.0),
                 np.ascontiguousarray(acceleration.values[:, j]),
                 0,
@@ -281,10 +283,10 @@ def _lateness(others: Sequence[ChannelDelay], base: str, joint: str) -> float | 
     return late - found["speed"].offset.value if "speed" in found else None
 
 
-def _latency(
-    empty: ChannelDelay, observed: _Predicted, sums: Sequence[Sequence[_Predicted]], windows: Sequence[_Window]
+def _best_delay(
+    empty: ChannelDelay, observed: _SampledSignal, sums: Sequence[Sequence[_SampledSignal]], windows: Sequence[_Window]
 ) -> ChannelDelay:
-    """Return the latency with the narrowest interval of all smoothings, widened by its change at twice that."""
+    """Return the delay with the narrowest interval of all smoothings, widened by its change at twice that."""
     period = max(observed.period, *(part.period for parts in sums for part in parts))
     shortest = min(window.end - window.start for window in windows)
     widths = [factor * period for factor in _WIDTHS if factor * period * _WIDTHS_PER_EVENT <= shortest] or [
@@ -294,7 +296,7 @@ def _latency(
     counts = [sum(event.delay.known for event in events) for events in trials]
     # A few events by chance, of many, do not show a smoothing to be good.
     scores = [
-        _score(events) if count >= _MOST_EVENTS * max(counts) else math.inf
+        _score(events) if count >= _ENOUGH_EVENTS * max(counts) else math.inf
         for events, count in zip(trials, counts, strict=True)
     ]
     best = int(np.argmin(scores))
@@ -307,14 +309,14 @@ def _latency(
 
 
 def _joint_events(
-    observed: _Predicted, sums: Sequence[Sequence[_Predicted]], windows: Sequence[_Window], width: float
+    observed: _SampledSignal, sums: Sequence[Sequence[_SampledSignal]], windows: Sequence[_Window], width: float
 ) -> list[TimedEvent]:
     """Return the events of the joint that explains the observed signal best."""
     per_joint = [[_event(observed, parts, window, width) for window in windows] for parts in sums]
     return min(per_joint, key=_score)
 
 
-def _event(observed: _Predicted, parts: Sequence[_Predicted], window: _Window, width: float) -> TimedEvent:
+def _event(observed: _SampledSignal, parts: Sequence[_SampledSignal], window: _Window, width: float) -> TimedEvent:
     step = width / POINTS_PER_WIDTH
     own = Grid.over(window.start, window.end, step)
     if own.count < LEAST_POINTS:

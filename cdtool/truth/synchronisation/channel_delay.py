@@ -1,8 +1,8 @@
 """How late a channel is: the result of the audit, for one log or pooled over several.
 
 Convention: a channel is late by 3 ms if its samples are stamped 3 ms later than the same moment in the reference
-channel. The reason may be a clock, a filter, a transmission or the machine's elasticity; the audit cannot tell them
-apart.
+channel. The reason may be a clock, a filter, a transmission or the machine's elasticity; the audit cannot distinguish
+them. This is not a detector's latency, from onset to alarm.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class ChannelDelay:
         The offset in the contacts with the shorter and the longer rise times [s], which `offset` reaches; NaN: of one
         kind.
     reason : str
-        Why the latency is not assessable; empty if it is.
+        Why the delay is not assessable; empty if it is.
     """
 
     channel: str
@@ -103,7 +103,7 @@ class ChannelDelay:
 
 
 def channel_delay_from(empty: ChannelDelay, events: Sequence[TimedEvent]) -> ChannelDelay:
-    """Return the latency that events show.
+    """Return the delay that events show.
 
     Parameters
     ----------
@@ -155,12 +155,12 @@ def channel_delay_from(empty: ChannelDelay, events: Sequence[TimedEvent]) -> Cha
     )
 
 
-def pooled(latencies: Sequence[ChannelDelay], starts: Sequence[float]) -> ChannelDelay:
-    """Return the latency of a channel over several logs that have the same clocks.
+def pooled(delays: Sequence[ChannelDelay], starts: Sequence[float]) -> ChannelDelay:
+    """Return the delay of a channel over several logs that have the same clocks.
 
     Parameters
     ----------
-    latencies : sequence of ChannelDelay
+    delays : sequence of ChannelDelay
         Those of one channel and joint against the same reference, one per log.
     starts : sequence of float
         What each log's times count from, on one clock [s]; 0 if that is unknown.
@@ -179,21 +179,21 @@ def pooled(latencies: Sequence[ChannelDelay], starts: Sequence[float]) -> Channe
     """
     events = tuple(
         replace(event, delay=replace(event.delay, time=event.delay.time + start - starts[0]))
-        for item, start in zip(latencies, starts, strict=True)
+        for item, start in zip(delays, starts, strict=True)
         for event in item.events
     )
-    first = latencies[0]
-    dependence = max(item.dependence for item in latencies)
+    first = delays[0]
+    dependence = max(item.dependence for item in delays)
     empty = ChannelDelay(first.channel, first.reference, first.rests_on, first.joint, dependence=dependence)
     return channel_delay_from(empty, events)
 
 
-def preferred(latencies: Sequence[ChannelDelay]) -> tuple[ChannelDelay, ...]:
-    """Return one latency per channel and joint.
+def preferred(delays: Sequence[ChannelDelay]) -> tuple[ChannelDelay, ...]:
+    """Return one delay per channel and joint.
 
     Parameters
     ----------
-    latencies : sequence of ChannelDelay
+    delays : sequence of ChannelDelay
         A load cell may have one against the position and one against the speed.
 
     Returns
@@ -209,16 +209,16 @@ def preferred(latencies: Sequence[ChannelDelay]) -> tuple[ChannelDelay, ...]:
     ['position']
     """
     best: dict[tuple[str, str], ChannelDelay] = {}
-    for item in latencies:
+    for item in delays:
         key = (item.channel, item.joint)
         if key not in best or _half(item) < _PREFERENCE * _half(best[key]):
             best[key] = item
     return tuple(best.values())
 
 
-def _half(latency: ChannelDelay) -> float:
-    half = 0.5 * (latency.offset.high - latency.offset.low)
-    return half if latency.assessable else math.inf
+def _half(delay: ChannelDelay) -> float:
+    half = 0.5 * (delay.offset.high - delay.offset.low)
+    return half if delay.assessable else math.inf
 
 
 def _is_unclear(drift: Interval, rests_on: RestsOn) -> bool:

@@ -63,11 +63,11 @@ def clock_line(events: Sequence[EventDelay]) -> ClockLine:
 
     Notes
     -----
-    Huber's M-estimate (1981) with deviations sqrt(s_i^2 + tau^2). tau^2 is the one by which the bounded residuals are
-    as large as expected, as Paule and Mandel (1982) choose it for unbounded ones. The intervals rest on the covariance
-    of the M-estimate, with a variance of the residuals of at least 1 times the expected one, and on Student's t with as
-    many degrees of freedom as events without parameters (Knapp and Hartung 2003). Events further from the median line
-    (Theil and Sen) than 6 robust standard deviations are left out.
+    Huber's M-estimate (1981) with deviations sqrt(s_i^2 + tau^2). tau^2 is the one by which the bounded
+    residuals are as large as expected, as Paule and Mandel (1982) choose it for unbounded ones. The intervals rest on
+    the covariance of the M-estimate, with a variance of the residuals of at least 1 times the expected one, and on
+    Student's t with as many degrees of freedom as there are events minus parameters (Knapp and Hartung 2003). Events
+    further from the median line (Theil and Sen) than 6 robust standard deviations are left out.
 
     Examples
     --------

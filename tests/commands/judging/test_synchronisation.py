@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cdtool as package
-from cdtool.commands.judging.information import Info, common_latencies
+from cdtool.commands.judging.information import Info, common_delays
 from tests.base.findings.facts import fact_of
 from tests.command import cdtool
 from tests.synthetic.shifted_clocks import Clocks, collisions
@@ -54,7 +54,7 @@ def test_what_is_not_assessable_has_a_reason():
 
 def test_several_logs_have_a_common_result_with_stiff_and_soft_contacts_apart():
     logs = [survey(name) for name in ("stiff/01.mcap", "stiff/03.csv", "stiff/04.csv", "soft/03.csv", "soft/04.csv")]
-    found = {item.channel: fact_of(item) for item in common_latencies(logs)}
+    found = {item.channel: fact_of(item) for item in common_delays(logs)}
     assert found["force"].kind == "channel_shift" and found["force"].numbers["stiff"] is not None
     assert found["speed"].numbers["events"] > max(shifts(log)["speed"].numbers["events"] for log in logs)
 
