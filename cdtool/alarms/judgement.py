@@ -52,7 +52,7 @@ class _Evaluation:
         return checked_evaluation(changed, self.recording, self.signal)
 
     @cached_property
-    def met_at(self) -> tuple[Signal, FloatArray]:
+    def exceedance(self) -> tuple[Signal, FloatArray]:
         """Return the statistic, and for each sample (rows, J) the safety factor at which its limit would be met."""
         return checked_exceedance(self.threshold, self.recording, self.signal, self.evaluated)
 
@@ -92,7 +92,7 @@ class Judgement:
         met = np.full(self.signal.values.shape, np.inf)
         applied = np.zeros(met.shape, dtype=bool)
         for part in self._evaluations:
-            statistic, own = part.met_at
+            statistic, own = part.exceedance
             valid = part.applies[:, np.newaxis] & (statistic.status == Status.VALID)
             rows = slice(part.rows.start, part.rows.start + len(own))
             met[rows] = np.where(valid & ((own < met[rows]) | np.isnan(own)), own, met[rows])
@@ -105,11 +105,9 @@ class Judgement:
         if not self.classes and self.thresholds and is_per_run(self.thresholds[0]) and len(self.strokes) > 1:
             return tuple(self._of_stroke(number) for number in range(len(self.strokes)))
         if not self.classes:
-            everywhere = np.ones(len(self.signal.time), dtype=bool)
-            rows = slice(0, len(self.signal.time))
-            return tuple(
-                _Evaluation(item, self.recording, self.signal, rows, everywhere) for item in self.thresholds[:1]
-            )
+            n = len(self.signal.time)
+            log = self.recording, self.signal, slice(0, n), np.ones(n, dtype=bool)
+            return tuple(_Evaluation(item, *log) for item in self.thresholds[:1])
         applied = over_speeds([item for item in self.thresholds if class_of(item) is not None])
         motions: list[Motion] = [getattr(item, "motion") for item in applied]  # noqa: B009
         applicable = applicable_classes(self.recording, motions, self.strokes, self.signal.time, self.grace)

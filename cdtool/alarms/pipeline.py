@@ -116,15 +116,13 @@ class Detection:
         starts, ends = [0, *edges.tolist()], [*(edges - 1).tolist(), len(status) - 1]
         found = [(a, b) for a, b in zip(starts, ends, strict=True) if len(status) and status[a] != Status.VALID]
         recording = self.operation.recording
-        position = (
+        at = (
             previous_value(recording["position"], time)[:, joint]
             if "position" in recording
             else np.full(len(time), np.nan)
         )
         return [
-            UnassessableSection(
-                REASONS[int(status[a])], float(time[a]), float(time[b]), float(position[a]), float(position[b])
-            )
+            UnassessableSection(REASONS[int(status[a])], float(time[a]), float(time[b]), float(at[a]), float(at[b]))
             for a, b in found
         ]
 

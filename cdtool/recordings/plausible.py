@@ -216,11 +216,9 @@ def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
     if not medians:
         return None
     centre = np.median(np.array(medians), axis=0)
-    reach = _of_four_fifths(
-        [max(_quantile(column, _SHARE) for column in np.abs(item.values - centre).T) for item in series]
-    )
-    rate = _of_four_fifths([_rate(item) for item in series]) if moves else 0.0
-    extreme = _of_four_fifths([_extreme(item.values - centre) for item in series])
+    reach = _of_most([max(_quantile(column, _SHARE) for column in np.abs(item.values - centre).T) for item in series])
+    rate = _of_most([_rate(item) for item in series]) if moves else 0.0
+    extreme = _of_most([_extreme(item.values - centre) for item in series])
     return ChannelRange(series[0].unit, tuple(centre.tolist()), reach, rate, extreme) if reach > 0.0 else None
 
 
@@ -241,7 +239,7 @@ def _rate(series: Series) -> float:
     return max(_quantile(column, _SHARE) for column in rates.T)
 
 
-def _of_four_fifths(figures: Sequence[float]) -> float:
+def _of_most(figures: Sequence[float]) -> float:
     """Return the largest of the lowest four fifths of the runs; 0 without runs."""
     known = sorted(figure for figure in figures if np.isfinite(figure))
     return known[int(_RUNS * (len(known) - 1))] if known else 0.0

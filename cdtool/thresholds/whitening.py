@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.derived import Recent
 from cdtool.base.errors import NothingValidError
 from cdtool.base.kernels import READ_ONLY, kernel
-from cdtool.base.recent import Recent
 from cdtool.detectors.detection import Signal, Status
 from cdtool.recordings.clock.lost_samples import lost_samples
 from cdtool.recordings.recording import Recording

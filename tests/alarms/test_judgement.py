@@ -72,7 +72,7 @@ def met_at_by_arrays(judgement: Judgement) -> FloatArray:
     met = np.full(judgement.signal.values.shape, np.inf)
     judges = np.zeros(met.shape, dtype=bool)
     for part in judgement._evaluations:
-        statistic, exceeded = part.met_at
+        statistic, exceeded = part.exceedance
         use = statistic.valid & part.applies[:, np.newaxis]
         met[part.rows] = np.where(use, np.minimum(met[part.rows], exceeded), met[part.rows])
         judges[part.rows] |= use

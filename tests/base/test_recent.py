@@ -7,7 +7,7 @@ from weakref import ref
 
 import numpy as np
 
-from cdtool.base.recent import Recent
+from cdtool.base.derived import Recent
 from cdtool.detectors.detection import Signal
 
 

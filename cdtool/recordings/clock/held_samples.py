@@ -25,8 +25,12 @@ def previous_value(series: Series, clock: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray of float, shape (m, J)
-        The values; NaN where there is no sample before, also outside the channel's time, it is missing, or it is too
-        old to stand for the present.
+        The values; NaN where there is no sample before, it is missing, or it is too old to stand for the present.
+
+    Raises
+    ------
+    Nothing
+        Where the channel has no value at a time, the result is NaN.
 
     Examples
     --------

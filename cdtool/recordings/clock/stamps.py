@@ -103,7 +103,7 @@ def _is_clean(stamps: FloatArray) -> bool:
 
 
 @dataclass(frozen=True)
-class _ClassifiedRows:
+class _RowKinds:
     """The rows of a piece, by their `index`, that are neither missing nor stray, and which repeat or run backward."""
 
     index: npt.NDArray[np.intp]
@@ -138,9 +138,7 @@ class ClockCleaner:
         decided, rows = self.classify(stamps, counted, final)
         return decided[rows.kept(len(decided))]
 
-    def classify(
-        self, stamps: FloatArray, counted: FloatArray, final: bool = False
-    ) -> tuple[FloatArray, _ClassifiedRows]:
+    def classify(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> tuple[FloatArray, _RowKinds]:
         """Return the time stamps that are decided, and which of them are to be kept."""
         is_stray = self._stray_marker.add(stamps[np.isfinite(stamps)], final)
         stamps, counted = np.concatenate((self._waiting[0], stamps)), np.concatenate((self._waiting[1], counted))
@@ -158,7 +156,7 @@ class ClockCleaner:
         kept, raw = stamps[index], counted[index]
         highest = np.maximum.accumulate(np.concatenate(([self._highest], kept)))
         self._highest = float(highest[-1])
-        rows = _ClassifiedRows(index, kept == highest[:-1], kept < highest[:-1])
+        rows = _RowKinds(index, kept == highest[:-1], kept < highest[:-1])
         self._backward.add(index[rows.backward], before)
         self._repeated.add(index[rows.repeated], before)
         steps = np.diff(np.concatenate((self._last, raw)))

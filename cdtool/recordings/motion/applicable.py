@@ -56,14 +56,12 @@ def applicable_classes(
     """
     own = recording.own_clock(clock)
     if own is None:
-        return _applicable_classes(recording, classes, strokes, clock, grace)
+        return _applicable(recording, classes, strokes, clock, grace)
     key = ("applicable classes", tuple(item.content for item in classes), tuple(strokes), grace)
-    return list(
-        recording.derived(key, lambda: tuple(_applicable_classes(recording, classes, strokes, own, grace)), own)
-    )
+    return list(recording.derived(key, lambda: tuple(_applicable(recording, classes, strokes, own, grace)), own))
 
 
-def _applicable_classes(
+def _applicable(
     recording: Recording, classes: Sequence[Motion], strokes: Sequence[Stroke], clock: FloatArray, grace: float
 ) -> list[Applicability]:
     speed = recording["speed"]

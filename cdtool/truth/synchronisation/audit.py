@@ -51,7 +51,7 @@ _LARGEST_ERROR = 0.05
 
 
 @dataclass(frozen=True)
-class _SampledSignal:
+class _Waveform:
     """A signal, observed or part of a prediction: its samples (n,), the order of the derivative, and a factor."""
 
     time: FloatArray
@@ -138,8 +138,8 @@ def _is_measured(recording: Recording, channel: str) -> bool:
     return derived is None or not any(item.kind == derived for item in recording.findings)
 
 
-def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _SampledSignal:
-    return _SampledSignal(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
+def _part(series: Series, joint: int, order: int, factor: float = 1.0) -> _Waveform:
+    return _Waveform(series.time, np.ascontiguousarray(series.values[:, joint]), order, factor)
 
 
 def _motion_delays(recording: Recording, joint: int, name: str, contacts: Sequence[Contact]) -> list[ChannelDelay]:
@@ -158,9 +158,7 @@ def _motion_delays(recording: Recording, joint: int, name: str, contacts: Sequen
     return found
 
 
-def _by_sections(
-    empty: ChannelDelay, observed: _SampledSignal, predictor: _SampledSignal, until: float
-) -> ChannelDelay:
+def _by_sections(empty: ChannelDelay, observed: _Waveform, predictor: _Waveform, until: float) -> ChannelDelay:
     start = max(float(observed.time[0]), float(predictor.time[0]))
     end = min(float(observed.time[-1]), float(predictor.time[-1]), until)
     period = max(observed.period, predictor.period)
@@ -174,7 +172,7 @@ def _by_sections(
     return found
 
 
-def _sections(start: float, end: float, period: float, predictor: _SampledSignal) -> list[_Window]:
+def _sections(start: float, end: float, period: float, predictor: _Waveform) -> list[_Window]:
     """Return the sections of a motion in which it changes, at most `_MOST_SECTIONS`."""
     length = max(_SECTION, _PERIODS_PER_SECTION * period, (end - start) / _FINEST_CUT)
     if end - start < length:
@@ -236,7 +234,7 @@ def _rise_time(force: Series, contact: Contact) -> float:
 
 def _balances(
     recording: Recording, machine: Machine, base: str, others: Sequence[ChannelDelay]
-) -> tuple[RestsOn, list[list[_SampledSignal]]]:
+) -> tuple[RestsOn, list[list[_Waveform]]]:
     """Return what the balance rests on, and one sum of parts per joint that may feel the contact."""
     order = 2 if base == "position" else 1
     inertia = machine.nominal_inertia
@@ -254,7 +252,7 @@ def _balances(
         if _is_measured(recording, "acceleration") and not machine.coupled and reflected is not None:
             rests_on = "two masses"
             acceleration = recording["acceleration"]
-            load = _SampledSignal(
+            load = _Waveform(
                 acceleration.time - (lateness or 0.0),
                 np.ascontiguousarray(acceleration.values[:, j]),
                 0,
@@ -284,7 +282,7 @@ def _lateness(others: Sequence[ChannelDelay], base: str, joint: str) -> float | 
 
 
 def _best_delay(
-    empty: ChannelDelay, observed: _SampledSignal, sums: Sequence[Sequence[_SampledSignal]], windows: Sequence[_Window]
+    empty: ChannelDelay, observed: _Waveform, sums: Sequence[Sequence[_Waveform]], windows: Sequence[_Window]
 ) -> ChannelDelay:
     """Return the delay with the narrowest interval of all smoothings, widened by its change at twice that."""
     period = max(observed.period, *(part.period for parts in sums for part in parts))
@@ -309,14 +307,14 @@ def _best_delay(
 
 
 def _joint_events(
-    observed: _SampledSignal, sums: Sequence[Sequence[_SampledSignal]], windows: Sequence[_Window], width: float
+    observed: _Waveform, sums: Sequence[Sequence[_Waveform]], windows: Sequence[_Window], width: float
 ) -> list[TimedEvent]:
     """Return the events of the joint that explains the observed signal best."""
     per_joint = [[_event(observed, parts, window, width) for window in windows] for parts in sums]
     return min(per_joint, key=_score)
 
 
-def _event(observed: _SampledSignal, parts: Sequence[_SampledSignal], window: _Window, width: float) -> TimedEvent:
+def _event(observed: _Waveform, parts: Sequence[_Waveform], window: _Window, width: float) -> TimedEvent:
     step = width / POINTS_PER_WIDTH
     own = Grid.over(window.start, window.end, step)
     if own.count < LEAST_POINTS:
