@@ -10,7 +10,7 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.recordings.motion import MotionClass, measured_class
-from cdtool.recordings.motion.motion_class import averaged
+from cdtool.recordings.motion.motion_class import AVERAGED_SAMPLES, AVERAGED_SECONDS, averaged
 from cdtool.recordings.motion.speed_course import stroke_progress
 from cdtool.recordings.operations import Operation
 from cdtool.results.results import Skipped
@@ -23,7 +23,6 @@ _OFF, _OFF_SHARE = 0.1, 0.1
 # With fewer runs no common speed along the stroke can be determined.
 _ENOUGH = 3
 _POINTS = 100
-_AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5.0
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ def _course(run: _ClassedRun, nominal: float) -> tuple[FloatArray, FloatArray]:
     use = np.isfinite(where.travel) & np.isfinite(speed)
     travel, smooth = (
         where.travel[use],
-        averaged(series.time[use], speed[use], max(_AVERAGED_SECONDS, _AVERAGED_SAMPLES * series.period)),
+        averaged(series.time[use], speed[use], max(AVERAGED_SECONDS, AVERAGED_SAMPLES * series.period)),
     )
     rising = np.concatenate(([True], np.diff(travel) > 0.0)) if len(travel) else np.empty(0, dtype=bool)
     return travel[rising], smooth[rising]
