@@ -34,6 +34,7 @@ from cdtool.report.html.self_contained import content_policy, page_part, page_te
 from cdtool.report.html.traces import HEIGHTS, trace_data
 from cdtool.report.model import AXES, NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number, spoken
+from cdtool.report.plots.latency_axis import FLOOR_MS
 from cdtool.report.plots.style import look_of
 from cdtool.report.table import Cell, Heading, Table, count_cell, name_cell, number_cell, tabulate
 from cdtool.results.traces.trace import Trace
@@ -49,8 +50,6 @@ _BEFORE = 0.5
 _MOST_TELLING, _FEW = 20, 12
 # A share of missed contacts to plan for, as `cdtool plan` takes it.
 _MISSED_TO_SHOW = "5%"
-# Latencies below this [ms] have the same colour.
-_FLOOR_MS = 1.0
 
 
 @dataclass(frozen=True)
@@ -82,14 +81,14 @@ class _Scale:
     @classmethod
     def of(cls, made: CoverageMap) -> _Scale:
         values = [cell.latency_ms for cells in made.cells.values() for cell in cells.values()]
-        known = [max(value, _FLOOR_MS) for value in values if math.isfinite(value)] or [_FLOOR_MS]
+        known = [max(value, FLOOR_MS) for value in values if math.isfinite(value)] or [FLOOR_MS]
         return cls(min(known), max(known))
 
     def level(self, latency: float) -> int:
         """Return the number of the colour of a latency."""
         if self.high <= self.low:
             return 0
-        share = math.log(max(latency, _FLOOR_MS) / self.low) / math.log(self.high / self.low)
+        share = math.log(max(latency, FLOOR_MS) / self.low) / math.log(self.high / self.low)
         return min(max(int(_LEVELS * share), 0), _LEVELS - 1)
 
     @property
