@@ -26,6 +26,7 @@ class Unit:
 RAW_UNITS = ("A", "V", "1", "count")
 
 STANDARD_GRAVITY = 9.80665  # m/s2, by definition (CGPM 1901)
+DAY_S = 86400.0  # s, without the leap seconds that no clock of a log counts
 _INCH, _POUND = 0.0254, 0.45359237 * STANDARD_GRAVITY  # m and N, by definition (1959)
 _PREFIXES = {"u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "da": 1e1, "h": 1e2, "k": 1e3, "M": 1e6}
 # Each symbol with its factor, what it measures, its prefixes, and its words in English and German, without a plural.

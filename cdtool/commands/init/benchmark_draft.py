@@ -31,8 +31,6 @@ from cdtool.truth.onset_rule import OnsetRule
 
 # Every fourth impact-free log is left for the hold-out, if the others are enough to learn from.
 _HOLDOUT = 4
-# With fewer logs of impacts, a threshold learned from the others is not worth it.
-_ENOUGH_IMPACTS = 3
 _FORCE_ONLY = "the logs have no channels of a machine: a protocol of the forces needs no detector"
 # Words, between anything but letters, in the names of logs without an impact.
 _FREE = re.compile(
@@ -192,7 +190,7 @@ def _learning(impacts: Sequence[Path], free: Sequence[Path], folder: Path, by_po
         return [*lines, "", "[holdout]", f"logs = {_listed(patterns(held, folder))}"] if held else lines
     why = f"{counted(len(free), 'impact-free log')}: a signature needs {ENOUGH_RUNS}."
     both = [*free, *impacts]
-    if len(both) >= _ENOUGH_IMPACTS:
+    if len(both) >= 3:  # with fewer logs of impacts, a threshold learned from the others is not worth it
         return [
             *comment_lines(
                 f"{why} Limits are learned from what is before the contacts, and each log is scored with what was "

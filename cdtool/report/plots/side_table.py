@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Height of a line, and how far the names of detectors are moved in [points].
-_ROW = 12.5
-_INDENT = 12.0
+# Height of a line, and how far the names of detectors are moved in [points], chosen by eye.
+_ROW, _INDENT = 12.5, 12.0
 # A detector's name is cut to this length.
 NAME_LENGTH = 24
 

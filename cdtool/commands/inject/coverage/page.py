@@ -42,12 +42,6 @@ from cdtool.results.traces.trace import Trace
 _SCRIPTS = ("scales.js", "chart.js", "trace.js", "tables.js", "coverage.js")
 # Colours of the style sheet, pale for fast to dark for slow, on a logarithmic scale that all maps share.
 _LEVELS = 10
-# All trigger plots together [characters of JSON]; the page stays below 5 MB.
-_MOST_TRACE_TEXT = 4_200_000
-# Time before the contact at which a trigger plot begins [s]: the approach is the same in all recordings of a log.
-_BEFORE = 0.5
-# Rows of the lists.
-_MOST_TELLING, _FEW = 20, 12
 # A share of missed contacts to plan for, as `cdtool plan` takes it.
 _MISSED_TO_SHOW = "5%"
 
@@ -108,7 +102,7 @@ def coverage_html(done: Coverage) -> str:
     scale, numbers = _Scale.of(made), _numbers(made)
     traces = _traces(done)
     style, script = page_part("report.css") + page_part("coverage.css"), "\n".join(page_part(name) for name in _SCRIPTS)
-    missed, telling = made.missed(), made.most_telling(_MOST_TELLING)
+    missed, telling = made.missed(), made.most_telling(20)
     return page_template("coverage.html.j2").render(
         policy=content_policy(style, script),
         style=Markup(style),
@@ -125,7 +119,7 @@ def coverage_html(done: Coverage) -> str:
         positions=[_short(item) for item in made.positions],
         unit=made.unit,
         missed=_missed_table(made, missed) if missed else None,
-        few=len(missed) <= _FEW,
+        few=len(missed) <= 12,
         telling=_telling_table(made, telling) if telling else None,
         left_out=left_out_sections(tuple(dict.fromkeys(done.skipped)), tuple(dict.fromkeys(done.findings)))[0].tables,
         classes=classes,
@@ -322,7 +316,7 @@ def _traces(done: Coverage) -> dict[str, dict[str, Any]]:
     for recording, trace in done.traces.items():
         values = trace_data(_around_contact(trace), detectors)
         size += len(json.dumps(values, ensure_ascii=False, separators=(",", ":")))
-        if size > _MOST_TRACE_TEXT:
+        if size > 4_200_000:  # characters of JSON: the page stays below 5 MB
             break
         found[recording] = values
     return found
@@ -333,7 +327,8 @@ def _around_contact(trace: Trace) -> Trace:
     contact = trace.shown
     if contact is None:
         return trace
-    start = max(trace.start, min(trace.view[0], contact.start - _BEFORE))
+    # Half a second before the contact: the approach is the same in all recordings of a log.
+    start = max(trace.start, min(trace.view[0], contact.start - 0.5))
     kept = trace.force_time >= start
     panels = tuple(replace(panel, course=panel.course.within((start, trace.end))) for panel in trace.panels)
     return replace(trace, start=start, force_time=trace.force_time[kept], force=trace.force[kept], panels=panels)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
+from cdtool.statistics.spread import MAD_TO_STD
 from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.missing_samples import CellClock
 
@@ -35,7 +36,6 @@ _FIRST, _MOST = 1.0, 1500
 _COARSE = 2e-3
 # An average over a longer period lowers a peak by less than this share.
 _PEAK = 0.05
-_NORMAL = 0.6745
 
 
 class _Curve(NamedTuple):
@@ -104,7 +104,7 @@ def hold_same_measurement(one: ForceTimeCurve, other: ForceTimeCurve) -> bool:
 def _prepared(curve: ForceTimeCurve) -> _Curve:
     bent = np.diff(curve.force, 2)
     # Six times the variance of white noise is that of its second differences, which a smooth force has not.
-    noise = float(np.median(np.abs(bent))) / (_NORMAL * np.sqrt(6.0)) if len(bent) else 0.0
+    noise = MAD_TO_STD * float(np.median(np.abs(bent))) / np.sqrt(6.0) if len(bent) else 0.0
     return _Curve(curve.time, curve.force, CellClock(curve.time).period, curve.resolution, noise)
 
 
