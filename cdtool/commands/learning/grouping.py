@@ -16,12 +16,11 @@ from cdtool.recordings.operations import Operation
 from cdtool.results.results import Skipped
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 
-# Nominal speeds that differ from the next one by more than this share belong to two classes.
-_STEP = 0.05
-# A run is left out if its speed is off by this share of the nominal one over this share of the stroke.
-_OFF, _OFF_SHARE = 0.1, 0.1
+# A run is left out if its speed is off by a tenth of the nominal one over this share of the stroke.
+_OFF_SHARE = 0.1
 # With fewer runs no common speed along the stroke can be determined.
 _ENOUGH = 3
+# Points along the stroke: 1 % of it, over which speeds are averaged anyway.
 _POINTS = 100
 
 
@@ -59,7 +58,8 @@ def _by_speed(operations: Sequence[_ClassedRun]) -> list[list[_ClassedRun]]:
     ordered = sorted(operations, key=lambda run: run.motion.nominal_speed)
     groups: list[list[_ClassedRun]] = [[ordered[0]]]
     for before, run in pairwise(ordered):
-        if run.motion.nominal_speed > (1.0 + _STEP) * before.motion.nominal_speed:
+        # Nominal speeds that differ from the next one by more than 5 % belong to two classes.
+        if run.motion.nominal_speed > 1.05 * before.motion.nominal_speed:
             groups.append([])
         groups[-1].append(run)
     made: list[list[_ClassedRun]] = []
@@ -87,7 +87,7 @@ def _alike(runs: list[_ClassedRun]) -> tuple[list[_ClassedRun], list[Skipped]]:
     usual = np.array(
         [np.median(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0 for column in speeds.T]
     )
-    off = known & (np.abs(np.nan_to_num(speeds - usual))[:, inner] > _OFF * nominal)
+    off = known & (np.abs(np.nan_to_num(speeds - usual))[:, inner] > 0.1 * nominal)
     share = off.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     alike = [run for run, part in zip(runs, share, strict=True) if part <= _OFF_SHARE]
     if len(alike) < max(_ENOUGH, len(runs) // 2):

@@ -21,11 +21,8 @@ Span = tuple[float, float]
 
 # Decimals of a time [s], and steps over the range of a panel: a plot has fewer pixels.
 TIME_DECIMALS, LEVELS = 5, 8000
-# Significant digits of a float64.
-_DIGITS = 15
 # Columns of pixels kept of the whole operation, and again of the view on the contact.
 _WHOLE, _VIEW = 200, 250
-_SHORTEST_VIEW, _LONGEST_VIEW = 0.3, 1.2
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ def rounded(*curves: FloatArray) -> list[FloatArray]:
     span = float(np.ptp(known)) if len(known) else 0.0
     if span == 0.0:
         return list(curves)
-    exact = _DIGITS - math.ceil(math.log10(float(np.abs(known).max())))
+    exact = 15 - math.ceil(math.log10(float(np.abs(known).max())))  # the significant digits of a float64
     decimals = min(math.ceil(math.log10(LEVELS / span)), exact)
     return [np.round(curve, decimals) for curve in curves]
 
@@ -255,7 +252,7 @@ def _view(contact: Contact | None, found: Sequence[Match | None], whole: Span) -
     if contact is None:
         return whole
     latest = max((item.latency for item in found if item and item.alarm), default=0.0)
-    length = min(max(1.25 * latest, _SHORTEST_VIEW), _LONGEST_VIEW)
+    length = min(max(1.25 * latest, 0.3), 1.2)
     return max(contact.start - 0.25 * length, whole[0]), min(contact.start + length, whole[1])
 
 
