@@ -20,6 +20,7 @@ import numpy.typing as npt
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
 
+# Two values have a spread, but none of it is certain.
 LEAST_VALUES = 3
 # Nobody makes more runs than this.
 MOST_RUNS = 1000

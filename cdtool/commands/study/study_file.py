@@ -30,8 +30,8 @@ from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS, JointMachine
 from cdtool.recordings.units import STANDARD_GRAVITY
 
-_DRIVE_FREQUENCY = 10.0
-_LOOP_FREQUENCY = 2.0
+# Defaults [Hz] where a study states none, of the size that gates and axes have; each is reported.
+_DRIVE_FREQUENCY, _LOOP_FREQUENCY = 10.0, 2.0
 
 
 # A number that has a default, which depends on the machine and is reported.

@@ -28,7 +28,7 @@ from cdtool.base.remote.remote_path import is_remote
 from cdtool.recordings.units import DAY_S
 
 Kind = Literal["logs", "traces", "learned"]
-_KIND, _SCHEMA = "cdtool store", 2
+_KIND, _SCHEMA = "cdtool store", 2  # a change of the layout counts on
 _MARK = "store.json"
 
 

@@ -29,6 +29,7 @@ from cdtool.formats.csv.stamps import Integers
 from cdtool.formats.csv.table_lines import TableLines
 from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
 
+# Rows above an unfinished last one that show what its last cell is like.
 RECENT = 20
 # pandas reads the nearest float64 by itself since 3.1; before that it must be asked.
 _VERSION = tuple(map(int, pd.__version__.split(".")[:2]))

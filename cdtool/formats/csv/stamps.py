@@ -48,7 +48,7 @@ _DATES = (
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M:%S;%f", "%H:%M", "%I:%M:%S.%f %p", "%I:%M %p")
 _MINUTES = "%M:%S.%f"
 _FRACTION = re.compile(r"(?P<before>.*[0-9]:[0-9]{2}:[0-9]{2}[.,:;])(?P<digits>[0-9]+)(?P<after>.*)")
-NS = 1_000_000_000
+NS = 1_000_000_000  # per second
 _MINUTE, _HOUR, _HALF_DAY, _DAY = 60 * NS, 3600 * NS, 43200 * NS, 86400 * NS
 # Nanoseconds in 64 bits reach from 1677 to 2262.
 _YEARS = (1680, 2260)

@@ -31,6 +31,7 @@ from cdtool.formats.csv_dialect.marks import Marks, SampleCell, find_marks
 from cdtool.formats.groups import PREFIX
 from cdtool.formats.source import stated_origin
 
+# Lines at the beginning and at the end of a sample in which separators are counted.
 _SCORED = 150
 _STRONG = "\t;|"
 _SHOWN_ENCODINGS = {
@@ -39,6 +40,7 @@ _SHOWN_ENCODINGS = {
     "cp932": "Shift-JIS",
     "gb18030": "GB18030",
 }
+# Rows whose numbers are looked at for the decimal mark; marks that decide are looked for in all.
 _LOOKED = 200
 _WRITTEN = f"# {PREFIX}"
 _ORIGIN = f"{_WRITTEN}origin_s: "

@@ -45,6 +45,7 @@ _CHANNEL_KEYS = (
 )
 # The head of a file may have this many bytes, and its first lines (those about the file) this many lines.
 _MOST_HEAD, _MOST_FILE_LINES = 1 << 22, 20
+# Ticks of 100 ns, which count from 1601.
 _TICKS_PER_S, _TICKS_1970 = 1e7, 116_444_736_000_000_000
 # Ticks since 1917 have 18 digits: fewer are damaged. No export is long enough for as many milliseconds.
 _FEWEST_TICKS = 10**17

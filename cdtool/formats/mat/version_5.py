@@ -25,11 +25,11 @@ from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.mat.variables import Numbers, Opaque, Value, ValueCount, Variables
 
 MAGIC = b"MATLAB 5.0 MAT-file"
-_HEADER = 128
-_MATRIX, _COMPRESSED = 14, 15
+# Of the format of MathWorks (MAT-File Format, 1999): bytes of the header, types of elements.
+_HEADER, _MATRIX, _COMPRESSED = 128, 14, 15
 _NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _ENCODINGS = {1: "latin-1", 2: "latin-1", 4: "utf-16-{}", 16: "utf-8", 17: "utf-16-{}", 18: "utf-32-{}"}
-_CELL, _STRUCT, _CHAR = 1, 2, 4
+_CELL, _STRUCT, _CHAR = 1, 2, 4  # classes of arrays
 _NUMERIC_CLASSES = range(6, 16)
 # Up to the two dimensions of a matrix.
 _HEAD = 40

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-#: A panel is at most as wide.
+#: A panel has fewer pixels.
 PIXELS = 1000
 
 
