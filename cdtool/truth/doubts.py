@@ -19,7 +19,7 @@ from cdtool.truth.onset_rule import OnsetRule
 _FOLLOWS = 0.95
 # They are compared around each contact: this long before its onset and after it [s].
 _BEFORE, _AFTER = 0.2, 0.5
-# The end of a log whose force should be back at rest [s]: shorter than a rebound.
+# The force that is left is the median over this end of the log [s], in which noise averages out.
 _TAIL = 0.2
 
 
@@ -89,7 +89,7 @@ def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Fi
     tail = reading[time >= time[-1] - _TAIL]
     left = float(np.median(tail)) - contact.rest
     noise = MAD_TO_STD * float(np.median(np.abs(tail - np.median(tail))))
-    if abs(left) <= max(rule.back_to or 0.0, 3.0 * noise):  # noise exceeds it in 3 of 1000 logs
+    if abs(left) <= max(rule.back_to or 0.0, 3.0 * noise):
         return None  # below the level at which a contact ends: the log was cut off while the axis rebounds
     # More than 5 % of the peak may be a contact that lasts.
     if abs(left) > 0.05 * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:

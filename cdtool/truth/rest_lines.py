@@ -13,11 +13,11 @@ import numpy.typing as npt
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.statistics.spread import MAD_TO_STD
 
-#: Longer than the periods of vibration and mains that a median should average [s].
+#: Readings are pooled over this long [s]: noise and the hum of the mains average out, drift does not.
 INTERVAL = 0.05
-#: The rest before a time ends so long before it [s]: a slow contact rises within it.
+#: The rest before a time ends so long before it [s]: a soft contact must not be mistaken for drift of the cell.
 GAP = 0.3
-#: Intervals of a line, 1 s in all: drift of the temperature is linear over it.
+#: Intervals that a line is fitted to: 1 s, over which drift is straight.
 WINDOW = 20
 #: A line needs so many intervals; of fewer, the level is constant.
 _LINE = 6

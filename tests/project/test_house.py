@@ -48,7 +48,9 @@ def test_every_number_of_a_module_has_its_reason(script):
     for module in script.modules_of(script.PACKAGE).values():
         numbers, lines = set(script.number_constants(module)), ["", *module.text.splitlines()]
         for node in module.tree.body:
-            stored = {each.id for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)}
+            stored = {
+                each.id for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)
+            }
             is_number = isinstance(node, ast.Assign | ast.AnnAssign) and stored & numbers
             if is_number and "#" not in lines[node.lineno] and not lines[node.lineno - 1].startswith("#"):
                 bare.append(f"{module.path}:{node.lineno}")

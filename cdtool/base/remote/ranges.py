@@ -15,7 +15,7 @@ from cdtool.base.remote.storage import StorageError
 
 # What is read ahead [bytes]: little after a jump, and twice as much each time that reading continues.
 _LEAST_AHEAD, _MOST_AHEAD = 1 << 13, 4 << 20
-# At most so many bytes of expected ranges are kept: the message indexes of a log are smaller.
+# Expected ranges are kept in memory: no more bytes of them than this.
 _MOST_EXPECTED = 64 << 20
 
 

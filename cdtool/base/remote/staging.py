@@ -20,7 +20,7 @@ from cdtool.base.remote import session, storage
 from cdtool.base.remote.storage import ObjectInfo, StorageError
 
 _BOUND = "CDTOOL_CACHE_MIB"
-#: Tens of usual logs, and a share of any disk.
+#: Forty logs of 100 MB.
 _BOUND_MIB = 4096
 # An answer of the storage is asked for again after this time [s].
 _TRUSTED = 2.0

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from cdtool.commands.compare.questions import Figure
     from cdtool.commands.compare.rows import BuildRow
 
-# Lengths of names in the table [characters]: it has seven more columns in 80.
+# Longest names in the table [characters]: the other columns need the rest of the line.
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
 # The colours of outcomes.
 _TONES = {"worse": "bad", "mixed": "bad", "better": "good", "inconclusive": "unknown"}

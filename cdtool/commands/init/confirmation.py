@@ -59,7 +59,7 @@ def _of_motion(name: str, streams: dict[str, Stream]) -> tuple[str, str]:
         ahead = motion.integral_lead(position, speed) if name == "speed" else 0.0
         late = f"ahead of the position's derivative by {ahead:.1f} samples: is it a set value?"
         told = f"its derivative fits the speed, r = {correlation:.3f}" if name == "position" else ""
-        # Interpolation and filters move a speed by up to a sample and a half.
+        # A speed that is further ahead of the position's derivative [samples] is doubtful.
         return told, late if ahead > 1.5 else ""
     fit = (
         motion.integral_fit(speed, acceleration, centred=True)

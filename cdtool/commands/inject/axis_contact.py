@@ -303,7 +303,7 @@ def _difference(
         Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, free, hit, reliable),
         Doubt.SLOPE_BEYOND_FREE_RUNS: assumption.slew is SlewBeyond.NO_LIMIT
         and _rises_beyond(model, hit, reliable & (time >= start)),
-        Doubt.APPROACH_SPEED: deviation > 0.05,  # more than models of good machines
+        Doubt.APPROACH_SPEED: deviation > 0.05,  # a contact at another speed has another force
         Doubt.ACCELEROMETER_UNKNOWN: sensors.accelerometer_hz == 0.0,
     }
     return made.with_doubts(doubts)

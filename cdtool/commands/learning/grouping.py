@@ -20,7 +20,7 @@ from cdtool.thresholds.common_class import SPEED_TOLERANCE
 _OFF_SHARE = 0.1
 # With fewer runs no common speed along the stroke can be determined.
 _ENOUGH = 3
-# Points along the stroke: 1 % of it, over which speeds are averaged anyway.
+# Points along the stroke at which the speeds of runs are compared: every 1 % of it.
 _POINTS = 100
 
 

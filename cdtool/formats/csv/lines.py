@@ -116,7 +116,7 @@ def _joined(raw: list[bytes], first: int) -> int:
     """Return the number of lines that a quoted name joins; 1 if the quote is closed in its line, or never closed."""
     if raw[first].count(b'"') % 2 == 0:
         return 1
-    for more in range(1, min(6, len(raw) - first)):  # no name in quotes has more lines
+    for more in range(1, min(6, len(raw) - first)):  # more are not one name in quotes
         if raw[first + more].count(b'"') % 2:
             return more + 1 if not raw[first].lstrip()[:1].isdigit() else 1
     return 1

@@ -21,7 +21,7 @@ from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
 
 # The beginning of a file that shows its dialect: hundreds of rows, also below a long head.
 SAMPLE_BYTES = 1 << 17
-# What pandas reads at once: its start is then a small part, and the memory of the cells some ten megabytes.
+# A file is read in blocks: the memory for it does not grow with the file.
 BLOCK_BYTES = 1 << 20
 UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 

@@ -57,7 +57,7 @@ class HeadFinder:
             raise self._no_rows(rows)
         start = next(i for i, row in enumerate(rows) if row.number == first)
         pinned = sum(row.number <= int(self.pins.header or 0) for row in rows)
-        cut = rows[: max(start + 4, pinned) + 1]  # names, units, and two lines more may be below
+        cut = rows[: max(start + 4, pinned) + 1]  # as far below as a head reaches
         head = self._search(cut, start, comments) if self.pins.header is None else self._find_by_pins(cut, start)
         numbers = [row.number for row in cut if row.number in head.preamble and has_numbers(row.text)]
         return replace(head, preamble=tuple(sorted((*head.preamble, *empty))), numbers=tuple(numbers))

@@ -161,7 +161,7 @@ def _read_head(text: Text, raw: Sequence[bytes]) -> _ScopeHead:
     for i, line in enumerate(raw):
         cells = _cells(text.decode(line), separator)
         if of_channels and _is_row(cells):
-            # 50 rows show which columns are clocks.
+            # A sample.
             rows = [_cells(text.decode(each), separator) for each in raw[i : i + 50]]
             wide = [row for row in rows[: max(1, len(raw) - i - 1)] if len(row) > 1]
             return _ScopeHead(separator, of_file, of_channels, i + 1, start, wide)

@@ -110,7 +110,7 @@ class Topic:
         for text, each in self.fields.items():
             each.add(fields[text], whole, stamps, exact)
             if each.elsewhere and not each.names:
-                # Ten messages have the names of all joints.
+                # The names of other joints are looked for in ten messages.
                 contents = self.decoders.contents(stream, batch.rows(slice(10)))
                 each.names = sorted({name for content in contents for name in element_names(content)})
 

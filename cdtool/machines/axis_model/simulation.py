@@ -127,7 +127,7 @@ def integration_steps(fastest: float, period: float) -> int:
             f"the model needs {needed} integration steps per {period:g} s",
             "a stiffness is too large for its mass, or friction.smoothing_speed too small: leave the stiffness out",
         )
-    return max(needed, 4)  # so that the inputs of a period are resolved, too
+    return max(needed, 4)  # fewer would not save time that matters
 
 
 def wind_up_at(drive: ElasticDrive, force: float) -> float:

@@ -122,7 +122,7 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
 
 def _sure(fit: _Terms, name: str, share: float = _SHARE) -> int:
     """Return the sign of a coefficient, 0 if it is not sure, not there, or too small a part of the torque."""
-    # Six standard errors: the windows of a log are not independent.
+    # Below six standard errors it may be chance.
     if abs(fit.errors.get(name, 0.0)) < 6.0 or abs(fit.share[name]) < share:
         return 0
     return 1 if fit.value[name] > 0.0 else -1

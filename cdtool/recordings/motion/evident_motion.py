@@ -65,5 +65,5 @@ def _evident(time: FloatArray, speed: FloatArray, found: FloatArray) -> None:
             if math.isfinite(speed[i]):
                 squares += (speed[i] - mean) ** 2
         error = math.sqrt(squares / (count - 1) / count)
-        if abs(mean) > 5.0 * error:  # standard errors from zero: noise does so in 1 of a million
+        if abs(mean) > 5.0 * error:  # standard errors from zero: hardly noise
             found[k] = mean

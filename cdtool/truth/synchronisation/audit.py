@@ -28,8 +28,6 @@ LONGEST_DELAY = 0.25
 _WIDTHS = (1.5, 3.0, 6.0, 12.0, 24.0)
 # Sections of a motion that are examined: as many as are needed, and as are affordable.
 _MOST_SECTIONS = 48
-# Contacts that are examined: spread over the log.
-_MOST_CONTACTS = 200
 
 
 @dataclass(frozen=True)
@@ -197,11 +195,8 @@ def _load_cell_latencies(
 
 
 def _contact_windows(force: Series, contacts: Sequence[Contact]) -> list[_Window]:
-    usable = [contact for contact in contacts if not contact.in_progress]
-    if len(usable) > _MOST_CONTACTS:
-        usable = [usable[i] for i in np.linspace(0, len(usable) - 1, _MOST_CONTACTS).round().astype(int)]
     windows = []
-    for contact in usable:
+    for contact in (item for item in contacts if not item.in_progress):
         # From 0.15 s before its onset to 0.05 s after its end; of a long one, the rise and what follows it.
         end = min(contact.end + 0.05, contact.start + 0.6)
         windows.append(_Window(contact.start - 0.15, end, _rise_time(force, contact)))

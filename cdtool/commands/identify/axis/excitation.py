@@ -11,7 +11,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.axis.filtered_regression import FilteredRun
 
-# Speeds within this share of each other are one: a controller's overshoot is less.
+# A speed is held within this relative distance of it.
 SAME_SPEED = 0.1
 # With one or two speeds, the viscous friction of a real axis came out 20-60 % wrong.
 SPEEDS_NEEDED = 3

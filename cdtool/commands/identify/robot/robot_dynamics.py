@@ -322,7 +322,7 @@ def _joint_weights(equations: Equations, start: FloatArray, count: int) -> Float
     """Return 1 / RMS residual of each joint (J,), of at least a thousandth of its torque: no sensor is better."""
     joints = equations.joints.astype(np.int64)
     weights = np.ones(count)
-    for _ in range(3):  # the weights have settled by then
+    for _ in range(3):  # passes of reweighting
         residual = equations.torques - equations.rows @ _solve(_weighted(equations, weights[joints]), start)
         for joint in np.unique(joints).tolist():
             own = joints == joint

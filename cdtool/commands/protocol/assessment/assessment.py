@@ -344,7 +344,7 @@ def _of_profile(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason
         planned, needed = point.repetitions, profile.average_of
         yield Reason.of_point("too_few_planned", point, planned=planned, needed=needed, profile=profile.name)
     stiffness, required = point.obstacle_stiffness_n_per_mm, profile.obstacle_stiffness_n_per_mm
-    if stiffness and required and abs(stiffness - required) > 0.02 * required:  # beyond what springs are made to
+    if stiffness and required and abs(stiffness - required) > 0.02 * required:  # another spring, not its tolerance
         yield Reason.of_point("wrong_stiffness", point, stiffness=stiffness, needed=required, profile=profile.name)
 
 

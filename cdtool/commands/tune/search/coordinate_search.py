@@ -10,7 +10,7 @@ from cdtool.commands.tune.search.candidate import Candidate
 
 # The first factor; the last one is the smallest that is tried. The number of evaluations is limited.
 _FIRST, _LAST = 2.0, 2.0**0.5
-# Of one search: it ends by itself after some twenty with two gains.
+# The number of evaluations of one search is limited: each of them runs on all recordings.
 EVALUATIONS = 40
 # A gain is not moved further from where it began than by this factor.
 FARTHEST = 32.0
