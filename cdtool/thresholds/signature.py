@@ -26,6 +26,7 @@ from cdtool.thresholds.fitted_signature import (
 from cdtool.thresholds.settings import SidesOfMachine
 from cdtool.thresholds.signature_curve import Curve, resample
 
+# With fewer runs a spread along the stroke is too uncertain for a limit: see Coverage in docs/signature.md.
 ENOUGH_RUNS = 10
 # Not even a forced signature has a spread below these.
 LEAST_RUNS = 2

@@ -23,8 +23,6 @@ COVERAGE = 0.8
 _SMALLEST_SPREAD = 0.1
 # A sample stands for a grid point at most so many steps before it: of the grid, or of the log where those are wider.
 _FURTHEST_STEPS = 2.0
-# A window of more steps is no curve that was learned.
-_MOST_STEPS = 1e6
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,7 @@ class Curve(SendsFields):
         alike = count.ndim == 2 and count.size and count.shape == mean.shape == squares.shape
         if not (alike and np.isfinite((count, mean, squares)).all() and min(count.min(), squares.min()) >= 0.0):
             raise ValueError(f"a curve of counts {count.shape}, means {mean.shape} and squares {squares.shape}")
-        if not 0.0 < step <= window <= _MOST_STEPS * step:
+        if not 0.0 < step <= window <= 1e6 * step:  # a window of more steps is no curve that was learned
             raise ValueError(f"a curve with step {step:g} and window {window:g}")
         return cls(step, window, count, mean, squares)
 

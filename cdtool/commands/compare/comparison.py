@@ -69,7 +69,6 @@ _UNDER_TEST = (
     "plugins",
 )
 _BY_DETECTOR = ("gains", "signature_sha256")
-_LONGEST = 80
 _DEFAULT_DEBOUNCE = f"default ({1e3 * DEBOUNCE_TIME:g} ms)"
 _HASH = re.compile(r"[0-9a-f]{64}")
 _Leaf = tuple[str, Any, Any]
@@ -283,4 +282,4 @@ def _shown(value: Any) -> str:
         return "none"
     text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
     # The beginning of a hash tells it apart as well.
-    return text[:12] if _HASH.fullmatch(text) else shorten(text, _LONGEST)
+    return text[:12] if _HASH.fullmatch(text) else shorten(text, 80)

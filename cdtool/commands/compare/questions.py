@@ -36,9 +36,7 @@ Ranges = tuple[tuple[float, float], tuple[float, float]]
 Labels = Mapping[str, str]
 """What each recording of a build is resampled with."""
 
-# Counts looked at for the least one that a test would show.
-_MOST = 10_000
-_COMPLETE_UNPAIRED = 0.05
+# Usual in planning a test (Cohen 1988): four of five differences are shown.
 POWER = 0.8
 # Clocks and interpolation leave traces far below a microsecond or a millinewton: they are no change [ms, N].
 LEAST_CHANGE = 5e-4
@@ -180,7 +178,8 @@ def ask_false_alarms(old: Watched, new: Watched, paired: bool) -> Asked:
 
     p = p_of(count_new) if count + count_new else math.nan
     change = Interval(count_new / hours_new - count / hours, math.nan, math.nan)
-    least = _least_count(p_of, math.floor(count * hours_new / hours), _MOST)
+    # Nobody counts more false alarms.
+    least = _least_count(p_of, math.floor(count * hours_new / hours), 10_000)
     same = paired and (count, hours) == (count_new, hours_new)
     open_rate = poisson_increase_at_most(count_new, new.operations, count, old.operations)
     return Asked(
@@ -264,7 +263,7 @@ def _complete_by_counts(before: int, of: int, after: int, of_new: int) -> float:
     else:
         return math.nan
     p = math.comb(side, good) / math.comb(of + of_new, good)
-    return p if p <= _COMPLETE_UNPAIRED else math.nan
+    return p if p <= 0.05 else math.nan
 
 
 def _without(

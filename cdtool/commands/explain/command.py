@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdtool.base.log_names import log_stem
-from cdtool.base.plain_text import counted
+from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.console import (
     leave,
     number,
@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from cdtool.results.explanation.explanation import Explanation
     from cdtool.results.explanation.margin import Moment
 
-# Events that are printed and drawn; --json has all.
-_SHOWN = 20
 # Its reason already names the speeds.
 _BLIND = "not_assessable"
 
@@ -105,7 +103,7 @@ def _draw(runs: Sequence[ExplainedRun], plot: Path | None, stem: str, *, force: 
         return []
     from cdtool.commands.explain.margin_plot import plot_explanation
 
-    events = [event for run in runs for event in run.events][: _SHOWN if plot.is_dir() else 1]
+    events = [event for run in runs for event in run.events][: LISTED if plot.is_dir() else 1]
     paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
     paths = [figure_name(path, force=force) for path in paths]
     for (detection, item), path in zip(events, paths, strict=True):
@@ -115,21 +113,21 @@ def _draw(runs: Sequence[ExplainedRun], plot: Path | None, stem: str, *, force: 
 
 def _show_explained(explained: ExplainedRun) -> None:
     """Print every event of a log, and the operations without one."""
-    shown = explained.events[:_SHOWN]
+    shown = explained.events[:LISTED]
     for _, item in shown:
         _show_event(item)
     if len(explained.events) > len(shown):
         print_line(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
     elsewhere = [item for item in explained.found.detections if item.other_speed and item.verdict.outcome != _BLIND]
-    for detection in elsewhere[:_SHOWN]:
+    for detection in elsewhere[:LISTED]:
         say(f"{detection.operation.name}, not assessable at another speed: {detection.other_speed}")
     pairs = zip(explained.found.detections, explained.explanations, strict=True)
     quiet = [detection for detection, events in pairs if not events]
-    for detection in quiet[:_SHOWN]:
+    for detection in quiet[:LISTED]:
         why = detection.verdict.reason or "no alarm and no missed contact"
         say(f"{detection.operation.name}, {detection.detector}: {why}")
-    if len(quiet) > _SHOWN:
-        print_line(f"and {counted(len(quiet) - _SHOWN, 'more operation')} without an event")
+    if len(quiet) > LISTED:
+        print_line(f"and {counted(len(quiet) - LISTED, 'more operation')} without an event")
 
 
 def _show_event(item: Explanation) -> None:

@@ -14,16 +14,8 @@ from cdtool.commands.init import motion_evidence as motion
 from cdtool.commands.init.stream import Stream, joined
 from cdtool.machines.plausibility.drive import explained
 
+# Columns that are compared, each with each: the time grows with their square.
 _MOST = 48
-_FITS = 0.9
-# A single pair must fit better: of a tool on a circle one coordinate is nearly the derivative of the other.
-_FITS_ALONE = 0.98
-# A circle leaves at most this share of what a parabola leaves of a coordinate.
-_CIRCLE = 0.01
-# A column is a function of the place above this share. Friction and inertia change an effort by more than this share.
-_PLACE, _CHANGES = 0.9, 0.05
-# Share of an effort that inertia and friction must explain.
-_DRIVES = 0.6
 
 
 def of_blocks(streams: list[Stream]) -> list[Stream]:
@@ -62,16 +54,18 @@ def on_circle(streams: list[Stream]) -> tuple[Stream, tuple[str, ...], list[Stre
         places = tuple(
             stream.name
             for stream in others
-            if 1.0 - explained(circle, stream.values[:, 0]) < _CIRCLE * (1.0 - explained(parabola, stream.values[:, 0]))
+            # A circle leaves at most a hundredth of what a parabola leaves of a coordinate.
+            if 1.0 - explained(circle, stream.values[:, 0]) < 0.01 * (1.0 - explained(parabola, stream.values[:, 0]))
         )
         if len(places) > 1:
             speed, place = motion.derived(angle), np.hstack([q, q**2, q**3])
             drives = [
                 stream
                 for stream in others
-                if stream.reach * _CHANGES < np.ptp(stream.values)
-                and explained(place, stream.values[:, 0]) < _PLACE
-                and motion.drive_fit(stream, speed) > _DRIVES
+                # Friction and inertia change an effort by more, and it is not a function of the place.
+                if stream.reach * 0.05 < np.ptp(stream.values)
+                and explained(place, stream.values[:, 0]) < 0.9
+                and motion.drive_fit(stream, speed) > motion.DRIVES
             ]
             return replace(angle, unit="deg"), places[:2], drives
     return None
@@ -91,11 +85,11 @@ def _runs(fits: FloatArray, lag: int) -> list[tuple[int, int]]:
     """Return (length, first position) of runs of joints that fit; one at rest may be among them, but not most."""
     found = []
     for first in range(len(fits)):
-        below = np.flatnonzero(fits[first:] <= _FITS)
+        below = np.flatnonzero(fits[first:] <= motion.FITS)
         length = min(int(below[0]) if len(below) else len(fits) - first, abs(lag))
         known = fits[first : first + length]
         known = known[np.isfinite(known)]
-        if len(known) > length // 2 and (length > 1 or known[0] > _FITS_ALONE):
+        if len(known) > length // 2 and (length > 1 or known[0] > motion.FITS_ALONE):
             found.append((length, first + max(0, -lag)))
     return found
 

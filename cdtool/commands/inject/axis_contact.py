@@ -27,23 +27,10 @@ from cdtool.machines.axis_model.simulation import AxisInputs, AxisMotion, simula
 
 # Time after contact [s] at which the model's own error begins to dominate the forces.
 RELIABLE_FOR = 0.2
-# What is simulated before the contact where the axis is never at rest before it [s].
-_LONGEST_APPROACH = 30.0
-# A rest is at least as long as this [s].
-_SHORTEST_REST = 0.2
 # A controller without which the motor would not notice the contact: as stiff as the sampling permits.
-_STIFF_SHARE = 0.2
+STIFF_SHARE = 0.2
 # Further, or faster, than known: by more than the error of a simulation.
-_BEYOND = 1.05
-# The speed is compared with the log's during the last time before the contact [s], and may differ by these shares.
-_COMPARED_TIME = 0.1
-_DOUBTFUL_DEVIATION, _LARGEST_DEVIATION = 0.05, 0.2
-# Correlation of the measured torque and the model's during the approach below which one has the opposite sign.
-_OPPOSITE = -0.3
-# The brackets' controller has at most this period [s], whatever the log's: how it reacts must not depend on the log.
-_LONGEST_PERIOD = 1e-3
-# The load has lost the contact when the force is below this share of the peak so far.
-_SEPARATED = 1e-3
+BEYOND = 1.05
 
 
 class Doubt(Enum):
@@ -177,13 +164,14 @@ def _deviation_from(run: AxisRun, free: AxisMotion, time: FloatArray, contact: f
     Raises RecordingError above 20 %, and where the torque has the opposite sign of the model's: such a model does not
     describe the log, and what a contact changes in it is not what it would change in the machine.
     """
-    last = (run.time > contact - _COMPARED_TIME) & (run.time <= contact)
+    # The speed is compared with the log's during the last 0.1 s before the contact.
+    last = (run.time > contact - 0.1) & (run.time <= contact)
     logged, clock = _speed(run), run.time
     simulated = np.interp(clock[last], time, free["motor_speed"])
     known = np.isfinite(logged[last])
     speed = float(np.mean(logged[last][known]))
     deviation = abs(float(np.mean(simulated[known])) - speed) / abs(speed) if speed else math.inf
-    if deviation > _LARGEST_DEVIATION:
+    if deviation > 0.2:  # the model is not that of the log
         raise RecordingError(
             f"{run.name}: before the contact at {contact:.3f} s the model moves at {float(np.mean(simulated)):.3g}, "
             f"the log at {speed:.3g} m/s or rad/s",
@@ -193,7 +181,7 @@ def _deviation_from(run: AxisRun, free: AxisMotion, time: FloatArray, contact: f
     measured, force = run.torque[approach], np.interp(clock[approach], time, free["drive_force"])
     if len(measured) > 1 and np.std(measured) > 0.0 and np.std(force) > 0.0:
         correlation = float(np.corrcoef(measured, force)[0, 1])
-        if correlation < _OPPOSITE:
+        if correlation < -0.3:  # the measured torque or the model's has the opposite sign
             raise RecordingError(
                 f"{run.name}: the torque falls where the model's rises",
                 "check the sign (scale) of torque in [channels]",
@@ -209,10 +197,11 @@ def _with_controller(model: AxisModel, run: AxisRun, reaction: ControllerReactio
                 f"{run.name}: the model has no controller", "identify it, or use the brackets 'frozen' and 'stiff'"
             )
         return model
-    period = min(run.period, _LONGEST_PERIOD)
-    gain = _STIFF_SHARE * model.drive.total_mass / period
+    # At most 1 ms, whatever the log's: how the brackets' controller reacts must not depend on the log.
+    period = min(run.period, 1e-3)
+    gain = STIFF_SHARE * model.drive.total_mass / period
     follows = Controller(
-        period=period, speed_gain=gain, integral_gain=0.1 * gain / period * _STIFF_SHARE, speed_filter_order=0
+        period=period, speed_gain=gain, integral_gain=0.1 * gain / period * STIFF_SHARE, speed_filter_order=0
     )
     return replace(model, controller=follows)
 
@@ -221,7 +210,8 @@ def _beginning(run: AxisRun, contact: float) -> float:
     """Return when the simulation begins [s]: in the last rest before the contact, or 30 s before it."""
     speed = _speed(run)
     moving = np.abs(np.nan_to_num(speed)) > 0.02 * float(np.nanmax(np.abs(speed)))
-    return max(contact - _LONGEST_APPROACH, last_rest(run.time, (run.time <= contact) & ~moving, run.period), run.start)
+    # Where the axis is never at rest before the contact, 30 s of its approach are simulated.
+    return max(contact - 30.0, last_rest(run.time, (run.time <= contact) & ~moving, run.period), run.start)
 
 
 def last_rest(time: FloatArray, resting: BoolArray, period: float) -> float:
@@ -229,7 +219,7 @@ def last_rest(time: FloatArray, resting: BoolArray, period: float) -> float:
 
     A shorter one may be noise, or the turning point of a stroke.
     """
-    long = max(round(_SHORTEST_REST / period), 1)
+    long = max(round(0.2 / period), 1)  # s
     sums = np.convolve(resting, np.ones(long), mode="valid") if len(resting) >= long else np.zeros(0)
     whole = np.flatnonzero(sums >= long - 0.5)
     return float(time[whole[-1]]) if len(whole) else -math.inf
@@ -313,7 +303,7 @@ def _difference(
         Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, free, hit, reliable),
         Doubt.SLOPE_BEYOND_FREE_RUNS: assumption.slew is SlewBeyond.NO_LIMIT
         and _rises_beyond(model, hit, reliable & (time >= start)),
-        Doubt.APPROACH_SPEED: deviation > _DOUBTFUL_DEVIATION,
+        Doubt.APPROACH_SPEED: deviation > 0.05,  # a contact at another speed has another force
         Doubt.ACCELEROMETER_UNKNOWN: sensors.accelerometer_hz == 0.0,
     }
     return made.with_doubts(doubts)
@@ -324,7 +314,7 @@ def _winds_up_beyond(model: AxisModel, free: AxisMotion, hit: AxisMotion, reliab
     if model.drive.is_rigid:
         return False
     known = max(float(np.max(np.abs(free["wind_up"]))), model.drive.observed_wind_up)
-    return float(np.max(np.abs(hit["wind_up"][reliable]))) > _BEYOND * known
+    return float(np.max(np.abs(hit["wind_up"][reliable]))) > BEYOND * known
 
 
 def _rises_beyond(model: AxisModel, hit: AxisMotion, reliable: BoolArray) -> bool:
@@ -333,7 +323,7 @@ def _rises_beyond(model: AxisModel, hit: AxisMotion, reliable: BoolArray) -> boo
     if controller is None or math.isfinite(controller.slew_limit) or controller.observed_slope == 0.0:
         return False
     slope = np.abs(np.diff(hit["command"], prepend=hit["command"][0])) / hit.period
-    return float(np.max(slope[reliable])) > _BEYOND * controller.observed_slope
+    return float(np.max(slope[reliable])) > BEYOND * controller.observed_slope
 
 
 def _moves_backward(run: AxisRun, contact: float) -> bool:
@@ -381,5 +371,6 @@ def _measured_speed(model: AxisModel, rows: Mapping[str, FloatArray], period: fl
 def separation_time(time: FloatArray, force: FloatArray) -> float:
     """Return when the force first falls to nothing after the contact [s]; infinite if it does not."""
     peak = np.maximum.accumulate(force)
-    lost = (peak > 0.0) & (force <= _SEPARATED * peak)
+    # The load has lost the contact when the force is below 0.1 % of the peak so far.
+    lost = (peak > 0.0) & (force <= 1e-3 * peak)
     return float(time[np.argmax(lost)]) if lost.any() else math.inf

@@ -15,7 +15,7 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.commands.inject.axis_contact import Doubt, InjectedContact, last_rest
+from cdtool.commands.inject.axis_contact import BEYOND, STIFF_SHARE, Doubt, InjectedContact, last_rest
 from cdtool.commands.inject.channel_change import ChannelChange
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.obstacle import Obstacle
@@ -24,18 +24,8 @@ from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, seco
 from cdtool.machines.robot_model.parameters import RobotModel, Vector, point_in_joint
 from cdtool.machines.robot_model.simulation import PointContact, RobotInputs, RobotMotion, simulate_robot
 
-# What is simulated before the contact where the robot is never at rest before it [s].
-_LONGEST_APPROACH = 5.0
-# Speeds are means over this time [s].
-_MEAN_SPEED_OVER = 0.02
 # A joint below this share of its own greatest speed is at rest.
 _AT_REST = 0.02
-# A controller without which the motors would not notice the contact: as stiff as this sampling [s] permits.
-_STIFF_SHARE, _STIFF_PERIOD = 0.2, 1e-3
-# A point that moves along a plane, or not at all, does not meet it: share of its speed, and of the greatest one.
-_ALONG_PLANE, _STANDS = 0.02, 1e-3
-# Further, or faster, than known: by more than the error of a simulation.
-_BEYOND = 1.05
 
 
 @dataclass(frozen=True)
@@ -105,7 +95,7 @@ class RobotLog:
             position = self.at("position", self.time)
             assert position is not None
             speed = np.asarray(np.gradient(position, self.period, axis=0))
-        width = min(max(round(_MEAN_SPEED_OVER / self.period), 1), len(speed))
+        width = min(max(round(0.02 / self.period), 1), len(speed))  # s
         mean = np.ones(width) / width
         return np.column_stack([np.convolve(column, mean, mode="same") for column in speed.T])
 
@@ -169,8 +159,8 @@ def _with_controllers(model: RobotModel, log: RobotLog, reaction: ControllerReac
                 f"{log.name}: the model has no controller", "identify it, or use the brackets 'frozen' and 'stiff'"
             )
         return model
-    period = log.period / max(math.ceil(log.period / _STIFF_PERIOD - 1e-6), 1)
-    gain = _STIFF_SHARE / period
+    period = log.period / max(math.ceil(log.period / 1e-3 - 1e-6), 1)  # at most 1 ms, as that of an axis
+    gain = STIFF_SHARE / period
     follows = Controller(period=period, speed_gain=gain, integral_gain=0.1 * gain**2, speed_filter_order=0)
     axes = tuple(replace(axis, controller=follows) for axis in model.axes)
     return replace(model, axes=axes, gains_of_inertia=True)
@@ -194,7 +184,8 @@ def _beginning(log: RobotLog, contact: float) -> float:
     """Return when the simulation begins [s]: in the last rest of all joints before the contact, or 5 s before it."""
     speed = np.abs(log.speed())
     moving = np.any(speed > _AT_REST * np.max(speed, axis=0, initial=0.0), axis=1)
-    return max(contact - _LONGEST_APPROACH, last_rest(log.time, (log.time <= contact) & ~moving, log.period), log.start)
+    # Where the robot is never at rest before the contact, 5 s of its approach are simulated.
+    return max(contact - 5.0, last_rest(log.time, (log.time <= contact) & ~moving, log.period), log.start)
 
 
 def _inputs(log: RobotLog, time: FloatArray) -> RobotInputs:
@@ -233,7 +224,7 @@ def _meeting(
     fastest = max(
         float(np.linalg.norm(_velocity(model, link.joint, point, positions[index], speeds[index]))) for index in shown
     )
-    if own <= _STANDS * fastest or own == 0.0:
+    if own <= 1e-3 * fastest or own == 0.0:  # the point does not move
         raise RecordingError(
             f"{log.name}: the point of link '{link.name}' is at rest at the contact",
             "choose a contact while it moves",
@@ -242,7 +233,7 @@ def _meeting(
     if struck.direction is not None:
         given = np.array(struck.direction) / np.linalg.norm(struck.direction)
         towards = float(given @ velocity)
-        if abs(towards) < _ALONG_PLANE * own:
+        if abs(towards) < 0.02 * own:  # a point that moves along a plane does not meet it
             raise RecordingError(
                 f"{log.name}: the point of link '{link.name}' moves along the obstacle at the contact",
                 "choose another direction",
@@ -341,7 +332,7 @@ def _winds_up_beyond(model: RobotModel, motions: tuple[RobotMotion, RobotMotion]
     observed = np.array([axis.drive.observed_wind_up for axis in model.axes])
     elastic = np.array([not axis.drive.is_rigid for axis in model.axes])
     known = np.maximum(np.max(free, axis=0), observed)
-    return bool(np.any(elastic & (np.max(hit[reliable], axis=0) > _BEYOND * known)))
+    return bool(np.any(elastic & (np.max(hit[reliable], axis=0) > BEYOND * known)))
 
 
 def _rises_beyond(model: RobotModel, hit: RobotMotion, reliable: BoolArray) -> bool:
@@ -350,6 +341,6 @@ def _rises_beyond(model: RobotModel, hit: RobotMotion, reliable: BoolArray) -> b
     slope = np.abs(np.diff(command, axis=0, prepend=command[:1])) / hit.period
     highest = np.max(slope[reliable], axis=0)
     return any(
-        math.isinf(controller.slew_limit) and 0.0 < _BEYOND * controller.observed_slope < own
+        math.isinf(controller.slew_limit) and 0.0 < BEYOND * controller.observed_slope < own
         for controller, own in zip(_controllers(model), highest, strict=True)
     )

@@ -36,6 +36,7 @@ _EARLY = 0.6
 _FIRST = 0.01
 # A contact that is slower than this from zero to the level at rest [s] is no contact, but a drift of the cell.
 _SLOWEST = 10.0
+# A difference of three standard errors is no noise.
 _BEYOND_DOUBT = 3.0
 # The end of a record over which it shows where the reading returned to [s].
 _LAST = 0.2

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from cdtool.base.errors import UsageError
 from cdtool.commands.simulate import gate_kernel, sensors
+from cdtool.recordings.units import STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
 Impact = Literal["none", "stiff", "soft"]
@@ -99,7 +100,7 @@ class GateParameters:
     accelerometer_bias: float = 0.03  # the same in every run: one sensor, one bias [m/s2]
     accelerometer_frequency: float = 25.0  # second-order low-pass [Hz]
     accelerometer_damping: float = 0.8  # [-]
-    accelerometer_resolution: float = sensors.STANDARD_GRAVITY / 4096.0  # [m/s2]
+    accelerometer_resolution: float = STANDARD_GRAVITY / 4096.0  # [m/s2]
     load_cell_noise: float = 3.0  # [N rms]
 
     # Log

@@ -49,9 +49,6 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.settings import with_context
 
-# A statistic may be assessable for less time than its signal.
-_SPARE = 1.1
-
 
 def tune(  # the public function: a keyword for each setting
     file: str | Path | BenchmarkFile,
@@ -243,7 +240,8 @@ class _TuningOf:
             return True
         seconds = np.array([signal.period * float(signal.valid.any(axis=1).sum()) for _, signal in pairs])
         fewest = min(float(seconds[recordings.free_in(fold + 1)].sum()) for fold in range(recordings.folds))
-        return fewest / 3600.0 >= _SPARE * budget.needed
+        # A statistic may be assessable for less time than its signal.
+        return fewest / 3600.0 >= 1.1 * budget.needed
 
     def _why_not_nested(self, recordings: TuningRecordings, chosen: Sequence[HeldOut]) -> str:
         """Return why there are no results on recordings not used for the choice."""

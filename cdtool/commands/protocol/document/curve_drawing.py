@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# Repetitions that fit on a page with their table.
 _IN_ONE = 4
 # Sizes [inch]: the drawing's width, the height of a panel and the distance to the next, the margins beside and below
 # the panels, the left panels' width. Given, not found by trial, which takes a second.
 _WIDTH, _PANEL, _APART, _BESIDE, _BELOW, _LEFT = 6.9, 1.2, 0.42, 0.62, 0.45, 3.3
-_PIXELS = 900
 # A record that covers this share of the axis is drawn as if it covered all of it.
 _WHOLE = 0.99
 NOT_RECORDED = "0.88"
@@ -79,7 +79,7 @@ def _draw(axes: Axes, item: Repetition, profile: ForceProfile, end: float, words
     time, force = item.curve.time, item.curve.force
     inside = time <= end
     time, force = time[inside], force[inside]
-    kept = kept_samples(time, force, _PIXELS)
+    kept = kept_samples(time, force, 900)  # more than the panel has pixels
     axes.plot(time[kept], force[kept], color=FORCE, linewidth=0.9)
     begins = [step.from_s for step in profile.steps if step.from_s < end]
     forces = [step.at_most_n for step in profile.steps[: len(begins)]]

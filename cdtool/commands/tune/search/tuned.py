@@ -20,8 +20,6 @@ from cdtool.statistics.spread import mean_interval
 
 # An optimum is flat where the cost is at most this share above the best.
 FLAT = 0.05
-# The neighbour of an optimum at an edge must be worse by this share for the edge to matter.
-_EDGE = 0.01
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,8 @@ class Sensitivity:
         if len(values) < 2 or self.chosen not in (values[0].value, values[-1].value):
             return False
         neighbour = values[1] if self.chosen == values[0].value else values[-2]
-        return neighbour.cost_ratio > 1.0 + _EDGE
+        # Where the neighbour is hardly worse, the edge does not matter.
+        return neighbour.cost_ratio > 1.01
 
     @property
     def _flat(self) -> list[TriedValue]:
