@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection
-from cdtool.commands.judging.runs import (
-    absent_truth,
-)
+from cdtool.commands.judging.runs import absent_truth
 from cdtool.detectors.detection import Alarm
 from cdtool.recordings.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.results.results import ContactResult, RecordingFinding, Skipped
 from cdtool.thresholds.normal_motion import NormalMotions
 from cdtool.truth.matching import Matching, belongs, windows
 from cdtool.truth.missing_samples import longest_step
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from cdtool.commands.console.console import number
-from cdtool.commands.detecting import prepared_benchmark
+from cdtool.commands.detecting import prepared
 from tests.command import cdtool
 
 SAMPLES = Path(__file__).parents[3] / "sample_logs"
@@ -43,13 +43,15 @@ mass_before_cell_kg = {mass}
 @pytest.fixture(autouse=True)
 def learn_once(monkeypatch):
     """Learn the threshold once per file and detector instead of in each command."""
-    prepare_again = prepared_benchmark.prepare_benchmark
+    prepare_again = prepared._of_benchmark
     prepare_once = cache(prepare_again)
 
-    def prepare(file, settings, **given):
-        return prepare_again(file, settings=settings, **given) if settings else prepare_once(file, **given)
+    def prepare(file, detector, signature, settings):
+        if settings:
+            return prepare_again(file, detector, signature, settings)
+        return prepare_once(file, detector, signature, None)
 
-    monkeypatch.setattr(prepared_benchmark, "prepare_benchmark", prepare)
+    monkeypatch.setattr(prepared, "_of_benchmark", prepare)
 
 
 def benchmark_with_other_settings(folder: Path, sample: str) -> Path:

@@ -22,7 +22,6 @@ from cdtool.execution.store.sources import SourceFile
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.labels import Labels
 from cdtool.recordings.log_section import LogSection
-from cdtool.recordings.motion.applicable import HOLD
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
 
@@ -103,8 +102,7 @@ class Determinants:
     @cached_property
     def _of_detector(self) -> dict[str, str]:
         setup = self.setup
-        hold = max(HOLD, *(group.window for group in setup.impacts.values()))
-        common = [setup.activation, setup.watched, hold]
+        common = [setup.activation, setup.watched, setup.hold]
         return {
             name: digest_of(
                 rule_to_dict(setup.rule),
