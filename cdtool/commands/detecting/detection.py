@@ -60,7 +60,10 @@ class DetectedRuns:
 
 
 def contact_of(found: Detected, alarm: Alarm) -> Contact | None:
-    """Return the contact that an alarm belongs to: by its window, or because the contact lasts until the alarm."""
+    """Return the contact that an alarm detected, or belongs to: by its window, or because it lasts until the alarm."""
+    matches = [item for matching in found.matchings for item in matching.matches]
+    if own := next((item.contact for item in matches if item.alarm == alarm), None):
+        return own
     spans = windows(found.contacts, found.window)
     return next((span[0] for span in reversed(spans) if belongs(alarm.time, [span])), None)
 

@@ -53,7 +53,7 @@ def test_a_contact_in_progress_is_counted_and_named_in_every_output_and_scored_i
     assert "in progress" in shown.out and "contact until 0.599 s" in shown.out
     told = json.loads(cdtool("explain", tmp_path / "stiff" / "begun.csv", "-b", file, "--json").out)
     assert [row["outcome"] for row in told["contacts"]] == ["in_progress", "detected"] and told["missed"] == []
-    assert all(item["onset_s"] is None for item in told["alarms"] if item["role"] == "in progress")
+    assert all(item["contact"] is None for item in told["alarms"] if item["role"] == "in progress")
 
 
 def test_thirty_newtons_of_drift_change_no_result_and_are_reported(tmp_path):
