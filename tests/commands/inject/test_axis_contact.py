@@ -10,7 +10,8 @@ import pytest
 
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.commands.inject.axis_contact import Doubt, InjectedContact, axis_contact
+from cdtool.commands.inject.axis_contact import axis_contact
+from cdtool.commands.inject.injected_contact import Doubt, InjectedContact
 from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.with_injected import Refusal, refusal
 from cdtool.commands.simulate.gate_model import GateRun, simulate_gate_run

@@ -10,7 +10,7 @@ import pytest
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, DriveBeyond
-from cdtool.commands.inject.axis_contact import Doubt, InjectedContact
+from cdtool.commands.inject.injected_contact import Doubt, InjectedContact
 from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.robot_contact import RobotLog, StruckPoint, robot_contact
 from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run
