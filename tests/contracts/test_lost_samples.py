@@ -18,7 +18,6 @@ from scipy.stats import binomtest
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection, judge, run_detector
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.detection import Signal
 from cdtool.formats.channels.reading import read_as_logged
@@ -31,6 +30,7 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.truth.onset import OnsetRule, find_contacts
 from tests.contracts.damaged_logs import KINDS, Fault, damaged, filled, random_faults
 from tests.contracts.lost_evidence import cost_of
+from tests.synthetic.gate_as_recording import as_recording
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 from tests.synthetic.motions import moving_recording
 from tests.synthetic.robots import six_joint_robot

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import judge, run_detector
 from cdtool.base.errors import SignatureError, UsageError
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.detectors.detection import Status
 from cdtool.detectors.momentum import Momentum
 from cdtool.recordings.operations import operations_of
@@ -18,6 +17,7 @@ from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, check_complete, guarded, largest_move
 from cdtool.thresholds.signature import Signature
 from tests.synthetic.ageing import GATE, ageing_run
+from tests.synthetic.gate_as_recording import as_recording
 from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
 
 CLEAN = stroke()

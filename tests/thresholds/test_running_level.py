@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.detectors.detection import Band, Status
 from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.momentum import Momentum
@@ -20,6 +19,7 @@ from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.running_level_kernel import CLIP, FREEZE, GUARD, MEMORY, START, WIDER
 from cdtool.thresholds.signature import Signature
+from tests.synthetic.gate_as_recording import as_recording
 from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
 
 REACH = 6.0

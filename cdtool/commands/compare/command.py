@@ -89,7 +89,7 @@ def compare(
     Example: cdtool compare old.json new.json -o compare.md
     """
     from cdtool.base.files.foreign import refuse_inputs
-    from cdtool.commands.compare.comparing import compare as run
+    from cdtool.commands.compare.comparison import compare as run
     from cdtool.commands.compare.comparison_json import to_json
     from cdtool.report.outputs import check_outputs, write_outputs
 

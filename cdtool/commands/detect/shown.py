@@ -177,35 +177,25 @@ def _as_json(
     rows: Sequence[ContactResult],
     force: ForceSummary | None,
 ) -> dict[str, Any]:
+    from cdtool.commands.detect.rows import alarm_row, operation_row
     from cdtool.commands.detecting.detection import contact_of, why_no_contact
 
-    belonging = {alarm: contact_of(found, alarm) for alarm in detection.verdict.alarms}
-    belonging |= {item.alarm: item.contact for item in matching.matches if item.alarm}
+    alarms = detection.verdict.alarms
+    why = [None if contact_of(found, alarm) else why_no_contact(found, alarm) for alarm in alarms]
     return {
         "log": str(log),
-        "operation": detection.operation.name,
-        "detector": detection.detector,
+        **asdict(operation_row(found, detection, matching)),
         "unit": detection.statistic.unit,
         "threshold": found.threshold,
-        "verdict": detection.verdict.outcome,
-        "reason": detection.verdict.reason or None,
         "alarms": [
-            {
-                "time_s": alarm.time,
-                "joint": alarm.joint,
-                "side": alarm.side,
-                "statistic": alarm.statistic,
-                "limit": alarm.limit,
-                "contact_onset_s": contact.start if contact else None,
-                "why_no_contact": None if contact else why_no_contact(found, alarm),
-            }
-            for alarm, contact in ((alarm, belonging[alarm]) for alarm in detection.verdict.alarms)
+            {**asdict(alarm_row(found, detection, alarm)), "why_no_contact": reason}
+            for alarm, reason in zip(alarms, why, strict=True)
         ],
         "contacts": [contact_as_json(detection, row) for row in rows],
         "not_judged": detection.statistic.shares(),
         "other_speed": detection.other_speed or None,
         "stretches_not_judged": [asdict(item) for item in detection.not_assessable_sections()],
-        "estimated_force": _force_as_json(force) if force else None,
+        "estimated_force": asdict(force) if force else None,
         "notes": list(detection.statistic.notes),
         "findings": _findings(found),
     }
@@ -217,9 +207,3 @@ def _findings(found: Detected) -> list[str]:
         (item.reason for item in found.findings if item.severity == "warning"),
     )
     return list(dict.fromkeys([*read, *of_log]))
-
-
-def _force_as_json(force: ForceSummary) -> dict[str, Any]:
-    figures = {"at_alarm_n": force.at_alarm, "largest_n": force.largest, "largest_at_s": force.largest_at}
-    known = {name: value if math.isfinite(value) else None for name, value in figures.items()}
-    return {"link": force.contact.link, "point_m": list(force.contact.point), **known}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -38,7 +39,6 @@ from cdtool.commands.console.place import Place, location
 if TYPE_CHECKING:
     from cdtool.commands.explain.explaining import ExplainedRun
     from cdtool.results.explanation.explanation import Explanation
-    from cdtool.results.explanation.margin import Moment
 
 # Its reason already names the speeds.
 _BLIND = "not_assessable"
@@ -159,10 +159,11 @@ def _show_event(item: Explanation) -> None:
 
 
 def _as_json_value(log: str, explained: ExplainedRun) -> dict[str, Any]:
-    """Return the same as JSON values."""
+    """Return the same as JSON values: an event by the names that it has in Python."""
     from cdtool.commands.console.contact_rows import contact_as_json
+    from cdtool.report.explanation_words import words
 
-    items = [item for _, item in explained.events]
+    items = [{**asdict(item), "words": words(item)} for _, item in explained.events]
     return {
         "log": log,
         "verdicts": [
@@ -174,98 +175,6 @@ def _as_json_value(log: str, explained: ExplainedRun) -> dict[str, Any]:
             for detection, rows in zip(explained.found.detections, explained.found.contact_rows, strict=True)
             for row in rows
         ],
-        "alarms": [_alarm_as_json(item) for item in items if item.alarm],
-        "missed": [_miss_as_json(item) for item in items if not item.alarm],
-    }
-
-
-def _alarm_as_json(item: Explanation) -> dict[str, Any]:
-    assert item.alarm is not None, "of an alarm"
-    return {
-        **_common(item),
-        "role": item.role,
-        "time_s": item.alarm.time,
-        "side": item.alarm.side,
-        "statistic": item.alarm.statistic,
-        "limit": item.alarm.limit,
-        "onset_s": item.contact.start if item.contact else None,
-        "left_band_s": item.left,
-        "missing_samples_skipped": item.skipped,
-    }
-
-
-def _miss_as_json(item: Explanation) -> dict[str, Any]:
-    return {
-        **_common(item),
-        "outcome": item.role,
-        "reason": item.reason or None,
-        "onset_s": item.zero,
-        "watched_ms": 1e3 * item.watched,
-        "not_judged": dict(item.not_judged),
-        "joints": [
-            {
-                "joint": found.joint,
-                "nearest": _moment_as_json(found.nearest),
-                "longest_outside_samples": found.longest,
-                "longest_outside_from_s": found.outside_from,
-                "held_share_of_limit": found.held,
-                "outside_before_contact_from_s": found.latched_from,
-            }
-            for found in item.approaches
-        ],
-    }
-
-
-def _common(item: Explanation) -> dict[str, Any]:
-    from cdtool.report.explanation_words import words
-
-    return {
-        "operation": item.operation,
-        "detector": item.detector,
-        "joint": item.joint,
-        "unit": item.unit,
-        "debounce_samples": item.debounce,
-        "words": words(item),
-        "detector_reads": list(item.inputs),
-        "compared_with_runs": item.runs,
-        "not_compared_because": str(item.absent) if item.absent else None,
-        "moved": [
-            {
-                "channel": found.channel,
-                "joint": found.joint,
-                "time_s": found.time,
-                "direction": found.direction or None,
-                "reason": found.reason or None,
-                "unit": found.unit or None,
-                "value": found.value,
-                "normal_mean": found.mean,
-                "normal_spread": found.spread,
-            }
-            for found in item.departed
-        ],
-        "glitches": [
-            {
-                "kind": found.kind,
-                "channel": found.channel,
-                "joint": found.joint or None,
-                "unit": found.unit or None,
-                "start_s": found.start,
-                "end_s": found.end,
-                "samples": found.samples,
-                "size": found.size,
-            }
-            for found in item.glitches
-        ],
-        "margins": [_moment_as_json(moment) for moment in item.moments],
-    }
-
-
-def _moment_as_json(moment: Moment) -> dict[str, Any]:
-    return {
-        "time_s": moment.time,
-        "statistic": moment.statistic,
-        "limit": moment.limit,
-        "margin": moment.margin,
-        "share_of_limit": moment.share,
-        "reason": moment.reason or None,
+        "alarms": [item for item in items if item["alarm"]],
+        "missed": [item for item in items if not item["alarm"]],
     }

@@ -12,20 +12,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.commands.inject.axis_contact import BEYOND, STIFF_SHARE, Doubt, InjectedContact, last_rest
+from cdtool.commands.inject.axis_contact import last_rest
 from cdtool.commands.inject.channel_change import ChannelChange
+from cdtool.commands.inject.injected_contact import InjectedContact, Signals, injected_contact
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.obstacle import Obstacle
 from cdtool.machines.axis_model.parameters import AxisModel, Controller
-from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.machines.robot_model.parameters import RobotModel, Vector, point_in_joint
 from cdtool.machines.robot_model.simulation import PointContact, RobotInputs, RobotMotion, simulate_robot
 
+# What is simulated before the contact where the robot is never at rest before it [s].
+_LONGEST_APPROACH = 5.0
+# Speeds are means over this time [s].
+_MEAN_SPEED_OVER = 0.02
 # A joint below this share of its own greatest speed is at rest.
 _AT_REST = 0.02
+# A controller without which the motors would not notice the contact: as stiff as this sampling [s] permits.
+_STIFF_SHARE, _STIFF_PERIOD = 0.2, 1e-3
+# A point that moves along a plane, or not at all, does not meet it: share of its speed, and of the greatest one.
+_ALONG_PLANE, _STANDS = 0.02, 1e-3
 
 
 @dataclass(frozen=True)
@@ -95,7 +103,7 @@ class RobotLog:
             position = self.at("position", self.time)
             assert position is not None
             speed = np.asarray(np.gradient(position, self.period, axis=0))
-        width = min(max(round(0.02 / self.period), 1), len(speed))  # s
+        width = min(max(round(_MEAN_SPEED_OVER / self.period), 1), len(speed))
         mean = np.ones(width) / width
         return np.column_stack([np.convolve(column, mean, mode="same") for column in speed.T])
 
@@ -133,7 +141,9 @@ def robot_contact(
     frozen = assumption.controller is ControllerReaction.FROZEN
     against = replace(inputs, command=free["command"]) if frozen else inputs
     hit = simulate_robot(model, against, placed)
-    return _difference(model, (free, hit), time, (contact, approach), assumption, log.acceleration_unit)
+    signals = [_signals(model, motion, log.acceleration_unit) for motion in (free, hit)]
+    force = ChannelChange(time, hit.contact_force[:, np.newaxis], contact)
+    return injected_contact(model.axes, (signals[0], signals[1]), force, approach, assumption)
 
 
 def least_known_joint(model: RobotModel) -> AxisModel:
@@ -159,8 +169,8 @@ def _with_controllers(model: RobotModel, log: RobotLog, reaction: ControllerReac
                 f"{log.name}: the model has no controller", "identify it, or use the brackets 'frozen' and 'stiff'"
             )
         return model
-    period = log.period / max(math.ceil(log.period / 1e-3 - 1e-6), 1)  # at most 1 ms, as that of an axis
-    gain = STIFF_SHARE / period
+    period = log.period / max(math.ceil(log.period / _STIFF_PERIOD - 1e-6), 1)
+    gain = _STIFF_SHARE / period
     follows = Controller(period=period, speed_gain=gain, integral_gain=0.1 * gain**2, speed_filter_order=0)
     axes = tuple(replace(axis, controller=follows) for axis in model.axes)
     return replace(model, axes=axes, gains_of_inertia=True)
@@ -184,8 +194,7 @@ def _beginning(log: RobotLog, contact: float) -> float:
     """Return when the simulation begins [s]: in the last rest of all joints before the contact, or 5 s before it."""
     speed = np.abs(log.speed())
     moving = np.any(speed > _AT_REST * np.max(speed, axis=0, initial=0.0), axis=1)
-    # Where the robot is never at rest before the contact, 5 s of its approach are simulated.
-    return max(contact - 5.0, last_rest(log.time, (log.time <= contact) & ~moving, log.period), log.start)
+    return max(contact - _LONGEST_APPROACH, last_rest(log.time, (log.time <= contact) & ~moving, log.period), log.start)
 
 
 def _inputs(log: RobotLog, time: FloatArray) -> RobotInputs:
@@ -224,7 +233,7 @@ def _meeting(
     fastest = max(
         float(np.linalg.norm(_velocity(model, link.joint, point, positions[index], speeds[index]))) for index in shown
     )
-    if own <= 1e-3 * fastest or own == 0.0:  # the point does not move
+    if own <= _STANDS * fastest or own == 0.0:
         raise RecordingError(
             f"{log.name}: the point of link '{link.name}' is at rest at the contact",
             "choose a contact while it moves",
@@ -233,7 +242,7 @@ def _meeting(
     if struck.direction is not None:
         given = np.array(struck.direction) / np.linalg.norm(struck.direction)
         towards = float(given @ velocity)
-        if abs(towards) < 0.02 * own:  # a point that moves along a plane does not meet it
+        if abs(towards) < _ALONG_PLANE * own:
             raise RecordingError(
                 f"{log.name}: the point of link '{link.name}' moves along the obstacle at the contact",
                 "choose another direction",
@@ -251,70 +260,12 @@ def _velocity(model: RobotModel, joint: int, point: Vector, position: FloatArray
     return np.array([float(model.point_along(position, joint, point, axis)[1] @ speed) for axis in axes])
 
 
-def _difference(
-    model: RobotModel,
-    motions: tuple[RobotMotion, RobotMotion],
-    time: FloatArray,
-    contact: tuple[float, float],
-    assumption: Assumption,
-    acceleration_unit: str,
-) -> InjectedContact:
-    free, hit = motions
-    start, approach = contact
-    period = hit.period
-    torque, command = hit["drive_torque"] - free["drive_torque"], hit["command"] - free["command"]
-    channels = {
-        "torque": _filtered(model, torque, period, "torque"),
-        "speed": _measured_speed(model, motions),
-        "position": hit["motor_position"] - free["motor_position"],
-        "reference_torque": command,
-    }
-    knows_accelerometer = all(axis.sensors.accelerometer_hz > 0.0 for axis in model.axes)
-    if knows_accelerometer:
-        sensed = _sensed(model, hit, acceleration_unit) - _sensed(model, free, acceleration_unit)
-        channels["acceleration"] = _filtered(model, sensed, period, "acceleration")
-    held = {"reference_torque"}
-    if all(axis.sensors.speed_hz == 0.0 for axis in model.axes):
-        held.add("speed")
-    changes = {name: ChannelChange(time, values, start, held=name in held) for name, values in channels.items()}
-    force = ChannelChange(time, hit.contact_force[:, np.newaxis], start)
-    wind_ups = (float(np.max(np.abs(free["wind_up"]))), float(np.max(np.abs(hit["wind_up"]))))
-    made = InjectedContact.of(changes, force, approach, wind_ups, assumption)
-    reliable = time <= made.reliable_until
-    doubts = {
-        Doubt.RIGID_DRIVE: model.is_rigid,
-        Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, motions, reliable),
-        Doubt.SLOPE_BEYOND_FREE_RUNS: _rises_beyond(model, hit, reliable),
-        Doubt.ACCELEROMETER_UNKNOWN: not knows_accelerometer,
-    }
-    return made.with_doubts(doubts)
-
-
-def _filtered(model: RobotModel, change: FloatArray, period: float, channel: str) -> FloatArray:
-    """Return a change (n, J) as the sensors of its channel show it."""
-    columns = []
-    for axis, column in zip(model.axes, change.T, strict=True):
-        sensors = axis.sensors
-        if channel == "torque":
-            columns.append(first_order_low_pass(column, sensors.torque_filter_time, period))
-        else:
-            damping = sensors.accelerometer_damping
-            columns.append(second_order_low_pass(column, sensors.accelerometer_hz, damping, period))
-    return np.column_stack(columns)
-
-
-def _measured_speed(model: RobotModel, motions: tuple[RobotMotion, RobotMotion]) -> FloatArray:
-    """Return the change of the speed channel: the controller's own, or the log's derivative of the position."""
-    free, hit = motions
-    change = hit["measured_speed"] - free["measured_speed"]
-    position = hit["motor_position"] - free["motor_position"]
-    for joint, axis in enumerate(model.axes):
-        if axis.sensors.speed_hz > 0.0:
-            constant = 1.0 / (2.0 * math.pi * axis.sensors.speed_hz)
-            steps = np.diff(position[:, joint], prepend=0.0) / hit.period
-            once = first_order_low_pass(steps, constant, hit.period)
-            change[:, joint] = first_order_low_pass(once, constant, hit.period)
-    return change
+def _signals(model: RobotModel, motion: RobotMotion, acceleration_unit: str) -> Signals:
+    """Return what the sensors and drives of the joints would log of a motion."""
+    names = {"torque": "drive_torque", "speed": "measured_speed", "position": "motor_position"}
+    names |= {"reference_torque": "command", "wind_up": "wind_up"}
+    rows = {name: motion[row] for name, row in names.items()}
+    return Signals(motion.period, {**rows, "acceleration": _sensed(model, motion, acceleration_unit)})
 
 
 def _sensed(model: RobotModel, motion: RobotMotion, unit: str) -> FloatArray:
@@ -324,23 +275,3 @@ def _sensed(model: RobotModel, motion: RobotMotion, unit: str) -> FloatArray:
             motion["link_position"], motion["link_speed"], motion["link_acceleration"]
         )
     return motion["link_acceleration"]
-
-
-def _winds_up_beyond(model: RobotModel, motions: tuple[RobotMotion, RobotMotion], reliable: BoolArray) -> bool:
-    """Whether the contact winds a joint's drive up by 5 % more than its stiffness is known for."""
-    free, hit = (np.abs(motion["wind_up"]) for motion in motions)
-    observed = np.array([axis.drive.observed_wind_up for axis in model.axes])
-    elastic = np.array([not axis.drive.is_rigid for axis in model.axes])
-    known = np.maximum(np.max(free, axis=0), observed)
-    return bool(np.any(elastic & (np.max(hit[reliable], axis=0) > BEYOND * known)))
-
-
-def _rises_beyond(model: RobotModel, hit: RobotMotion, reliable: BoolArray) -> bool:
-    """Whether a command without a known slew limit rises by 5 % faster than it was observed to."""
-    command = hit["command"]
-    slope = np.abs(np.diff(command, axis=0, prepend=command[:1])) / hit.period
-    highest = np.max(slope[reliable], axis=0)
-    return any(
-        math.isinf(controller.slew_limit) and 0.0 < BEYOND * controller.observed_slope < own
-        for controller, own in zip(_controllers(model), highest, strict=True)
-    )

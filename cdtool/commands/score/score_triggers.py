@@ -132,7 +132,7 @@ class _TriggerScoring:
     path: Path
     said: Mapping[str, Mapping[str, Triggered]]
 
-    def __call__(self, group: str, path: Path, wanted: Wanted | None, _: object = None) -> list[LogOutcome]:
+    def __call__(self, group: str, path: Path, wanted: Wanted | None) -> list[LogOutcome]:
         found = score_runs(self.setup, group, path, self._detect, {})
         if self.setup.has_runs:
             found = self._listed_runs(found)

@@ -28,13 +28,13 @@ from cdtool.commands.judging.runs import (
     reported,
     shown_path,
     unread,
+    without_contradicted,
 )
 from cdtool.commands.judging.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.force_rows import force_rows
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.recordings.log_section import LogSection
-from cdtool.recordings.motion.applicable import HOLD
 from cdtool.recordings.operations import Operation, RunCut, operations_of
 from cdtool.recordings.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recordings.recording import Contact, Recording
@@ -127,7 +127,6 @@ def detect_with(
     `unusable` cannot be used, for the given reason; none of their samples is assessable. A class of motion is monitored
     for the longest matching window.
     """
-    hold = max(HOLD, *(group.window for group in setup.impacts.values()))
     machine = setup.machine_file.machine
 
     def detect(log: Path, operations: Sequence[Operation]) -> Detections:
@@ -143,7 +142,7 @@ def detect_with(
                 known = thresholds[detector.name]
                 try:
                     made = detect_operations(
-                        operations, machine, detector, known, setup.activation, setup.watched, hold
+                        operations, machine, detector, known, setup.activation, setup.watched, setup.hold
                     )
                 except CdtoolError as fault:
                     failed[detector.name] = tuple(Skipped(item.whole.name, str(fault)) for item in operations)
@@ -223,7 +222,9 @@ def _cut_log(setup: BenchmarkFile, group: str, log: Path, path: Path, load: Call
     """Read and cut a log or a run at `path`; `log` is its path in the benchmark file. Raises RecordingError."""
     rules = setup.rules_of(group)
     whole = load()
-    section = setup.sections.get(log, LogSection())
+    if setup.checks_channels:
+        whole = without_contradicted(whole, setup.machine_file.machine, setup.onset)
+    section = setup.sections.get(log, LogSection() if group else setup.section)
     recording = section.of(whole)
     operations = operations_of(recording, setup.operations)
     if setup.is_impact_free(group):
@@ -233,7 +234,7 @@ def _cut_log(setup: BenchmarkFile, group: str, log: Path, path: Path, load: Call
     contacts: Sequence[Contact] = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
     if section and contacts:
         contacts = section.contacts_of(whole, contacts)
-        if not contacts:
+        if not contacts and group:
             raise RecordingError(f"{path}: no contact {section}", "change from and to, or move it to [holdout]")
     return CutLog(recording, operations, setup.operations, contacts)
 

@@ -198,7 +198,7 @@ def integrate_gate(
     per sample; `run` holds the run's friction factor [-], cogging phase [rad] and obstacle position [m].
     """
     log = np.zeros((len(gate_kernel.ROWS), reference_speed.size))
-    numbers = tuple(float(getattr(parameters, name)) for name in gate_kernel.PARAMETER_ORDER)
+    numbers = gate_kernel.Numbers(*(float(getattr(parameters, name)) for name in gate_kernel.Numbers._fields))
     waves = np.array(parameters.friction_waves, dtype=np.float64).reshape(-1, 3)
     kind = gate_kernel.CONTACT_KINDS[impact]
     first_contact = gate_kernel.integrate_gate(

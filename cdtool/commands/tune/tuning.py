@@ -188,7 +188,7 @@ class _TuningOf:
         measure = _MeasuresAll(measuring, self.workers)
         channels = set.intersection(*(set(run.operation.recording.channels) for run in recordings.free))
         grid = [Candidate(default.gains, item) for item in self._rules(rule, channels)]
-        found = search(default, 0, grid, gains, objective, measure)
+        found = search(default, grid, gains, objective, measure)
         if not np.isfinite(found.best.score):
             reason = found.measured[default.key].reason or "no candidate is acceptable"
             raise UsageError(f"{self.name} cannot be tuned: {reason}", "check the logs with cdtool info")
@@ -332,7 +332,7 @@ def _checked_choice(
         without = [item.rule for item in rejected]
         best = found.subsets[0].best_without(without)
         chosen = [subset.best_without(without) for subset in found.subsets[1:]]
-        is_default = best.candidate.key == found.default.key and best.debounce == found.default_debounce
+        is_default = best.candidate.key == found.default.key and best.debounce == 0
         nested = measure.pooled(chosen, corrects=not is_default)
         if default is None or nested is None or best.candidate.key == found.default.key:
             return best, chosen, nested, rejected

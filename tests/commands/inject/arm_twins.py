@@ -23,7 +23,7 @@ from cdtool.commands.learning.fitting import fit_operations
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
-from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.detectors.base import Detector
 from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.machines.planar_arm import PlanarArm
@@ -31,6 +31,7 @@ from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import FittedThreshold
 from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
+from tests.synthetic.arm_as_recording import as_recording
 
 LEARNED = 14
 # Of the mean paired difference: share of the true latency, and [ms].

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.motion.speed_course import TOLERANCE
 from cdtool.recordings.motion.speed_range import FORGET, GUARD, KNOWN, SpeedRange
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.common_class import common_class
 from tests.recordings.motion.speed_logs import log
+from tests.synthetic.gate_as_recording import as_recording
 
 
 def learned(speed: float, direction: int = 1) -> MotionClass:

@@ -41,18 +41,17 @@ class GroupResults:
 
 @dataclass(frozen=True)
 class ChoiceResults:
-    """What a choice gives: by group, and the number of impact-free operations that alarm."""
+    """What a choice gives: by group, and the number of impact-free operations that alarm.
+
+    `alarm_share`: their share, with its exact 95 % interval.
+    """
 
     groups: dict[str, GroupResults]
     alarming: int
     free: int
+    alarm_share: Interval
     score: float
     costs: FloatArray
-
-    @property
-    def alarm_share(self) -> Interval:
-        """Return the share of impact-free operations that alarm, with its exact 95 % interval."""
-        return binomial_share(self.alarming, self.free)
 
 
 @dataclass(frozen=True)
@@ -186,7 +185,7 @@ def results_of(
             float(np.mean(known)) if len(known) else math.nan,
         )
     costs = objective.costs_of(latency, force, everything)
-    return ChoiceResults(found, *counts, objective.score(costs), costs)
+    return ChoiceResults(found, *counts, binomial_share(*counts), objective.score(costs), costs)
 
 
 def held_out_results(objective: Objective, made: Pooled | None) -> ChoiceResults | None:
