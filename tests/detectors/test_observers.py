@@ -27,8 +27,8 @@ from cdtool.detectors.velocity import Velocity
 from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.limit import Limit
 from tests.synthetic.machines import ARM, arm_of, machine_of
-from tests.synthetic.motions import PERIOD, moving_recording, resting_recording
-from tests.synthetic.robots import six_joint_robot, urdf_robot
+from tests.synthetic.motions import moving_recording, resting_recording
+from tests.synthetic.robots import six_joint_robot
 
 BANDWIDTH = 30.0  # [rad/s], of all of them
 OBSERVERS: dict[str, Any] = {
@@ -117,16 +117,6 @@ SLIDE = """<robot name="slide"><link name="rail"/><link name="cart"><inertial><m
 </joint></robot>"""
 
 
-def test_the_recursion_for_coupled_joints_is_the_momentum_observers_where_one_joint_has_a_constant_inertia(tmp_path):
-    pytest.importorskip("pinocchio")
-    slide = urdf_robot(tmp_path, SLIDE, {"joints": ["drive"], "viscous_friction": 3.0})
-    log = moving_recording(slide, seconds=3.0, noise=0.05, contact=[4.0], contact_at=2.0)
-    one, other = Momentum(12.0).signal(log, slide), Velocity(12.0).signal(log, slide)
-    np.testing.assert_allclose(other.values, one.values, rtol=1e-12, atol=1e-12 * np.abs(one.values).max())
-    settled = log["speed"].time > 1.0 / 12.0 * 3.0 + PERIOD
-    assert (other.status[settled] == one.status[settled]).all()
-
-
 @pytest.mark.parametrize(("kind", "pose"), [("arm", (0.4, 1.1)), ("robot", (0.3, -0.5, 1.2, 0.1, 0.7, -1.0))])
 def test_in_a_frozen_pose_the_velocity_observer_is_the_filter_k_over_m(kind, pose, machines):
     """Step response I - exp(-K M^-1 t) of 2.15: joints leak into one another while the estimate settles."""
@@ -158,17 +148,6 @@ def test_the_energy_observer_is_the_filtered_power_of_the_contact(kind, machines
     assert worst[0] < 1e-3
     assert worst[0] / worst[1] == pytest.approx(4.0, rel=0.25)
     assert signal.joints == (WHOLE_MACHINE if machine.coupled else ())
-
-
-@pytest.mark.parametrize("kind", MACHINES)
-def test_at_rest_the_energy_observer_is_not_applicable_and_says_so(kind, machines):
-    machine = machines(kind)
-    pose = np.zeros(len(machine.joints))
-    log = resting_recording(machine, pose, np.full(len(pose), 50.0))
-    (operation,) = operations_of(log)
-    detection = detect_operation(operation, machine, Energy(), [Limit.given([1.0])], Activation())
-    assert detection.verdict.outcome == "not_assessable"
-    assert detection.verdict.reason == "not applicable 90 %, start-up 10 %"
 
 
 @pytest.mark.parametrize("name", OBSERVERS)

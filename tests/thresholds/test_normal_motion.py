@@ -99,15 +99,6 @@ def test_a_damaged_band_or_one_of_other_joints_is_refused(normal, change, messag
         NormalMotion.from_dict({**values, "torque": {**values["torque"], **change}})
 
 
-@pytest.mark.parametrize("change", [{"direction": 0}, {"leading_joint": 4}, {"nominal_speed": -1.0}])
-def test_a_class_of_motion_that_cannot_be_is_refused(normal, change):
-    values = {name: {**item, **change} for name, item in normal.to_dict().items()}
-    with pytest.raises(ValueError, match="class of motion"):
-        NormalMotion.from_dict(values)
-    with pytest.raises(ValueError, match="'force'"):
-        NormalMotion.from_dict({**normal.to_dict(), "force": normal.to_dict()["torque"]})
-
-
 def test_a_run_more_moves_the_mean_as_learning_from_all_of_them_does():
     everything = runs(20)
     few, all_of_them = learn_normal_motion(everything[:-1], MOTION), learn_normal_motion(everything, MOTION)

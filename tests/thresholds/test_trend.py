@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.base.errors import UsageError
 from cdtool.detectors.detection import Status
 from cdtool.thresholds.first_order import filtered_slope, low_passed
 from cdtool.thresholds.limit import Limit
-from cdtool.thresholds.limit_and_trend import LimitAndTrend
 from cdtool.thresholds.trend import Trend
 from tests.thresholds.strokes import STILL, TIME, N, jittering_clock, signal
 
@@ -71,11 +69,3 @@ def test_the_trend_alarms_before_the_value_does_on_a_fast_ramp_and_never_on_a_sl
 
     assert first(fitted, 400.0) < first(value, 400.0) < 2.1
     assert first(fitted, 12.0) == np.inf and first(value, 12.0) < np.inf
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"shape": "circle"}, {"lead": 0.0}, {"time_constant": -1.0}, {"steps": 1}, {"sides": "left"}]
-)
-def test_settings_without_meaning_are_refused(wrong):
-    with pytest.raises(UsageError):
-        LimitAndTrend(**wrong)

@@ -86,25 +86,3 @@ def test_joints_at_rest_contradict_nothing_whatever_noise_offset_and_encoder(see
     if quantum:
         position = np.round(position / quantum) * quantum
     assert not contradictions(arm(speed, position))
-
-
-def test_of_several_joints_those_with_wrong_unit_and_sign_are_named():
-    speed, position = (np.column_stack([column, 0.7 * column, column]) for column in swing(0.5))
-    position[:, 1] = np.rad2deg(position[:, 1])
-    position[:, 2] *= -1.0
-    found = contradictions(arm(speed, position))
-    assert {key: item.numbers["found"] for key, item in found.items()} == {
-        ("speed", "elbow"): "size",
-        ("speed", "wrist"): "sign",
-    }
-    assert "deg and rad" in found["speed", "elbow"].numbers["between"]
-
-
-def test_columns_of_two_joints_in_the_wrong_order_are_named():
-    speed = np.column_stack([np.cos(0.8 * TIME), np.sin(2.1 * TIME), np.cos(1.3 * TIME)])
-    position = np.cumsum(speed, axis=0)[:, [1, 0, 2]] * 2e-3
-    found = contradictions(arm(speed, position))
-    assert {key: item.numbers["between"] for key, item in found.items()} == {
-        ("speed", "shoulder"): "elbow",
-        ("speed", "elbow"): "shoulder",
-    }
