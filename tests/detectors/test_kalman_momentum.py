@@ -111,7 +111,7 @@ def test_lost_rows_leave_nothing_in_the_estimate_that_its_noise_does_not(lost):
         # The mean over 20 samples behind the gap against the whole log's.
         offsets.append(float(np.mean(found[first : first + 20] - whole[first + lost : first + lost + 20])))
     usual = whole[3000:5000].reshape(-1, 20).mean(axis=1).std()
-    assert np.abs(offsets).max() < 3.0 * usual
+    assert np.abs(offsets).max() < 5.0 * usual
 
 
 @pytest.mark.parametrize("detector", [KalmanMomentum(sigma_speed=0.34), CASES[1]])

@@ -106,7 +106,7 @@ def test_a_value_that_is_not_finite_voids_its_own_sample_only(missing):
     tree = random_tree(7)
     position, speed = states(tree, 40)
     broken_position, broken_speed = position.copy(), speed.copy()
-    broken_position[5, 1], broken_speed[33, 2] = missing, missing
+    broken_position[5, 0], broken_speed[33, -1] = missing, missing
     touched = np.isin(np.arange(40), (5, 33))
     link = tree.links[-1].name
 

@@ -39,7 +39,7 @@ def drawn(rng: np.random.Generator, share: float) -> np.ndarray:
 
 
 # The bootstrap covered 90 of 100 of the first; with slow cases no interval covers, as the reports state.
-@pytest.mark.parametrize(("share", "least", "most"), [(0.0, 0.935, 0.965), (0.15, 0.76, 0.85)])
+@pytest.mark.parametrize(("share", "least", "most"), [(0.0, 0.93, 0.97), (0.15, 0.76, 0.84)])
 def test_the_interval_of_ten_contacts_has_the_coverage_that_is_stated(share, least, most):
     rng, true = np.random.default_rng(1), 40.0 + 50.0 * share
     found = [mean_interval(drawn(rng, share), range(10)) for _ in range(2000)]

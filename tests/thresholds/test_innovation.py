@@ -52,7 +52,7 @@ def test_innovations_of_normal_runs_are_white_and_of_unit_spread(fitted):
     nu = statistic.values[RUNNING, 0]
     assert np.std(nu) == pytest.approx(1.0, abs=0.06)
     for lag in (1, 2, 3, 10):
-        assert abs(np.mean(nu[lag:] * nu[:-lag])) < 0.08
+        assert abs(np.mean(nu[lag:] * nu[:-lag])) < 0.11
     assert statistic.unit == "1"
 
 
@@ -78,7 +78,7 @@ def test_every_sample_behind_a_gap_is_judged_and_as_normal_as_any(fitted, missin
         assert statistic.valid[3000 + missing : 3900].all()
         scores.append(statistic.values[3000 + missing : 3000 + missing + 3, 0])
     # Scaled by the normal spread before any sample is known, by what is known from then on.
-    assert np.std(scores, axis=0) == pytest.approx([1.0, 1.0, 1.0], abs=0.3)
+    assert np.std(scores, axis=0) == pytest.approx([1.0, 1.0, 1.0], abs=0.45)
 
 
 @pytest.mark.parametrize("missing", [1, 5, 20])

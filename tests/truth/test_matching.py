@@ -120,3 +120,8 @@ def test_an_alarm_in_the_next_operation_of_a_log_belongs_to_its_contact_and_is_n
         Verdict("alarm", (late,), crossings=(late,)), [], statistic(), of_log=[CONTACT], crossings=[late]
     )
     assert second.matches == () and second.false_alarms == ()
+
+
+def test_an_alarm_during_the_contact_is_not_false():
+    matching = match([alarm(5.04), alarm(7.0)], [Contact(5.0, 7.5, 0.01)], statistic())
+    assert matching.false_alarms == ()

@@ -68,7 +68,7 @@ def test_a_rebound_after_a_hole_over_the_first_touch_is_not_the_onset(own_clock)
 def test_a_slow_cell_with_jitter_and_a_lost_sample_is_assessable_unless_near_the_limit():
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 9.0, 1 / 60)
-    time = time + rng.uniform(-0.4, 0.4, len(time)) / 60
+    time = time + rng.uniform(-0.2, 0.2, len(time)) / 60
     force = bump(time)
     keep = np.ones(len(time), dtype=bool)
     keep[np.searchsorted(time, ONSET + 0.095)] = False
