@@ -87,7 +87,7 @@ class PreparedDetector:
         for scored in every:
             detected = self._detected(scored, log)
             if detected is None:
-                skipped += scored.left_out or [Skipped(str(log), "no operation is assessable")]
+                skipped += scored.rows.skipped or [Skipped(str(log), "no operation is assessable")]
             else:
                 found.append(detected)
         if not found:
@@ -98,7 +98,7 @@ class PreparedDetector:
     def _detected(self, scored: ScoredLog, log: Path) -> Detected | None:
         """Return the detection in a scored recording; None if it was left out."""
         matched = scored.matched
-        if scored.recording is None or matched is None or any(scored.detections.failed.values()):
+        if scored.recording is None or matched is None or not all(item.detections for item in matched.judged):
             return None
         return Detected(
             scored.recording,

@@ -58,11 +58,10 @@ def left_out_by(detectors: Mapping[str, Iterable[Skipped]]) -> list[Skipped]:
 
 @dataclass(frozen=True)
 class LogRows:
-    """The rows of a log that do not depend on the detectors.
+    """The rows of a log without those of its operations.
 
     `recording` is None if it was left out. `unchecked`: names of logs assumed to be free of impacts, with the ground
-    truth that is missing from them. `beside`: name and SHA-256 of each file beside the log with a channel. `strokes`:
-    of a log that is not cut.
+    truth that is missing from them. `beside`: name and SHA-256 of each file beside the log with a channel.
     """
 
     recording: RecordingResult | None
@@ -72,7 +71,6 @@ class LogRows:
     findings: tuple[RecordingFinding, ...] = ()
     unchecked: tuple[tuple[str, Finding], ...] = ()
     beside: tuple[tuple[str, str], ...] = ()
-    strokes: int = 0
 
 
 class Detections(NamedTuple):
@@ -87,9 +85,6 @@ class Detections(NamedTuple):
     untaught: Mapping[str, Sequence[RecordingFinding]]
 
 
-_NOTHING_DETECTED = Detections((), {}, {})
-
-
 @dataclass(frozen=True)
 class ScoredLog:
     """One log or run after detection and matching: its rows, and with its samples what the rows are made of.
@@ -101,14 +96,8 @@ class ScoredLog:
     rows: LogRows
     recording: Recording | None = None
     contacts: tuple[Contact, ...] = ()
-    detections: Detections = _NOTHING_DETECTED
     matched: MatchedLog | None = None
     lasts: bool = True
-
-    @property
-    def left_out(self) -> list[Skipped]:
-        """Return everything that was left out; what all detectors left out for the same reason is listed once."""
-        return [*self.rows.skipped, *left_out_by(self.detections.failed)]
 
 
 # Returns the detections in the operations of a log or run, given by its path.
@@ -268,7 +257,7 @@ def _score(
     found = detect(path, operations)
     matched = match_log(replace(read, operations=operations), found.of_operations, group, rules, setup.activation.wait)
     skipped += matched.not_scored
-    findings += matched.about_log
+    findings += matched.findings
     forces, verdicts = list[ForceResult](), dict[int, ForceVerdict]()
     if group in setup.impacts and (profile := setup.impacts[group].force):
         curves = matched.curves
@@ -287,13 +276,12 @@ def _score(
         row,
         tuple(forces),
         tuple(verdicts.values()),
-        tuple(skipped),
-        tuple(findings),
+        (*skipped, *left_out_by(found.failed)),
+        (*findings, *(item for of_detector in found.untaught.values() for item in of_detector)),
         tuple(unchecked),
         beside=recording.beside,
-        strokes=matched.uncut.strokes,
     )
-    return ScoredLog(rows, recording, tuple(contacts), found, matched)
+    return ScoredLog(rows, recording, tuple(contacts), matched)
 
 
 def _force_not_seen(

@@ -10,7 +10,6 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import plain, print_line, progress
-from cdtool.commands.console.options import keys_option
 from cdtool.commands.console.place import Place, location
 
 
@@ -25,9 +24,10 @@ def simulate(
     ] = None,
     settings: Annotated[
         list[str] | None,
-        keys_option(
-            "How many logs, and what differs, repeatable: stiff=4, friction=1.2, format=mcap; docs/simulators.md.",
-            "cdtool.commands.simulate.simulation_table:SimulationTable",
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="How many logs, and what differs, repeatable: stiff=4, friction=1.2, format=mcap; docs/simulators.md.",
         ),
     ] = None,
 ) -> None:

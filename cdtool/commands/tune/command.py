@@ -23,7 +23,7 @@ from cdtool.commands.console.options import DetectorsOption, ForceOption, JsonOp
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
-    from cdtool.commands.tune.result import TuningResult
+    from cdtool.commands.tune.tuned_rows import Tuning
 
 
 def tune(
@@ -81,7 +81,7 @@ def tune(
     leave(left_out, done.findings)
 
 
-def _show(done: TuningResult, *, quiet: bool) -> None:
+def _show(done: Tuning, *, quiet: bool) -> None:
     from cdtool.commands.tune.page import injected_words, rejection_words
     from cdtool.commands.tune.tuned_files import described_choice
 
@@ -103,7 +103,7 @@ def _show(done: TuningResult, *, quiet: bool) -> None:
         say(_meaning(done) + injected_words(done))
 
 
-def _show_table(done: TuningResult) -> None:
+def _show_table(done: Tuning) -> None:
     from cdtool.commands.tune.page import alarms_words, debounce_words, range_words
 
     rows = []
@@ -138,7 +138,7 @@ def _show_table(done: TuningResult) -> None:
     table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} results")
 
 
-def _meaning(done: TuningResult) -> str:
+def _meaning(done: Tuning) -> str:
     from cdtool.commands.tune.page import apparent_words
 
     if done.is_nested:

@@ -12,7 +12,6 @@ from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import plain
 from cdtool.base.remote.remote_path import is_remote
 from cdtool.commands.console.json_schema import refuse_other_schema, with_schema
-from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.tuned_files import (
     LABELS,
     LABELS_MARK,
@@ -25,6 +24,7 @@ from cdtool.commands.tune.tuned_files import (
     tuned_signature,
     tuning_summary,
 )
+from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.formats.signature_store import SIGNATURE, write_signature
 
 PAGE, JSON = "tuning.html", "tuning.json"
@@ -71,7 +71,7 @@ def open_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] =
         raise UsageError(f"{plain(folder)}: cannot be created: {fault.strerror}", "choose another name") from fault
 
 
-def write_tuning(tuning: TuningResult, folder: Path) -> tuple[Path, ...]:
+def write_tuning(tuning: Tuning, folder: Path) -> tuple[Path, ...]:
     """Write what was tuned into a folder, all texts or none; return the files. Raises OutputError, SignatureError."""
     from cdtool.commands.tune.page import tuning_html
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from functools import partial
 
 from cdtool.base.plain_text import counted
-from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.search.objective import Goal
 from cdtool.commands.tune.search.tuned import ChoiceResults, GroupResults, Sensitivity, TunedDetector
 from cdtool.commands.tune.tuned_files import described_choice
+from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, left_out_sections
 from cdtool.report.model import NO_CERTIFICATE
@@ -33,7 +33,7 @@ APPARENT_NOTE = (
 )
 
 
-def tuning_html(tuning: TuningResult) -> str:
+def tuning_html(tuning: Tuning) -> str:
     """Return the page: the same text for the same input."""
     tone, headline = tuning.verdict
     sections = [
@@ -63,7 +63,7 @@ def tuning_html(tuning: TuningResult) -> str:
     ).html()
 
 
-def injected_words(tuning: TuningResult) -> str:
+def injected_words(tuning: Tuning) -> str:
     """Return a sentence about injected contacts; empty if all are real."""
     names = [name for name, group in tuning.setup.impacts.items() if group.injected is not None]
     if not names:
@@ -71,7 +71,7 @@ def injected_words(tuning: TuningResult) -> str:
     return f"The contacts of {', '.join(map(visible, names))} were computed (injected), not measured. "
 
 
-def _detectors_table(tuning: TuningResult) -> Table:
+def _detectors_table(tuning: Tuning) -> Table:
     groups = list(tuning.groups)
 
     def mean(name: str, item: TunedDetector) -> Cell:
@@ -122,7 +122,7 @@ def debounce_words(tuned: TunedDetector) -> str:
     return "9 ms" if tuned.debounce is None else counted(tuned.debounce, "sample")
 
 
-def apparent_words(tuning: TuningResult) -> list[str]:
+def apparent_words(tuning: Tuning) -> list[str]:
     """Return a sentence per detector without nested results: the reason."""
     return [
         f"{visible(item.detector)}: no nested results: {visible(item.why_not_nested)}."

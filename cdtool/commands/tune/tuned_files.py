@@ -19,8 +19,8 @@ from cdtool.base.version import __version__
 from cdtool.commands.judging.settings_table import names_in
 from cdtool.commands.learning.learning import LearnedSignature, Setting, learned_from_runs
 from cdtool.commands.tune.options import TuneTable
-from cdtool.commands.tune.result import TuningResult
 from cdtool.commands.tune.search.tuned import TunedDetector
+from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.results.limits import ALL
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.stored import rule_to_dict
@@ -33,7 +33,7 @@ _ELSEWHERE = ("signature", "safety_factor", "limits")
 _WITH_LOGS, _OF_TABLES = ("learn", "holdout", "inject"), ("impacts", "campaigns", "points")
 
 
-def machine_text(tuning: TuningResult, folder: Path) -> str:
+def machine_text(tuning: Tuning, folder: Path) -> str:
     """Return the machine file with the tuned gains, each with a comment; everything else is kept."""
     import tomlkit
 
@@ -61,7 +61,7 @@ def _detector_table(document: Any, tuned: TunedDetector) -> Any:
     return opened_table(document, "detectors", name)
 
 
-def benchmark_text(tuning: TuningResult, tuned: TunedDetector, factor: float, folder: Path) -> str:
+def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: Path) -> str:
     """Return the benchmark file for one tuned detector and its safety factor: its paths are relative to `folder`."""
     import tomlkit
 
@@ -160,7 +160,7 @@ def _moved(pattern: str, base: Path, folder: Path) -> str:
     return PurePosixPath(between, pattern).as_posix()
 
 
-def labels_text(tuning: TuningResult, folder: Path) -> str | None:
+def labels_text(tuning: Tuning, folder: Path) -> str | None:
     """Return the label file with its recordings named from `folder`; None without a label file."""
     setup = tuning.setup
     if setup.labels is None:
@@ -188,7 +188,7 @@ def _without_other_limits(document: Any, tuned: TunedDetector) -> None:
             del limits[key]
 
 
-def _why(tuning: TuningResult, tuned: TunedDetector) -> list[str]:
+def _why(tuning: Tuning, tuned: TunedDetector) -> list[str]:
     """Return the comment at the head of a benchmark file: what was chosen, and why."""
     lines = [f"{MARK} from {tuning.setup.path.name} for {tuned.detector} at {tuning.options.budget}."]
     for words, figures in (("default", tuned.default_nested or tuned.default_apparent), ("tuned", tuned.honest)):
@@ -203,7 +203,7 @@ def _why(tuning: TuningResult, tuned: TunedDetector) -> list[str]:
     return lines
 
 
-def factor_words(tuning: TuningResult, tuned: TunedDetector) -> str:
+def factor_words(tuning: Tuning, tuned: TunedDetector) -> str:
     """Return how the safety factor was set, in words."""
     words = f"for {tuning.options.budget}, set on {len(tuning.runs.operations)} runs"
     if tuned.correction > 1.0:
@@ -211,7 +211,7 @@ def factor_words(tuning: TuningResult, tuned: TunedDetector) -> str:
     return words
 
 
-def tuned_signature(tuning: TuningResult, tuned: TunedDetector) -> LearnedSignature:
+def tuned_signature(tuning: Tuning, tuned: TunedDetector) -> LearnedSignature:
     """Return the signature file of a tuned detector, learned from all runs; raises SignatureError, UsageError."""
     setup, activation = tuning.setup, tuning.setup.activation
     if tuned.debounce is not None:
@@ -225,7 +225,7 @@ def tuned_signature(tuning: TuningResult, tuned: TunedDetector) -> LearnedSignat
     return replace(learned, signature=replace(learned.signature, current=thresholds, first=thresholds))
 
 
-def tuning_summary(tuning: TuningResult) -> dict[str, Any]:
+def tuning_summary(tuning: Tuning) -> dict[str, Any]:
     """Return the results as JSON values."""
     options = tuning.options
     return {
@@ -256,7 +256,7 @@ def _tuned_values(tuned: TunedDetector) -> dict[str, Any]:
     return {**plain(tuned), **candidates}
 
 
-def files_of(tuning: TuningResult) -> list[tuple[str, TunedDetector]]:
+def files_of(tuning: Tuning) -> list[tuple[str, TunedDetector]]:
     """Return the name of each tuned detector's benchmark file: that of the best one is benchmark.toml."""
     first, *others = tuning.detectors
     return [(BENCHMARK, first), *((f"benchmark_{item.detector}.toml", item) for item in others)]

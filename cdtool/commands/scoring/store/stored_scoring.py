@@ -59,7 +59,7 @@ def _with_traces(outcomes: Sequence[LogOutcome], traces: Mapping[int, Trace]) ->
     """Return outcomes with the traces of some operations, by number counted on through the runs."""
     found, first = [], 0
     for outcome in outcomes:
-        count = outcome.operations
+        count = len(outcome.operations)
         found.append(replace(outcome, traces=tuple(traces.get(first + number) for number in range(count))))
         first += count
     return tuple(found)
