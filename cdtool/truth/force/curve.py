@@ -23,8 +23,8 @@ from cdtool.truth.rest_level import rest_before
 _STUCK = 5
 # Before the rounded top of a smooth peak, the reading one step lower lasts this share of it or more: a parabola 0.2.
 _SLOW = 0.15
-# A cell that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
-_TAIL = 0.1
+# A cell that ends earlier than its log by this time [s] has not recorded all of it.
+TAIL = 0.1
 
 
 @dataclass(frozen=True)
@@ -239,7 +239,7 @@ def _end(recording: Recording, contact: Contact, clock: CellClock) -> float:
     """Return until when samples are expected [s]: the cell's last one, or the log's if the cell ends in the contact."""
     last = float(recording["force"].time[-1])
     pressing = contact.end >= float(clock.time[-1]) - clock.longest_step
-    return recording.end if pressing and recording.end - last > _TAIL else last
+    return recording.end if pressing and recording.end - last > TAIL else last
 
 
 def _resolution(force: FloatArray) -> float:
