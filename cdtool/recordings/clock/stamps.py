@@ -307,7 +307,7 @@ class _RestartDetector:
         if self._step_back is None:
             return None
         bits = wrapped_bits(*self._step_back, usual_step, self._largest) if self._whole else 0
-        # So many consecutive rows that run backward: the clock restarted.
+        # Three consecutive rows that run backward: the clock restarted.
         return {"wrapped_bits": bits} if bits or self._longest >= 3 else None
 
 

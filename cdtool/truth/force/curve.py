@@ -245,7 +245,7 @@ def _end(recording: Recording, contact: Contact, clock: CellClock) -> float:
 def _resolution(force: FloatArray) -> float:
     """Return the step in which readings are written [N]; 0 if they are on no such grid, or too few show one."""
     steps = np.diff(np.unique(force))
-    # Readings that differ by less than this share of the largest are equal: files have six digits or more.
+    # Readings that differ by less than 1e-6 of the largest are equal: files have six digits or more.
     steps = steps[steps > 1e-6 * float(np.max(np.abs(force)))]
     if not len(steps):
         return 0.0
@@ -302,7 +302,7 @@ def _clipped_axis(series: Series, first: int, last: int) -> BoolArray | bool:
     clipped = np.zeros(len(axes), dtype=bool)
     for over, reading in zip(axes.T, readings.T, strict=True):
         largest = float(over[np.argmax(np.abs(over))])
-        # An axis takes part in a contact from this share of the magnitude's peak on.
+        # An axis takes part in a contact from 30 % of the magnitude's peak on.
         if abs(largest) >= 0.3 * peak:
             clipped |= _clipped(np.copysign(1.0, largest) * reading)
     return clipped
