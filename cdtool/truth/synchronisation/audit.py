@@ -314,8 +314,8 @@ def _event(observed: _Predicted, parts: Sequence[_Predicted], window: _Window, w
         delay = EventDelay(delay.time, math.nan, math.nan, delay.explained, reason="the signals do not change enough")
     if delay.known and is_contact:
         period = max(observed.period, *(part.period for part in parts))
-        # A force that rises within a sample period is not resolved: its delay is uncertain by a tenth of the period, and
-        # by less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so.
+        # A force that rises within a sample period is not resolved: its delay is uncertain by a tenth of the period,
+        # and by less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so.
         aliasing = 0.1 * period * min(period / window.rise, 1.0)
         delay = replace(delay, error=math.hypot(delay.error, aliasing))
     return TimedEvent(delay, window.rise)
