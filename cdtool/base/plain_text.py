@@ -11,9 +11,9 @@ from decimal import Decimal
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
 # Length of one printed error, warning or note, including text from files [characters].
 LINE_LENGTH = 300
-#: A list within a sentence has so many items.
+#: Items of a list within a sentence: more make it too long to read.
 NAMED = 3
-#: A list on the screen or a page has so many lines, and one that counts the others.
+#: Lines of a list on the screen or a page; one more counts the others.
 LISTED = 10
 _SINGULAR = {"are": "is", "were": "was", "have": "has"}
 _NONCHARACTERS = frozenset("\ufffe\uffff")

@@ -14,6 +14,7 @@ from cdtool.base.settings import NotNegative, Positive, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.motion.progress import Alignment, Progress
+from cdtool.recordings.motion.speed_course import TIME_RESERVE
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
@@ -31,8 +32,6 @@ ENOUGH_RUNS = 10
 # Not even a forced signature has a spread below these.
 LEAST_RUNS = 2
 
-# The time curve reaches this much beyond the slowest run's acceleration.
-_TIME_RESERVE = 1.5
 #: 40 m in steps of 2 mm; memory and time grow with the places, and a wrong unit makes a thousand times as many.
 MOST_PLACES = 20_000
 
@@ -193,5 +192,5 @@ class Signature:
         for where in wheres:
             part = where.elapsed if self.alignment == "time" else where.elapsed[~where.running]
             lasting.append(float(np.nanmax(part, initial=0.0)))
-        reserve = 1.0 if self.alignment == "time" else _TIME_RESERVE
+        reserve = 1.0 if self.alignment == "time" else TIME_RESERVE
         return reserve * max(lasting, default=0.0)

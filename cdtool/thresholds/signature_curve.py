@@ -16,9 +16,8 @@ from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion.progress import Progress
 from cdtool.recordings.motion.smoothing import moving_mean
+from cdtool.recordings.motion.speed_course import COVERAGE
 
-# A grid point has a limit once this share of the runs has been there.
-COVERAGE = 0.8
 # The spread is nowhere below this share of its median: a quantised signal may not vary at all at some points.
 _SMALLEST_SPREAD = 0.1
 # A sample stands for a grid point at most so many steps before it: of the grid, or of the log where those are wider.

@@ -44,7 +44,7 @@ def reading_step(force: FloatArray) -> float:
     """
     ordered = np.sort(force)
     distances = np.diff(ordered)
-    # Readings closer than this share of the largest one differ by what arithmetic rounds, not by a step of the cell.
+    # Readings closer than 1e-6 of the largest one differ by what arithmetic rounds, not by a step of the cell.
     is_step = distances > 1e-6 * float(np.max(np.abs(force), initial=0.0))
     if not is_step.any():
         return 0.0
@@ -292,7 +292,7 @@ class ContactSearch:
         if self.rest.reaches(onset, sample, -level, _RELEASED * level) or self._goes_on(sample, level, rest):
             return None
         over = self.force[: sample + 1] - rest
-        # What was felt at the start was a contact if it was at least this share of the largest force until its release.
+        # What was felt at the start was a contact if it was a tenth of the largest force until its release, or more.
         if abs(level - rest) < 0.1 * float(np.max(np.abs(over))):
             return None
         _, ends = self._held_runs(0, np.where(np.abs(over) > self.back_to, np.sign(over), 0.0))

@@ -108,7 +108,7 @@ def _from_label(recording: Recording) -> list[Contact]:
         kinds[values > 0.5] = 1
     # A missing sample does not end a contact, unless the log has no other samples without one.
     usual = float(np.median(np.diff(present))) if len(present) > 1 else 1.0
-    # Where a label has no value between contacts, more missing samples than this, by its usual step, are no contact.
+    # Where a label has no value between contacts, more than five missing samples, by its usual step, are no contact.
     behind_hole = (np.diff(present, prepend=-1) > 5 * usual) & bool(np.all(kinds > 0))
     firsts = np.flatnonzero((np.diff(kinds, prepend=0) != 0) | behind_hole)
     ends = np.append(firsts[1:], len(time))[: len(firsts)]

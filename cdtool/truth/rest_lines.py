@@ -19,7 +19,7 @@ INTERVAL = 0.05
 GAP = 0.3
 #: Intervals that a line is fitted to: 1 s, over which drift is straight.
 WINDOW = 20
-#: A line needs so many intervals; of fewer, the level is constant.
+#: Fewer intervals determine no slope: the level is constant.
 _LINE = 6
 # A line is extended for at most this long [s]; after that its last value is used.
 EXTENDED = 1.0

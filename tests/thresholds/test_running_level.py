@@ -15,9 +15,10 @@ from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_ru
 from cdtool.detectors.detection import Band, Status
 from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.momentum import Momentum
+from cdtool.recordings.motion.speed_range import GUARD, MEMORY
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
-from cdtool.thresholds.running_level_kernel import CLIP, FREEZE, GUARD, MEMORY, START, WIDER
+from cdtool.thresholds.running_level_kernel import CLIP, FREEZE, START, WIDER
 from cdtool.thresholds.signature import Signature
 from tests.synthetic.gate_as_recording import as_recording
 from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke

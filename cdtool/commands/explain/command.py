@@ -103,7 +103,7 @@ def _draw(runs: Sequence[ExplainedRun], plot: Path | None, stem: str, *, force: 
         return []
     from cdtool.commands.explain.margin_plot import plot_explanation
 
-    events = [event for run in runs for event in run.events][: LISTED if plot.is_dir() else 1]
+    events = [event for run in runs for event in run.events][: None if plot.is_dir() else 1]
     paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
     paths = [figure_name(path, force=force) for path in paths]
     for (detection, item), path in zip(events, paths, strict=True):

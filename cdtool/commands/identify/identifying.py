@@ -17,7 +17,7 @@ from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import NAMED, counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
-from cdtool.commands.identify.axis.speed_controller import ControllerSettings, identify_controller
+from cdtool.commands.identify.axis.speed_controller import SIGNIFICANT, ControllerSettings, identify_controller
 from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.identifying_robot import RobotIdentification, identify_joints
@@ -41,8 +41,6 @@ from cdtool.recordings.recording import Contact, Recording
 from cdtool.results.results import RecordingFinding, Skipped
 from cdtool.truth.onset_rule import OnsetRule
 
-# A number beyond so many standard errors from 0 is no chance.
-_SIGNIFICANT = 3.0
 _COULOMB = ("coulomb_friction", "coulomb_forward", "coulomb_backward")
 
 
@@ -321,7 +319,7 @@ def _has_opposite_sign(fit: RigidAxisFit | None) -> bool:
     numbers = {item.key: item.numbers for item in fit.identified.not_identifiable} if fit else {}
     signs = (("load_mass", "total_mass"), ("coulomb_friction", "value"))
     return all(
-        numbers.get(key, {}).get(name, 0.0) < -_SIGNIFICANT * numbers.get(key, {}).get("standard_error", math.inf)
+        numbers.get(key, {}).get(name, 0.0) < -SIGNIFICANT * numbers.get(key, {}).get("standard_error", math.inf)
         for key, name in signs
     )
 
@@ -332,7 +330,7 @@ def _refuse_constant_force(fit: RigidAxisFit | None, unit: str) -> None:
         return
     constant = fit.identified["constant_force"]
     friction = [item.value for item in fit.identified.estimates if item.key in _COULOMB]
-    known = abs(constant.value) > _SIGNIFICANT * constant.standard_error
+    known = abs(constant.value) > SIGNIFICANT * constant.standard_error
     # Above a fifth of the Coulomb friction the model of the starts cannot leave it out.
     if known and friction and abs(constant.value) > 0.2 * float(np.mean(friction)):
         raise IdentificationError(

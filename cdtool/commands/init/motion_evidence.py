@@ -14,7 +14,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.commands.init.stream import Stream
 from cdtool.machines.plausibility.drive import explained
 
-# A log is compared in so many windows: noise averages out, strokes do not.
+# Windows in which a log is compared: noise averages out in them, strokes do not.
 _WINDOWS = 400
 # Above this correlation one column is treated as another's derivative.
 FITS = 0.9

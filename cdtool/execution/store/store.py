@@ -25,7 +25,6 @@ from cdtool.base.files.bounded_loading import parse_json, read_bytes
 from cdtool.base.files.locks import is_temporary
 from cdtool.base.files.writing import write_bytes, write_text
 from cdtool.base.remote.remote_path import is_remote
-from cdtool.recordings.units import DAY_S
 
 Kind = Literal["logs", "traces", "learned"]
 _KIND, _SCHEMA = "cdtool store", 2  # a change of the layout counts on
@@ -80,7 +79,7 @@ class Store:
             return None
         if not is_remote(self.folder):
             with suppress(OSError):
-                if path.stat().st_mtime < time.time() - DAY_S:  # older: it is noted that the file is in use
+                if path.stat().st_mtime < time.time() - 86_400.0:  # after a day it is noted that the file is in use
                     os.utime(path)
         return content
 

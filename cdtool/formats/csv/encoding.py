@@ -52,7 +52,7 @@ def looks_like_text(sample: bytes) -> bool:
     if not text or b"\0" in first_line or is_other or begin.startswith((b"<", b"{")):
         return False
     controls = len(text.translate(None, _ALLOWED))
-    # So many may be there by mistake: the error names their line.
+    # A few may be there by mistake: the error names their line.
     return not controls or (b"\0" not in text and controls <= max(3, 0.02 * len(text)))
 
 

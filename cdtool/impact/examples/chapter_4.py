@@ -10,7 +10,6 @@ from cdtool.impact.sensor_ranking import ImpactCase
 from cdtool.impact.sensors import Sensor
 from cdtool.impact.transmissions.transmission import ElasticTransmission, RigidTransmission
 from cdtool.impact.transmissions.transmission_simulation import SimulatedMotion, Start, simulate_impact
-from cdtool.recordings.units import STANDARD_GRAVITY
 
 TRANSMISSION = RigidTransmission(inertia=2.35e-4, friction=0.03, ratio=0.015)
 TORQUE = ConstantTorque(0.5)
@@ -38,7 +37,7 @@ _COUNT = 2.0 * math.pi * 0.015 / 4096
 SENSORS = (
     Sensor("load_cell", "at the contact", "contact_force", "N", 0.001 * _RATED, 0.0, 500.0, 1000.0),
     Sensor("torque_sensor", "in the drive", "drive_force", "N", 0.002 * _RATED, 0.0, 500.0, 1000.0),
-    Sensor("accelerometer", "on the load", "load_acceleration", "m/s2", 0.1, STANDARD_GRAVITY / 4096, 100.0, 1000.0),
+    Sensor("accelerometer", "on the load", "load_acceleration", "m/s2", 0.1, 9.80665 / 4096, 100.0, 1000.0),
     Sensor("motor_position", "on the motor", "motor_position", "m", 0.0, _COUNT, math.inf, 1000.0),
     Sensor("motor_speed", "on the motor", "motor_position", "m/s", 0.0, _COUNT, 60.0, 1000.0, differentiated=True),
     Sensor("motor_torque", "control action", "motor_force", "N", 0.01 * _RATED, 0.0, 200.0, 1000.0),

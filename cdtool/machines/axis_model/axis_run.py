@@ -104,10 +104,10 @@ def _interpolated(series: Series, joint: int, clock: FloatArray) -> FloatArray:
     if len(time) < 2:
         return np.full(len(clock), np.nan)
     usual = float(np.median(np.diff(time)))
-    near = 1e-3 * usual  # a time closer to a sample than this share of a step is that sample's
+    near = 1e-3 * usual  # a time closer to a sample is that sample's
     found: FloatArray = np.interp(clock, time, values)
     after = np.clip(np.searchsorted(time, clock, side="left"), 1, len(time) - 1)
-    # A step longer than this many usual steps of a channel is a gap: nothing is interpolated across it.
+    # A step longer than 3.5 usual steps of a channel is a gap: nothing is interpolated across it.
     in_gap = (time[after] - time[after - 1] > 3.5 * usual) & (clock > time[after - 1] + near)
     found[in_gap & (clock < time[after] - near)] = np.nan
     found[(clock < time[0] - near) | (clock > time[-1] + near)] = np.nan

@@ -60,7 +60,7 @@ def derivative_checks(recordings: Sequence[Recording], channel: str, other: str)
             if check.answer == "agrees" and channel == "speed":
                 expected = np.abs(path[:, j]) / check.value
                 seen = expected > max(_LARGE * float(np.nanquantile(expected, 0.95)), _ABOVE_NOISE * of_change[j])
-                # A change below this share of what the speed says is none.
+                # A change below a tenth of what the speed says is none.
                 still = float(np.mean(np.abs(change[seen, j]) < 0.1 * expected[seen]))
                 if still > _ODD:  # no ratio shows it: at rest there is no ratio
                     check = replace(check, answer="contradicts", found="still", share=still)
@@ -114,5 +114,5 @@ def units_apart(ratio: float, channel: str = "speed") -> str:
     ratio = max(ratio, 1.0 / max(ratio, 1e-300))
     factors = (*_FACTORS, *(_OF_ACCELERATION if channel == "acceleration" else _OF_SPEED))
     factor, units = min(factors, key=lambda item: abs(math.log(ratio / item[0])))
-    # A factor between two units is named if it is within this share: noise and filters change that of an accelerometer.
+    # A factor between two units is named within 15 %: noise and filters change that of an accelerometer.
     return units if abs(ratio / factor - 1.0) < 0.15 else ""

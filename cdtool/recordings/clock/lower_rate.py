@@ -34,6 +34,6 @@ def sampled_rows(values: FloatArray) -> BoolArray | None:
     missing = np.isnan(values)
     rows: BoolArray = np.logical_not(missing if missing.ndim == 1 else missing.all(axis=1))
     steps = np.diff(np.flatnonzero(rows))
-    if len(steps) + 1 < 3 or np.median(steps) < 2.0:  # below this number of values a rate is not evident
+    if len(steps) + 1 < 3 or np.median(steps) < 2.0:  # with two values a rate is not evident
         return None
     return rows

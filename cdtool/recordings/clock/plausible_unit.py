@@ -37,7 +37,7 @@ def contradicted_by_epoch(stamp: float, factor: float) -> str:
     >>> contradicted_by_epoch(1.6e12, 1.0), contradicted_by_epoch(1.6e12, 1e-3), contradicted_by_epoch(1.6e9, 1e-3)
     ('ms', '', '')
     """
-    # No clock counts more than this many seconds, whatever its zero: the year 0 was 6.4e10 s ago.
+    # No clock counts more seconds, whatever its zero: the year 0 was 6.4e10 s ago.
     return unit_since_1970(stamp) if stamp * factor > 1e11 else ""
 
 
@@ -55,7 +55,7 @@ def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float
     that yields a plausible sample rate nearest to 1 kHz. It is empty if the stated unit may be right, or no unit yields
     a plausible rate.
     """
-    some = stamps[:100_000]  # the median of so many steps is known well enough
+    some = stamps[:100_000]  # enough for a median
     steps = np.diff(some)
     # With all steps plausible, so is their median. A step that is NaN is not plausible.
     if len(steps) and steps.min() * factor >= _SHORTEST_STEP and steps.max() * factor <= _LONGEST_STEP:

@@ -49,7 +49,7 @@ def usual_steps(time: FloatArray) -> FloatArray:
         padded[:_BEFORE] = padded[_BEFORE]
         _take_medians(padded, usual[1:])
     usual.flags.writeable = False
-    # Up to this many samples the usual steps are kept with the array of times; beyond, memory is worth more than time.
+    # Up to a million samples the usual steps are kept with the array of times; beyond, memory is worth more than time.
     if not time.flags.writeable and len(time) <= 1 << 20:
         key = id(time)
         _kept[key] = weakref.ref(time, lambda _: _kept.pop(key, None)), usual

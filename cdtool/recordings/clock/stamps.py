@@ -17,6 +17,7 @@ import numpy.typing as npt
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
+from cdtool.base.plain_text import NAMED
 from cdtool.recordings.clock.coarse_clock import fit_line
 from cdtool.recordings.distribution import Distribution
 
@@ -26,8 +27,6 @@ GAP_PERIODS = 2.5
 COARSE_SHARE = 0.2
 # Widths [bits] of counters that may wrap within a log.
 _COUNTER_BITS = (16, 32)
-# The first rows or gaps, up to this many, are listed; the others are only counted.
-_LISTED = 3
 # A jump ahead spans at most this many rows; fewer at the edges of a log, where one side is unknown.
 STRAY_ROWS, EDGE_ROWS = 50, 3
 # A step of about 3 years [s] at an edge of a log is not a pause: the time stamps beyond it are from another clock.
@@ -206,7 +205,7 @@ class GapStatistics:
         steps = np.diff(time)
         gaps = np.flatnonzero(steps > GAP_PERIODS * self._period)
         self._count += len(gaps)
-        self._first += [{"time": float(time[i]), "length": float(steps[i])} for i in gaps[: _LISTED - len(self._first)]]
+        self._first += [{"time": float(time[i]), "length": float(steps[i])} for i in gaps[: NAMED - len(self._first)]]
         usual = steps[steps <= GAP_PERIODS * self._period]
         if len(usual):
             share = len(usual) / (self._regular + len(usual))
@@ -260,7 +259,7 @@ class _RowCount:
     def add(self, rows: npt.NDArray[np.intp], before: int) -> None:
         """Add rows of a piece; `before` is the number of rows before the piece."""
         self.count += len(rows)
-        self._first += (rows[: _LISTED - len(self._first)] + before).tolist()
+        self._first += (rows[: NAMED - len(self._first)] + before).tolist()
 
     def findings(self, rows: int, first_row: int, restart: dict[str, Any] | None = None) -> list[Finding]:
         """Return the finding, given the total of `rows`: a loss if there is a cause, or if many rows are dropped."""
@@ -308,7 +307,7 @@ class _RestartDetector:
         if self._step_back is None:
             return None
         bits = wrapped_bits(*self._step_back, usual_step, self._largest) if self._whole else 0
-        # So many consecutive rows that run backward: the clock restarted.
+        # Three consecutive rows that run backward: the clock restarted.
         return {"wrapped_bits": bits} if bits or self._longest >= 3 else None
 
 

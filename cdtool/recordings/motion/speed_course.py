@@ -47,8 +47,10 @@ class Expected(NamedTuple):
 
 # Grid points along the stroke: a quarter of a percent of it, as fine as a speed is known.
 _POINTS = 400
-# A grid point is known where this share of the runs has been.
-_COVERAGE = 0.8
+# A grid point, or a level, is known where this share of the runs has been.
+COVERAGE = 0.8
+# A time curve reaches this much beyond the slowest run's acceleration: later ones may be slower.
+TIME_RESERVE = 1.5
 # A speed fits within this share of the nominal speed in any case.
 TOLERANCE = 0.05
 
@@ -136,8 +138,7 @@ def learn_course(
         courses.append((where, direction * series.values[:, joint], use))
     whole = alignment == "time"
     lasting = [float(np.max(where.elapsed[use & (whole | ~where.running)], initial=0.0)) for where, _, use in courses]
-    # Half as long again as the slowest run's acceleration: later ones may be slower.
-    longest = max(lasting, default=0.0) * (1.0 if whole else 1.5)
+    longest = max(lasting, default=0.0) * (1.0 if whole else TIME_RESERVE)
     furthest = max((float(np.nanmax(where.travel[use], initial=0.0)) for where, _, use in courses), default=0.0)
     return SpeedCourse(
         alignment,
@@ -188,7 +189,7 @@ def _learned(runs: Sequence[tuple[FloatArray, FloatArray]], end: float) -> Speed
         row[there] = speed[at[there]]
     present = np.isfinite(samples)
     count = present.sum(axis=0)
-    known = count >= max(1.0, _COVERAGE * len(runs))
+    known = count >= max(1.0, COVERAGE * len(runs))
     mean = np.where(present, samples, 0.0).sum(axis=0) / np.maximum(count, 1)
     squares = np.where(present, (samples - mean) ** 2, 0.0).sum(axis=0)
     variance = squares / np.maximum(count - 1, 1)

@@ -31,7 +31,7 @@ from cdtool.recordings.recording import Recording
 
 # Age of a sample that is learned from, and time for which nothing is learned after a departure [s].
 GUARD = 0.3
-# The speed is the mean over about this time, and known after this much of it [s].
+# A speed, or a level, is the mean over about this time; a speed is known after this much of it [s].
 MEMORY, KNOWN = 2.0, 0.1
 # A departure that lasts longer is another speed, which is learned again [s].
 FORGET = 1.0

@@ -36,7 +36,7 @@ _MOST_CURVES = 100
 #: Lines that fit beside the curve.
 _ALARMS_LISTED = 4
 # A record that covers this share of the time axis is drawn as if it covered all of it.
-_WHOLE = 0.99
+WHOLE = 0.99
 _UNSEEN = HATCHES[Status.GAP]
 _ORDER = ("fail", "not_assessable", "pass")
 # The first part of the time axis [s] is the shortest of these with alarms and first peak; the rest is compressed.
@@ -120,7 +120,7 @@ def _draw_curves(axes: Axes, curves: Sequence[TracedForce]) -> None:
         axes.plot(curve.time[kept], curve.force[kept], color=colour, linewidth=width, zorder=4 if rank == 0 else 3)
     worst = curves[0]
     end = axes.get_xlim()[1]
-    if worst.verdict.end < _WHOLE * end:
+    if worst.verdict.end < WHOLE * end:
         axes.axvspan(worst.verdict.end, end, fill=False, edgecolor=NOT_ASSESSED, linewidth=0, hatch=_UNSEEN, zorder=0.6)
     seen = [step for step in worst.verdict.steps if math.isfinite(step.peak)]
     if seen:
@@ -194,7 +194,7 @@ def _handles(ranked: Sequence[Sequence[TracedForce]], end: float) -> list[Artist
     ]
     if any(len(curves) > 1 for curves in ranked):
         handles.insert(1, Line2D([], [], color="0.45", linewidth=0.8, label="other contacts"))
-    if any(curves[0].verdict.end < _WHOLE * end for curves in ranked):
+    if any(curves[0].verdict.end < WHOLE * end for curves in ranked):
         text = "worst contact's record has ended"
         handles.append(Patch(facecolor="white", edgecolor=NOT_ASSESSED, hatch=_UNSEEN, label=text))
     detectors = dict.fromkeys(name for curves in ranked for name in curves[0].alarms)

@@ -23,8 +23,8 @@ from cdtool.truth.rest_level import rest_before
 _STUCK = 5
 # Before the rounded top of a smooth peak, the reading one step lower lasts this share of it or more: a parabola 0.2.
 _SLOW = 0.15
-# A cell that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
-_TAIL = 0.1
+# A cell that ends earlier than its log by this time [s] has not recorded all of it.
+TAIL = 0.1
 
 
 @dataclass(frozen=True)
@@ -239,13 +239,13 @@ def _end(recording: Recording, contact: Contact, clock: CellClock) -> float:
     """Return until when samples are expected [s]: the cell's last one, or the log's if the cell ends in the contact."""
     last = float(recording["force"].time[-1])
     pressing = contact.end >= float(clock.time[-1]) - clock.longest_step
-    return recording.end if pressing and recording.end - last > _TAIL else last
+    return recording.end if pressing and recording.end - last > TAIL else last
 
 
 def _resolution(force: FloatArray) -> float:
     """Return the step in which readings are written [N]; 0 if they are on no such grid, or too few show one."""
     steps = np.diff(np.unique(force))
-    # Readings that differ by less than this share of the largest are equal: files have six digits or more.
+    # Readings that differ by less than 1e-6 of the largest are equal: files have six digits or more.
     steps = steps[steps > 1e-6 * float(np.max(np.abs(force)))]
     if not len(steps):
         return 0.0
@@ -302,7 +302,7 @@ def _clipped_axis(series: Series, first: int, last: int) -> BoolArray | bool:
     clipped = np.zeros(len(axes), dtype=bool)
     for over, reading in zip(axes.T, readings.T, strict=True):
         largest = float(over[np.argmax(np.abs(over))])
-        # An axis takes part in a contact from this share of the magnitude's peak on.
+        # An axis takes part in a contact from 30 % of the magnitude's peak on.
         if abs(largest) >= 0.3 * peak:
             clipped |= _clipped(np.copysign(1.0, largest) * reading)
     return clipped

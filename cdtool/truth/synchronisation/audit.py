@@ -269,13 +269,13 @@ def _latency(
     """Return the latency with the narrowest interval of all smoothings, widened by its change at twice that."""
     period = max(observed.period, *(part.period for parts in sums for part in parts))
     shortest = min(window.end - window.start for window in windows)
-    # Twice the chosen width must still resolve an event: at least this many widths per event [-].
+    # Twice the chosen width must still resolve an event: at least 12 widths per event.
     widths = [factor * period for factor in _WIDTHS if factor * period * 12.0 <= shortest] or [_WIDTHS[0] * period]
     trials = [_joint_events(observed, sums, windows, width) for width in widths]
     counts = [sum(event.delay.known for event in events) for events in trials]
     # A few events by chance, of many, do not show a smoothing to be good.
     scores = [
-        # A smoothing counts if at least this share of the events that another one shows have a delay.
+        # A smoothing counts if it shows a delay in at least 75 % of the events in which another one does.
         _score(events) if count >= 0.75 * max(counts) else math.inf
         for events, count in zip(trials, counts, strict=True)
     ]
@@ -303,20 +303,19 @@ def _event(observed: _Predicted, parts: Sequence[_Predicted], window: _Window, w
     is_contact = not math.isnan(window.rise)
     # A contact that is later than half of its window would be compared with what is not part of it.
     half = 0.5 * (window.end - window.start)
-    # A periodic motion would allow longer ones: filters of drives are shorter than this [s].
+    # A periodic motion would allow longer ones: filters of drives are shorter than 0.1 s.
     longest = min(LONGEST_DELAY, half) if is_contact else max(0.1, 4.0 * width)
     wide = Grid.over(window.start - longest - step, window.end + longest + step, step)
     predicted = sum((part.on(wide, width) for part in parts), np.zeros(wide.count))
     y = SmoothSignal(own, observed.on(own, width))
     delay = delay_of(y, SmoothSignal(wide, predicted), window.start, window.end, longest, is_contact)
-    # A delay whose standard error is larger than this [s] says nothing.
+    # A delay whose standard error is above 50 ms says nothing.
     if delay.known and delay.error > 0.05:
         delay = EventDelay(delay.time, math.nan, math.nan, delay.explained, reason="the signals do not change enough")
     if delay.known and is_contact:
         period = max(observed.period, *(part.period for part in parts))
-        # A force that rises within a sample period is not resolved: its delay is uncertain by this share of the period,
-        # and by less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so
-        # much.
+        # A force that rises within a sample period is not resolved: its delay is uncertain by a tenth of the period,
+        # and by less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so.
         aliasing = 0.1 * period * min(period / window.rise, 1.0)
         delay = replace(delay, error=math.hypot(delay.error, aliasing))
     return TimedEvent(delay, window.rise)

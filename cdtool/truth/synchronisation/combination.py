@@ -194,7 +194,6 @@ def _without_outliers(times: FloatArray, delays: FloatArray, errors: FloatArray)
     about = delays - slope * times
     distance = np.abs(about - np.median(about))
     spread = MAD_TO_STD * float(np.median(distance))
-    # An event further from the others than this many standard deviations (robust), and than its own errors, is not
-    # used.
+    # An event further from the others than six robust standard deviations, or six of its own errors, is not used.
     kept: BoolArray = distance <= 6.0 * np.maximum(spread, errors)
     return kept

@@ -219,7 +219,7 @@ def _half(latency: ChannelLatency) -> float:
 def _is_unclear(drift: Interval, rests_on: RestsOn) -> bool:
     """Return True for a drift that is not assessable, or that of channels of one device if it may be zero."""
     is_zero = drift.low <= 0.0 <= drift.high
-    # No clock drifts by 1 ms/s: a drift known no better than this to each side is not assessable.
+    # No clock drifts by 1 ms/s: a drift that is known no better to each side is not assessable.
     return drift.high - drift.low > 2e-3 or (rests_on == "derivative" and is_zero)
 
 
@@ -241,7 +241,7 @@ def _by_kind(events: Sequence[TimedEvent]) -> tuple[Interval, Interval]:
         return _UNKNOWN, _UNKNOWN
     ratios = [later / max(rise, 1e-6) for rise, later in pairwise(rises[1:-1])]
     widest = max(range(len(ratios)), key=ratios.__getitem__)
-    if ratios[widest] < 2.5:  # the rise times of soft contacts are at least so many times those of stiff ones
+    if ratios[widest] < 2.5:  # soft contacts rise at least so much slower than stiff ones
         return _UNKNOWN, _UNKNOWN
     limit = rises[widest + 1]
     stiff = [event.delay for event in events if event.rise <= limit]

@@ -96,7 +96,7 @@ class ControllerSettings:
 # A less plausible source of the error, or another rate of the controller, must leave less than this share of the cost.
 _OTHER_SOURCE_SHARE = 0.5
 # A gain within so many standard errors of 0 is compatible with 0.
-_SIGNIFICANT = 3.0
+SIGNIFICANT = 3.0
 # A fit begins with a speed filter at this share of the sampling rate.
 _FIRST_CORNER = 0.15
 # A lag of this share of a period is none; a fit with a limit begins with at most so many periods, as a limit that is
@@ -374,7 +374,7 @@ def _standard_errors(fit: _Fit, is_command: bool) -> FloatArray:
         other_influence = np.add.reduceat(weighted * residual[:, np.newaxis], blocks, axis=0) @ other
         moved = np.abs(np.sum(other_influence, axis=0))
         scatter = np.sqrt(degrees * np.sum((other_influence - influence) ** 2, axis=0))
-        systematic = np.maximum(systematic, np.where(moved > _SIGNIFICANT * scatter, moved, 0.0))
+        systematic = np.maximum(systematic, np.where(moved > SIGNIFICANT * scatter, moved, 0.0))
     return np.asarray(np.hypot(statistical, systematic) / scale)
 
 
@@ -794,7 +794,7 @@ def identify_controller(runs: Sequence[AxisRun], settings: ControllerSettings | 
     fit, errors = _with_unknown_rate(fit, errors, source.is_command)
     if not (source.is_command or source.from_position):
         errors = np.hypot(errors, _moved_by_noise(fit))
-    if fit.model.values["speed_gain"] < -_SIGNIFICANT * errors[fit.model.free.index("speed_gain")]:
+    if fit.model.values["speed_gain"] < -SIGNIFICANT * errors[fit.model.free.index("speed_gain")]:
         raise IdentificationError(
             f"{runs[0].name}: the controller's output falls where the speed error rises",
             "check the signs (scale) of torque, speed and references in [channels]",
@@ -820,7 +820,7 @@ def _without_zeros(fit: _Fit, is_command: bool) -> tuple[_Fit, FloatArray]:
     errors = _standard_errors(fit, is_command)
     for name in ("position_gain", "integral_gain"):
         free, value = fit.model.free, abs(fit.model.values[name])
-        if name in free and not value > _SIGNIFICANT * errors[free.index(name)]:
+        if name in free and not value > SIGNIFICANT * errors[free.index(name)]:
             fit = _OutputError(fit.sections, fit.model.without(name)).fit(_LAST, 1e-12)
             errors = _standard_errors(fit, is_command)
     return fit, errors

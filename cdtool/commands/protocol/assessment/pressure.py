@@ -18,15 +18,17 @@ from cdtool.base.errors import RecordingError
 from cdtool.commands.protocol.assessment.sampling import sample_rate
 from cdtool.recordings.recording import CONTACT_PRESSURE, Contact, Recording, Series
 from cdtool.recordings.units import UNITS
-from cdtool.truth.force.curve import ForceTimeCurve, force_time_curve
+from cdtool.truth.force.curve import TAIL, ForceTimeCurve, force_time_curve
 from cdtool.truth.force.limits import ForceProfile, ForceStep, PressureLimit
 from cdtool.truth.force.verdict import ForceVerdict, Outcome, assess_force
 from cdtool.truth.missing_samples import cell_samples
 from cdtool.truth.rest_level import RunningRest
 
 _PA = UNITS["N/cm2"].factor
-# A sensor that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
-_TAIL = 0.1
+# A record that begins within this time [s] before a contact may show no rest at all: a slow contact begins with it.
+EARLY = 0.6
+# Its first readings, over this time [s], are those nearest to the rest.
+FIRST = 0.01
 # An entered peak that differs from the recorded one by more than this share of the larger is shown as a deviation.
 SAME_PEAK = 0.1
 
@@ -117,14 +119,13 @@ def pressure_record(
         curve = force_time_curve(own, replace(contact, rest=rest, hole=0.0), until=until)
     except RecordingError:
         return None
-    if contact.end >= time[-1] and recording.end - time[-1] > _TAIL:
+    if contact.end >= time[-1] and recording.end - time[-1] > TAIL:
         # The sensor ends in the contact: the rest of it is a hole.
         curve = replace(curve, end=min(recording.end, until) - contact.start)
     noise = float(np.max(np.abs(pressure[near] - rest), initial=0.0))
     begin = time[before][0]
-    # A record that begins within 0.6 s before the contact may show no rest at all.
-    first = float(np.mean(pressure[before & (time <= begin + 0.01)]))
-    rest_error = abs(rest - first) if contact.start - begin < 0.6 else 0.0
+    first = float(np.mean(pressure[before & (time <= begin + FIRST)]))
+    rest_error = abs(rest - first) if contact.start - begin < EARLY else 0.0
     return PressureRecord(curve, rest, line.drift, rest_error, rises=curve.peak > noise)
 
 
