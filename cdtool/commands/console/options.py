@@ -91,13 +91,18 @@ QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Only the concl
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
-def set_option(example: str) -> Any:
-    """Return the option --set for the keys of a benchmark file, with one as an example."""
+def keys_option(meaning: str, model: str) -> Any:
+    """Return the option --set of the keys of a model, named as module:Class, with what its help says."""
+    return typer.Option("--set", metavar="KEY=VALUE", help=meaning, autocompletion=completions.keys(model))
+
+
+def set_option(example: str, table: str) -> Any:
+    """Return the option --set for the keys of a table of `judging.settings_table`, with one as an example."""
     meaning = f"As {example}; the last of a key counts; docs/benchmark-file.md."
-    return typer.Option("--set", metavar="KEY=VALUE", help=meaning)
+    return keys_option(meaning, f"cdtool.commands.judging.settings_table:{table}")
 
 
-SetOption = Annotated[list[str] | None, set_option("activation.debounce=9")]
+SetOption = Annotated[list[str] | None, set_option("activation.debounce=9", "JudgingTable")]
 
 
 def logs_argument(description: str) -> Any:

@@ -55,7 +55,7 @@ def detect(
     benchmark: BenchmarkOption = None,
     signature: SignatureOption = None,
     detectors: DetectorOption = None,
-    settings: Annotated[list[str] | None, set_option("threshold.name=baseline")] = None,
+    settings: Annotated[list[str] | None, set_option("threshold.name=baseline", "DetectionTable")] = None,
     contact_at: Annotated[
         str, typer.Option("--contact-at", metavar="LINK:X,Y,Z", help="Robots: estimate the force there [m].")
     ] = "",

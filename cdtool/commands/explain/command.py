@@ -50,7 +50,7 @@ def explain(
     benchmark: BenchmarkOption = None,
     signature: SignatureOption = None,
     detectors: DetectorOption = None,
-    settings: Annotated[list[str] | None, set_option("threshold.name=baseline")] = None,
+    settings: Annotated[list[str] | None, set_option("threshold.name=baseline", "DetectionTable")] = None,
     plot: Annotated[
         Place | None,
         typer.Option("--plot", parser=location, help="Figure of the first event; a folder for all."),

@@ -35,7 +35,7 @@ def learn_signature(
     machine: MachineOption,
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Signature file to write (.json).")],
     detectors: RequiredDetectorOption,
-    settings: Annotated[list[str] | None, set_option("threshold.name=cusum")] = None,
+    settings: Annotated[list[str] | None, set_option("threshold.name=cusum", "LearningTable")] = None,
     false_alarm_budget: BudgetOption = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,

@@ -40,7 +40,7 @@ def score(
         ),
     ],
     output: OutputOption = None,
-    settings: Annotated[list[str] | None, set_option("triggers.clock=source")] = None,
+    settings: Annotated[list[str] | None, set_option("triggers.clock=source", "JudgingTable")] = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
     force: ForceOption = False,

@@ -42,7 +42,7 @@ FileArgument = Annotated[
         metavar="SIGNATURE",
     ),
 ]
-UpkeepOption = Annotated[list[str] | None, set_option("onset.above_n=20")]
+UpkeepOption = Annotated[list[str] | None, set_option("onset.above_n=20", "UpkeepTable")]
 
 
 @signature.command("show", epilog=statuses_words("signature show"))

@@ -10,6 +10,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import plain, print_line, progress
+from cdtool.commands.console.options import keys_option
 from cdtool.commands.console.place import Place, location
 
 
@@ -24,10 +25,9 @@ def simulate(
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="How many logs, and what differs, repeatable: stiff=4, friction=1.2, format=mcap; docs/simulators.md.",
+        keys_option(
+            "How many logs, and what differs, repeatable: stiff=4, friction=1.2, format=mcap; docs/simulators.md.",
+            "cdtool.commands.simulate.simulation_table:SimulationTable",
         ),
     ] = None,
 ) -> None:

@@ -9,7 +9,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import statuses_words
 from cdtool.commands.console.console import number, plain, print_json, print_line, table
-from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption
+from cdtool.commands.console.options import ForceOption, JsonOption, MachineOption, keys_option
 from cdtool.commands.console.place import Place, location
 
 if TYPE_CHECKING:
@@ -38,10 +38,9 @@ def sensors(
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="A key of the study file in place of its value, repeatable, as impact.speed=0.2.",
+        keys_option(
+            "A key of the study file in place of its value, repeatable, as impact.speed=0.2.",
+            "cdtool.commands.study.study_file:StudyTable",
         ),
     ] = None,
     output: Annotated[

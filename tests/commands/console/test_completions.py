@@ -12,6 +12,8 @@ from typer.main import get_command
 from cdtool.commands.app import app
 from cdtool.commands.console import completions
 from cdtool.detectors import DETECTORS
+from cdtool.recordings.operations import HOW_TO_CUT
+from cdtool.thresholds import THRESHOLDS
 
 
 def completed(*words):
@@ -49,13 +51,26 @@ def test_a_list_of_detectors_is_completed_at_its_last_name():
 
 def test_every_registered_name_is_a_completion():
     assert completions.detectors("") == [*DETECTORS.names(), *DETECTORS.short_names]
+    assert completions.thresholds("") == THRESHOLDS.names()
+    assert completed("detect", "--set", "operations=") == [f"operations={how}" for how in HOW_TO_CUT]
 
 
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
+        (("learn-signature", "--set", "threshold.name=cu"), ["threshold.name=cusum"]),
+        (("learn-signature", "--set", "signature.r"), ["signature.rule="]),
+        (("learn-signature", "--set", "signature.rule=t"), ["signature.rule=thesis"]),
+        (("detect", "--set", "activation.latch="), ["activation.latch=true", "activation.latch=false"]),
+        (("signature", "update", "--set", "ex"), ["execution.timeout_s=", "execution.retries="]),
         (("list", "KIND", "w"), ["writers"]),
+        (("tune", "--set", "tune.ob"), ["tune.objective="]),
+        (("inject", "--set", "inject.form"), ["inject.format="]),
+        (("benchmark", "--set", "tune.ob"), []),
+        (("score", "--set", "tri"), ["triggers.clock=", "triggers.listed_only="]),
+        (("score", "--set", "th"), []),
         (("plan", "--detectors", "feekf,g"), ["feekf,gm"]),
+        (("simulate", "--set", "fri"), ["friction="]),
     ],
 )
 def test_other_values_are_completed(words, expected):
