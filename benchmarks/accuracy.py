@@ -42,6 +42,9 @@ from cdtool.thresholds.base import FittedThreshold
 from cdtool.truth.matching import match
 from cdtool.truth.onset import find_contacts
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.synthetic import arm_as_recording, gate_as_recording
+
 IMPACTS = ("stiff", "soft")
 HEADS = ("missed", "false", "reference", "worst seed")
 WITHIN = 0.25
@@ -235,14 +238,14 @@ STIFF_2_MEDIAN = Cell("T2 stiff, median", "stiff", STIFF_2.reference, median)
 def simulate_gate(seed: int, group: str, number: int) -> Recording:
     """Simulate one run with the seeds of the command line."""
     gate, rng = GateParameters(), np.random.default_rng([seed, GROUPS.index(group), number])
-    return gate_recordings.as_recording(simulate_gate_run(gate, rng, IMPACT_OF[group]), f"{group}/{number:02d}", gate)
+    return gate_as_recording.as_recording(simulate_gate_run(gate, rng, IMPACT_OF[group]), f"{group}/{number:02d}", gate)
 
 
 def simulate_arm(trial: Trial, seed: int, group: str, number: int) -> Recording:
     """Simulate one run with the seeds of the command line."""
     rng = np.random.default_rng([seed, trial, GROUPS.index(group), number])
     run = simulate_arm_run(ArmParameters(), rng, trial, IMPACT_OF[group])
-    return arm_recordings.as_recording(run, f"{group}/{number:02d}")
+    return arm_as_recording.as_recording(run, f"{group}/{number:02d}")
 
 
 def gate(seeds: Sequence[int]) -> list[Requirement]:

@@ -40,7 +40,6 @@ from cdtool.commands.inject.axis_contact import axis_contact  # noqa: E402
 from cdtool.commands.inject.injected_logs import injected_recording  # noqa: E402
 from cdtool.commands.inject.with_injected import refusal  # noqa: E402
 from cdtool.commands.simulate.gate_model import Impact, simulate_gate_run  # noqa: E402
-from cdtool.commands.simulate.gate_recordings import as_recording  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402
 from cdtool.formats.machine_file import read_machine_file  # noqa: E402
 from cdtool.machines.axis import Axis  # noqa: E402
@@ -55,6 +54,7 @@ from cdtool.results.agreement import with_model_error  # noqa: E402
 from cdtool.thresholds.signature import Signature  # noqa: E402
 from tests.machines.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle  # noqa: E402
 from tests.synthetic import plain_gate  # noqa: E402
+from tests.synthetic.gate_as_recording import as_recording  # noqa: E402
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, free_recording, without_references  # noqa: E402
 
 SEEDS, PAIRS, LEARNED = 5, 8, 14

@@ -1,7 +1,7 @@
 from .alarms.pipeline import Detection as Detection
 from .base.errors import CdtoolError as CdtoolError
 from .base.version import __version__ as __version__
-from .commands.compare.comparing import compare as compare
+from .commands.compare.comparison import compare as compare
 from .commands.compare.planning import plan as plan
 from .commands.convert.converting import convert as convert
 from .commands.convert.recovering import recover as recover

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import settings
 
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recordings.recording import Recording
 from tests import markers
+from tests.synthetic.gate_as_recording import as_recording
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 
 # Tests have no deadline: a busy machine takes longer for an example. Each run tries other examples than the one before,

@@ -11,8 +11,10 @@ from decimal import Decimal
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
 # Length of one printed error, warning or note, including text from files [characters].
 LINE_LENGTH = 300
-# So many names or lines of a list are shown.
-_NAMED = 3
+#: Items of a list within a sentence: more make it too long to read.
+NAMED = 3
+#: Lines of a list on the screen or a page; one more counts the others.
+LISTED = 10
 _SINGULAR = {"are": "is", "were": "was", "have": "has"}
 _NONCHARACTERS = frozenset("\ufffe\uffff")
 
@@ -126,8 +128,8 @@ def first_of(names: Sequence[str]) -> str:
     >>> first_of(["a", "b"]), first_of(["a", "b", "c", "d", "e"])
     ('a, b', 'a, b, c and 2 more')
     """
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return f"{', '.join(names[:_NAMED])}{more}"
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{', '.join(names[:NAMED])}{more}"
 
 
 def shown_lines(numbers: Sequence[int]) -> str:
@@ -136,7 +138,7 @@ def shown_lines(numbers: Sequence[int]) -> str:
     >>> shown_lines([3]), shown_lines([1, 2, 3]), shown_lines([3, 9, 12, 20])
     ('line 3', 'lines 1 to 3', '4 lines (3, 9, 12, ...)')
     """
-    return counted_lines(len(numbers), numbers[:_NAMED], numbers[-1])
+    return counted_lines(len(numbers), numbers[:NAMED], numbers[-1])
 
 
 def counted_lines(count: int, first: Sequence[int], last: int) -> str:

@@ -18,9 +18,6 @@ from cdtool.base.errors import CdtoolError, UsageError, nearest
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-# A hint has room for so many names.
-_FEW = 10
-
 
 @dataclass(frozen=True)
 class Registry:
@@ -159,7 +156,7 @@ class Registry:
 
     def _hint(self, name: str, known: list[str]) -> str:
         """Return the nearest known names, or all of them if they are few; then where the list is."""
-        if len(known) <= _FEW:
+        if len(known) <= 10:  # as a hint has room for
             return nearest(name, known)
         close = get_close_matches(name, sorted(known), n=2, cutoff=0.5)
         listed = f"cdtool list {self.kind}s shows all"

@@ -10,6 +10,7 @@ from typing import Any
 
 from cdtool.base.plain_text import counted, digits, shorten
 
+#: Leaves most of a line to what is wrong with the value.
 _LONGEST = 60
 _NO_NUMBER = re.compile(r"(?:could not convert string to float|invalid literal for int\(\) with base 10): (.*)")
 _WRONG_KIND = (TypeError, AttributeError, IndexError)

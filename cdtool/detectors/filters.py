@@ -13,8 +13,10 @@ from cdtool.detectors.base import BRIDGED
 from cdtool.recordings.clock import GAP_PERIODS, HOLD_PERIODS
 from cdtool.recordings.clock.recent_steps import usual_steps
 
-# Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
-_SETTLE = 3.0 * math.sqrt(2.0)
+# Time constants after which 5 % of a start are left.
+SETTLED = 3.0
+# Time in which a Butterworth filter of cut-off 1 rad/s has settled so far: its poles have a real part of 1 / sqrt(2).
+_SETTLE = SETTLED * math.sqrt(2.0)
 # The fewest samples that determine a cubic with one to spare.
 _FEWEST = 5
 # No gap is cut into more steps than this.

@@ -28,9 +28,8 @@ from cdtool.recordings.clock import HOLD_PERIODS
 from cdtool.recordings.clock.recent_steps import usual_steps
 from cdtool.recordings.recording import Recording
 
-# The accelerometer's bias is averaged while the axis stands still, over at most this time [s].
-_STANDSTILL_WINDOW = 0.3
-_STANDSTILL_AT_LEAST = 0.1
+# The accelerometer's bias is averaged while the axis stands still, over at most and at least this time [s].
+_STANDSTILL_WINDOW, _STANDSTILL_AT_LEAST = 0.3, 0.1
 # Over a longer gap than this [s], because of vibration, the change of the speed is better than a straight line.
 _LONGEST_LINE = 0.02
 

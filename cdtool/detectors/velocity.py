@@ -21,14 +21,13 @@ from cdtool.detectors.base import (
     require_positive,
 )
 from cdtool.detectors.detection import Signal, Status, StatusArray
+from cdtool.detectors.filters import SETTLED
 from cdtool.detectors.look import SKY, Look
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.recordings.recording import Recording
 
 # Number of steps whose matrices are computed together: they fit into the processor's cache.
 _STEPS = 2048
-# Number of time constants of the slowest mode after which a residual is valid: 5 % of the start are left.
-_SETTLED = 3.0
 # x - x^2/2! + x^3/3! ..., four powers in a row: 1 - exp(-x) up to x = 0.3, where the first term left out is 1e-17.
 _SERIES = np.array([-((-1.0) ** k) / math.factorial(k) for k in range(1, 13)]).reshape(3, 4)
 # A mode is not faster than the slowest by more: its time constant is 0 up to rounding.
@@ -148,7 +147,7 @@ def observe_velocity(
         targets = (0.5 * (balance[ends[1:]] + balance[ends[:-1]]) - (mass @ rates[:, :, np.newaxis])[:, :, 0]) / root
         scaled = mass / np.outer(root, root)
         # The slowest mode counts only while the residual settles, which begins again only after a long step.
-        settles = np.logical_or.accumulate((elapsed > BRIDGED) | (since < _SETTLED))
+        settles = np.logical_or.accumulate((elapsed > BRIDGED) | (since < SETTLED))
         shares, slowest = relaxations(scaled, elapsed, settles)
         restarts = settles & (elapsed > np.maximum(3.0 * slowest, BRIDGED))
         shares[restarts], targets[restarts] = np.eye(len(gains)), 0.0
@@ -156,7 +155,7 @@ def observe_velocity(
         total = since + np.cumsum(np.where(restarts | ~settles, 0.0, elapsed / slowest))
         part = total - np.maximum.accumulate(np.where(restarts, total, 0.0))
         settled[begin : begin + len(elapsed)], since = part, part[-1]
-    status[known] = np.where(settled < _SETTLED, Status.START_UP, Status.VALID)[:, np.newaxis]
+    status[known] = np.where(settled < SETTLED, Status.START_UP, Status.VALID)[:, np.newaxis]
     return root * values[np.cumsum(~missing)], status
 
 

@@ -20,6 +20,7 @@ from time import monotonic
 from typing import Any
 
 from cdtool.base.errors import WorkerError
+from cdtool.base.files.bounded_loading import MIB
 from cdtool.execution.in_worker import HEADER, Failed, NotBegun, Outcome, ended_words, limit_words, serve
 from cdtool.execution.starting import shares_memory, without_interruption
 
@@ -29,8 +30,6 @@ _MOST_PROCESSES = 61 if os.name == "nt" else sys.maxsize
 _MOST_RESTARTS = 3
 # A process is ready within this time, if there is a time limit [s].
 _READY_WITHIN = 60.0
-# Of an outcome, at most so much is read at once [bytes].
-_AT_ONCE = 1 << 20
 
 
 class _Process:
@@ -62,7 +61,7 @@ class _Process:
         Nothing waits for a process that is ended, or stopped, while it sends.
         """
         try:
-            content = self.pipe.recv(_AT_ONCE)
+            content = self.pipe.recv(MIB)
         except BlockingIOError:
             return []
         except OSError as fault:

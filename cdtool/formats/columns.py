@@ -11,9 +11,6 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
 
-# Codes are integers from -2^52 down by less than 2^48: float64 represents integers down to -2^53 exactly.
-_FIRST_CODE, _CODE_BYTES = 2**52, 6
-
 
 def as_float64(values: npt.ArrayLike) -> FloatArray:
     """Return numbers of a file as a contiguous float64 array, without a copy if they are one.
@@ -54,8 +51,9 @@ class Categories:
         """Return the number of a text; the same text has the same number."""
         code = self._codes.get(text)
         if code is None:
-            digest = hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=_CODE_BYTES).digest()
-            code = self._codes[text] = -float(_FIRST_CODE + int.from_bytes(digest, "big"))
+            digest = hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=6).digest()
+            # Integers from -2^52 down by less than 2^48: float64 represents integers down to -2^53 exactly.
+            code = self._codes[text] = -float(2**52 + int.from_bytes(digest, "big"))
         return code
 
     @property

@@ -19,8 +19,10 @@ from cdtool.formats.columns import as_float64
 from cdtool.recordings.clock import THREE_YEARS
 from cdtool.recordings.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
 
-# The first stamps may be missing: so many are searched.
-_SEARCHED = 1000
+# The years 2000 to 2100 in days since 1899-12-30, as counted by Excel.
+EXCEL_2000, EXCEL_2100 = 36526.0, 73051.0
+# A clock in days steps by less than this (4 s); a clock in seconds that steps by less samples above 20 kHz.
+SHORTEST_STEP = 5e-5
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ class EpochClock:
     first: Fraction | None = field(init=False)
 
     def __post_init__(self) -> None:
-        stamps = (stamp for stamp in self.read(0, _SEARCHED) if np.isfinite(stamp))
+        # The first stamps may be missing.
+        stamps = (stamp for stamp in self.read(0, 1000) if np.isfinite(stamp))
         first = next(stamps, None)
         exact = int(first) if isinstance(first, np.integer) else None if first is None else float(first)
         object.__setattr__(self, "first", None if exact is None else Fraction(exact))

@@ -27,6 +27,7 @@ from cdtool.thresholds.fitted_signature import known
 from cdtool.thresholds.normal_motion import NormalMotion
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict, rule_from_dict, rule_to_dict
 
+# Of the layout of a file: a change of it counts on.
 SCHEMA_VERSION = 5
 # Version 3 has no plausible ranges and speed courses, and before 5 there were other normal motions, or none.
 _READABLE = (3, 4, SCHEMA_VERSION)

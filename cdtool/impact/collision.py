@@ -22,13 +22,10 @@ from cdtool.impact.impact import Collision, Impact
 
 # The state: penetration, V_1, V_2, impulse, contact work, friction loss.
 _DEPTH, _SPEED_1, _SPEED_2, _IMPULSE, _WORK, _FRICTION = range(6)
-_RELATIVE, _ABSOLUTE = 1e-10, 1e-13
 # Samples of compression and of restitution; the moment between both is a sample.
 _SAMPLES = 501
 # The range in which the scale of a contact is sought [m]: from far below an atom to a kilometre.
 _DEPTHS: FloatArray = np.geomspace(1e-13, 1e3, 1601)
-_PATIENCE = 100.0
-_BISECTIONS = 50
 # A rebound slower than this share of the approach is rest.
 _AT_REST = 1e-9
 
@@ -83,7 +80,7 @@ def collide(law: ContactLaw, bodies: Bodies, contacts: int = 1, longest: float |
 def _contact(law: ContactLaw, bodies: Bodies, time: float, longest: float | None) -> list[_Stretch]:
     """Return compression, and restitution if compression ends: two phases, because some laws change between them."""
     depth, scale = _scales(law, bodies)
-    patience = _PATIENCE * scale if longest is None else longest
+    patience = 100.0 * scale if longest is None else longest  # no contact of these laws lasts so long
     mass, speed = bodies.effective_mass, bodies.approach_speed
     energy = mass * speed**2
     size = np.array([depth, speed, speed, mass * speed, energy, energy])
@@ -128,7 +125,7 @@ def _stretch(
 
     events = [_event(falling, -1.0)] + ([] if rising is None else [_event(rising, 1.0)])
     found: Any = solve_ivp(
-        bounded(motion), span, begin, "DOP853", events=events, dense_output=True, rtol=_RELATIVE, atol=_ABSOLUTE * size
+        bounded(motion), span, begin, "DOP853", events=events, dense_output=True, rtol=1e-10, atol=1e-13 * size
     )
     met = next((i for i, times in enumerate(found.t_events) if len(times)), None)
     return _Stretch(law, found.sol, span[0], float(found.t[-1]), met)
@@ -215,7 +212,7 @@ def _force_ends(stretch: _Stretch) -> float:
     if not len(pressed) or pressed[-1] >= _SAMPLES - 2:
         return stretch.end
     with_force, without = times[pressed[-1]], times[pressed[-1] + 1]
-    for _ in range(_BISECTIONS):
+    for _ in range(50):  # to the last bit of the time
         middle = 0.5 * (with_force + without)
         if stretch.forces(np.array([middle]))[0] > 0.0:
             with_force = middle

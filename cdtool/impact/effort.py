@@ -8,8 +8,8 @@ from typing import Any
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
 
+#: Some 10 s of work; an impact takes a few thousand, a window of many swings or contacts a hundred thousand.
 MOST_EVALUATIONS = 500_000
-"""Some 10 s of work; an impact takes a few thousand, a window of many swings or contacts a hundred thousand."""
 
 
 def bounded(rates: Callable[[float, FloatArray], list[float]]) -> Callable[[float, Any], list[float]]:

@@ -21,7 +21,6 @@ _RESTITUTION_SERIES = (-2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42
 _DAMPING_SERIES = (3 / 2, 3 / 2, 27 / 20, 6 / 5, 759 / 700, 351 / 350, 6639 / 7000)
 # Below it a series of seven terms is more exact than the closed form, which subtracts near-equal numbers there.
 _SERIES_BELOW = 0.02
-_HALVINGS = 64
 
 
 @dataclass(frozen=True)
@@ -134,7 +133,7 @@ def hunt_crossley_damping_number(restitution: npt.ArrayLike) -> FloatArray:
         raise UsageError("a restitution lies outside 0 to 1", "e is 0 for plastic, 1 for elastic")
     within = np.clip(e, np.finfo(np.float64).tiny, 1.0 - _SERIES_BELOW)
     low, high = 1.0 - within, np.ones_like(within)
-    for _ in range(_HALVINGS):
+    for _ in range(64):  # halvings, to the last bit
         middle = 0.5 * (low + high)
         with np.errstate(divide="ignore"):
             below = middle / within + middle - np.log1p(middle / within) + np.log1p(-middle) > 0.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from cdtool.impact.linearised import resonances
 from cdtool.impact.transmissions.transmission import ElasticTransmission
 
+#: Up to this share of the limit 4.36 the motor's motion differs from the load's by some 10 %.
 RIGID_SHARE = 0.1
-"""Up to this share of the limit 4.36 the motor's motion differs from the load's by some 10 %."""
 
 
 @dataclass(frozen=True)

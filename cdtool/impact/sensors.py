@@ -13,8 +13,6 @@ from cdtool.impact.checks import require_not_negative, require_positive
 QUANTITIES = ("contact_force", "drive_force", "load_acceleration", "motor_position", "motor_force")
 """What a sensor may measure: each on the load side [N, N, m/s2, m, N]."""
 
-_FINEST = 5e-5
-
 
 @dataclass(frozen=True)
 class Sensor:
@@ -99,7 +97,7 @@ class Sensor:
         from scipy.signal import lfilter
 
         period = 1.0 / self.sample_rate
-        phases = max(8, math.ceil(period / _FINEST))
+        phases = max(8, math.ceil(period / 5e-5))  # instants at most 50 us apart
         fine = period / phases
         samples = max(1, int(time[-1] / period))
         at = np.arange(samples * phases) * fine

@@ -16,9 +16,6 @@ from cdtool.base.arrays import FloatArray
 from cdtool.machines.dynamics import JointEquation
 from cdtool.machines.joint_machine import JointMachine
 
-# A singular value of the Jacobian below this share of the largest only contributes noise to a force.
-_HARDLY = 0.05
-
 
 @dataclass(frozen=True)
 class CoupledMachine(JointMachine, ABC):
@@ -88,7 +85,8 @@ class CoupledMachine(JointMachine, ABC):
         hardly (5 % of its best direction, near a singular pose), it is 0.
         """
         jacobian = self.contact_jacobian(position, link, point)[:, :3]
-        return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(jacobian.transpose(0, 2, 1), rcond=_HARDLY), residual))
+        # A singular value of the Jacobian below 5 % of the largest only contributes noise to a force.
+        return np.asarray(np.einsum("nij,nj->ni", np.linalg.pinv(jacobian.transpose(0, 2, 1), rcond=0.05), residual))
 
     def require_inertia(self, who: str) -> None:
         """Do nothing: a coupled machine always has its inertia."""

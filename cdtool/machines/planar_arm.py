@@ -17,8 +17,6 @@ from cdtool.machines.joint_machine import JointTable, PerJoint, PerJointNotNegat
 from cdtool.recordings.clock import previous_value
 from cdtool.recordings.recording import Recording, Series
 
-_LINKS = 2
-
 
 @dataclass(frozen=True, kw_only=True)
 class PlanarArmTable(JointTable):
@@ -62,12 +60,12 @@ class PlanarArm(CoupledMachine):
     @classmethod
     def parameters(cls, table: PlanarArmTable, place: Place) -> dict[str, Any]:
         """Return the parameters of the arm; raises ConfigurationError naming the key."""
-        if len(table.joints) not in (0, _LINKS):
+        if len(table.joints) not in (0, 2):
             place.note("joints", f"names {len(table.joints)} joints", "a planar arm has 2: arm and forearm")
             table = replace(table, joints=())
         found = super().parameters(table, place)
         found |= {
-            key: per_joint(table, key, _LINKS, place)
+            key: per_joint(table, key, 2, place)
             for key in ("link_mass", "centre_of_mass", "link_inertia", "imu_position")
         }
         found |= {"link_length": table.link_length, "gravity_acceleration": table.gravity}

@@ -12,7 +12,7 @@ from cdtool.machines.tree_rows import BLOCK, COSINE, OFFSET, ROW, SINE, SLOT
 _ROUND = 6755399441055744.0
 # pi in three parts of 33, 33 and 53 bits: an integer below 2^20 times one of the first two is exact.
 _PI_1, _PI_2, _PI_3 = 3.1415926534682512, 1.2154201012607932e-10, 4.044532497591901e-21
-_REDUCIBLE = 1e6
+_REDUCIBLE = 1e6  # rad: below 2^20, see above
 
 
 @kernel(f"void({ROW}, float64)")

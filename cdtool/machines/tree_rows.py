@@ -24,6 +24,7 @@ IndexArray = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
+#: Samples that one instruction handles, or two: see above.
 BLOCK = 16
 # Where the rows of a slot begin: joint, motion (W to DV), load (L to S), results.
 SINE, COSINE, OFFSET, RATE, RATE_CHANGE = 0 * BLOCK, 1 * BLOCK, 2 * BLOCK, 3 * BLOCK, 4 * BLOCK

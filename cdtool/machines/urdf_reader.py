@@ -25,6 +25,7 @@ from cdtool.machines.kinematic_tree import KinematicTree, TreeJoint, TreeLink
 
 _STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 _MOVING = ("revolute", "continuous", "prismatic")
+# A robot has some hundred: a file with more is refused before it is parsed.
 _MOST_TAGS, _MOST_ATTRIBUTES = 100_000, 200_000
 # The library that reads a chain of links does so by recursion.
 _MOST_JOINTS = 1000

@@ -9,7 +9,6 @@ from cdtool.base.arrays import FloatArray
 
 # Number of distinct values (1 MiB); values are collected up to this number, since sorting is the main cost.
 _MOST = 1 << 16
-_MANTISSA = 52  # bits of a float64
 
 
 class Distribution:
@@ -46,7 +45,7 @@ class Distribution:
     def resolution(self) -> float:
         """Return the largest relative error of a quantile; 0: exact."""
         self._sort()
-        return 2.0 ** (self._dropped - _MANTISSA - 1) if self._dropped else 0.0
+        return 2.0 ** (self._dropped - 53) if self._dropped else 0.0  # a float64 has 52 bits, and half of the last one
 
     @property
     def median(self) -> float:
@@ -91,7 +90,7 @@ class Distribution:
         values = np.concatenate((self._values, self._rounded(waiting)))
         counts = np.concatenate((self._counts, np.ones(len(waiting), np.int64)))
         self._values, self._counts = _merged(values, counts)
-        while len(self._values) > self._most and self._dropped < _MANTISSA:
+        while len(self._values) > self._most and self._dropped < 52:
             self._dropped += 1
             self._values, self._counts = _merged(self._rounded(self._values), self._counts)
 

@@ -18,11 +18,8 @@ from cdtool.recordings.units import find_unit
 
 _TEXT = re.compile(r"\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+))\s*(?P<unit>[^\d\s.]\S*)\s*", re.ASCII)
 _UNITS = ("s", "m", "rad")
-_SHOWN = 40
 # A distance counts as reached after this many consecutive samples: a single wrong value is no motion.
 _HELD = 3
-# Samples whose median is the first position.
-_FIRST = 3
 MARK_HINT = "give a number with its unit: a time as 3.2s or 250ms, a distance travelled as 0.8m or 1.2rad"
 
 
@@ -42,10 +39,10 @@ class Mark:
         match = _TEXT.fullmatch(text)
         unit = find_unit(match["unit"]) if match else None
         if match is None or unit is None or unit.si not in _UNITS:
-            raise UsageError(f"is '{text[:_SHOWN]}'", MARK_HINT)
+            raise UsageError(f"is '{text[:40]}'", MARK_HINT)
         value = float(match["number"]) * unit.factor
         if not math.isfinite(value) or (unit.si != "s" and not value > 0.0):
-            raise UsageError(f"is '{text[:_SHOWN]}'", f"{MARK_HINT}; a distance is above 0")
+            raise UsageError(f"is '{text[:40]}'", f"{MARK_HINT}; a distance is above 0")
         return cls(value, unit.si)
 
     def __str__(self) -> str:
@@ -214,7 +211,7 @@ def _travel(recording: Recording, mark: Mark) -> tuple[FloatArray, FloatArray]:
         values = np.unwrap(values)  # an encoder that starts again at half a turn
     if not len(values):
         raise RecordingError(f"{recording.name}: {channel} has no sample to determine {mark}", "give times instead")
-    distance = np.abs(values - np.median(values[:_FIRST]))
+    distance = np.abs(values - np.median(values[:3]))  # the first one alone may be wrong
     held = np.zeros(len(distance))
     if len(distance) >= _HELD:
         held[_HELD - 1 :] = np.lib.stride_tricks.sliding_window_view(distance, _HELD).min(axis=1)

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError, UsageError, nearest
 from cdtool.recordings.motion import MotionClass, leading_joint, motion_class
+from cdtool.recordings.motion.strokes import SHORTEST_REST
 from cdtool.recordings.recording import Recording
 
 HOW_TO_CUT = ("whole", "motion", "trigger")
@@ -28,11 +29,6 @@ _RUN_CUTS = ("column:NAME", "clock-reset", "label:NAME")
 
 # A larger speed counts as this one, so that the quantile is finite.
 _LARGEST = float(np.finfo(np.float64).max)
-# Share of the speed that 99 % of the samples do not exceed, below which the axis counts as at rest.
-_REST_SHARE = 0.05
-# A rest shorter than this [s] is a pause in a stroke; a motion shorter than this is not a stroke.
-_SHORTEST_REST = 0.2
-_SHORTEST_MOTION = 0.2
 # Length of the rest before and after a stroke that belongs to it [s]: detectors start up there.
 _MARGIN = 0.5
 
@@ -132,12 +128,12 @@ def _motion_spans(recording: Recording) -> list[tuple[float, float]]:
         if sign[first] == 0:
             continue
         start, end = float(series.time[first]), float(series.time[last])
-        if strokes and direction == sign[first] and start - strokes[-1][1] < _SHORTEST_REST:
+        if strokes and direction == sign[first] and start - strokes[-1][1] < SHORTEST_REST:
             strokes[-1][1] = end
         else:
             strokes.append([start, end])
             direction = int(sign[first])
-    strokes = [stroke for stroke in strokes if stroke[1] - stroke[0] >= _SHORTEST_MOTION]
+    strokes = [stroke for stroke in strokes if stroke[1] - stroke[0] >= 0.2]  # s: a shake
     return _with_margins(strokes, recording)
 
 
@@ -171,5 +167,5 @@ def _directions(speed: FloatArray) -> npt.NDArray[np.int8]:
     It is at rest up to a share of the magnitude that 99 % of the samples do not exceed.
     """
     size = np.minimum(np.abs(np.where(np.isnan(speed), 0.0, speed)), _LARGEST)
-    rest = _REST_SHARE * np.quantile(size, 0.99)
+    rest = 0.05 * np.quantile(size, 0.99)  # of the peak speed
     return np.asarray((speed > rest).astype(np.int8) - (-speed > rest).astype(np.int8))

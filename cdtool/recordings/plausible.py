@@ -25,27 +25,15 @@ IMPOSSIBLE = 1e9
 # Above this multiple of the reach (the distance from the median of 99 % of the samples) a value is not a measurement.
 # Stiff impacts reach 13 in this project's logs; accelerometers measure shocks, and encoders may start elsewhere.
 FAR = {"acceleration": 1e4, "position": 1e4, "reference_position": 1e4}
-_FAR_ELSE = 1e3
-# ... and above this multiple of the largest distance in the runs.
-_BEYOND_EXTREME = 10.0
-# Ends of integer ranges, as logged before scaling: above this multiple of the reach such a value fills a gap.
+# Ends of integer ranges, as logged before scaling.
 _ENDS = np.array([-(2.0**15), 2.0**15 - 1, 2.0**16 - 1, -(2.0**31), 2.0**31 - 1, 2.0**32 - 1])
+#: An end of a range beyond this multiple of the reach fills a gap.
 _FAR_ENDS = 20.0
-# A step of 16-bit integers this large is a wrap.
-_WRAP = 0.9 * 2**16
-# A position step larger than its whole reach, and this many times faster than usual, is not a motion.
-_FASTER = 10.0
 # In runs to learn from, a value above this multiple of the runs' largest distance, for so few samples, is a spike. In a
 # log to be assessed it may be a contact.
 _SPIKE, _SPIKE_SAMPLES = {"acceleration": 20.0}, 3
-_SPIKE_ELSE = 5.0
-# The share of samples and of runs that may be wrong without affecting a range.
-_SHARE, _RUNS = 0.99, 0.8
 # A log may begin with wrong values for at most this many samples.
 _EDGE = 3
-# After a leap to a new zero, a position counts again once it has stayed within this multiple of the usual reach for
-# this long [s], and has moved by this share of the reach.
-_AMONG, _SETTLED, _MOVED = 1.5, 0.1, 0.02
 # Ranges without a log are learned at most so many times, each time without a part of the logs.
 _FOLDS = 10
 
@@ -113,11 +101,12 @@ class PlausibleRanges:
                 findings.append(Finding("learned_in_other_unit", name, {"logged": series.unit, "learned": known.unit}))
                 continue
             of_channel = factors.get(name, ())
+            far = FAR.get(name, 1e3)
             if not to_learn and _is_ordinary(series, known):
                 continue
-            wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
+            wrong = _implausible(series, known, far, of_channel)
             if to_learn and not name.endswith("position"):
-                spikes = _spikes(np.where(wrong, np.nan, series.values), known, _SPIKE.get(name, _SPIKE_ELSE))
+                spikes = _spikes(np.where(wrong, np.nan, series.values), known, _SPIKE.get(name, 5.0))
                 wrong |= spikes & ((to_learn[0] <= series.time) & (series.time <= to_learn[1]))[:, np.newaxis]
             values = np.where(wrong, np.nan, series.values)
             for j in range(series.joint_count):
@@ -125,8 +114,8 @@ class PlausibleRanges:
                 factor = of_channel[j] if of_channel else 0.0
                 behind, leaps = _leapt(series.time, values[:, j], known, known.centre[j], factor)
                 if wrong[:, j].any():
-                    far = _far_values(series, j, wrong[:, j], known, joint)
-                    findings.append(Finding("implausible_values", name, far))
+                    numbers = _far_values(series, j, wrong[:, j], known, joint)
+                    findings.append(Finding("implausible_values", name, numbers))
                 if behind.any():
                     masked = int(np.count_nonzero(behind))
                     findings.append(
@@ -216,7 +205,8 @@ def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:
     if not medians:
         return None
     centre = np.median(np.array(medians), axis=0)
-    reach = _of_most([max(_quantile(column, _SHARE) for column in np.abs(item.values - centre).T) for item in series])
+    # One sample in a hundred, and one run in five, may be wrong without affecting a range.
+    reach = _of_most([max(_quantile(column, 0.99) for column in np.abs(item.values - centre).T) for item in series])
     rate = _of_most([_rate(item) for item in series]) if moves else 0.0
     extreme = _of_most([_extreme(item.values - centre) for item in series])
     return ChannelRange(series[0].unit, tuple(centre.tolist()), reach, rate, extreme) if reach > 0.0 else None
@@ -236,13 +226,13 @@ def _rate(series: Series) -> float:
     if len(series) < 2:
         return 0.0
     rates = np.abs(np.diff(series.values, axis=0)) / np.diff(series.time)[:, np.newaxis]
-    return max(_quantile(column, _SHARE) for column in rates.T)
+    return max(_quantile(column, 0.99) for column in rates.T)
 
 
 def _of_most(figures: Sequence[float]) -> float:
     """Return the largest of the lowest four fifths of the runs; 0 without runs."""
     known = sorted(figure for figure in figures if np.isfinite(figure))
-    return known[int(_RUNS * (len(known) - 1))] if known else 0.0
+    return known[int(0.8 * (len(known) - 1))] if known else 0.0
 
 
 def _quantile(values: FloatArray, share: float) -> float:
@@ -257,7 +247,8 @@ def _implausible(series: Series, known: ChannelRange, far: float, factors: Seque
     """Return True (n, J) where a value is far from all learned values, or an end of an integer range."""
     with np.errstate(invalid="ignore"):
         distance = np.abs(series.values - np.array(known.centre))
-        wrong: BoolArray = distance > max(far * known.reach, _BEYOND_EXTREME * known.extreme)
+        # ... and above ten times the largest distance in the runs.
+        wrong: BoolArray = distance > max(far * known.reach, 10.0 * known.extreme)
         for j, factor in enumerate(factors):
             ends = np.isin(series.values[:, j], _ENDS * factor)
             wrong[:, j] |= ends & (distance[:, j] > _FAR_ENDS * known.reach)
@@ -297,10 +288,11 @@ def _leapt(
     index = np.flatnonzero(np.isfinite(values))
     step = np.abs(np.diff(values[index]))
     if known.rate > 0.0:
-        is_leap = step > np.maximum(known.reach, _FASTER * known.rate * np.diff(time[index]))
+        # A position step larger than its whole reach, and ten times faster than usual, is not a motion.
+        is_leap = step > np.maximum(known.reach, 10.0 * known.rate * np.diff(time[index]))
         found, leaps = _behind_leaps(time[index], values[index], is_leap, known.reach, (centre, known.reach))
     else:
-        near = 0.5 * _WRAP * abs(factor)
+        near = 0.45 * 2**16 * abs(factor)  # a step of 16-bit integers twice as large is a wrap
         is_leap = (step >= 2.0 * near) & (near > _FAR_ENDS * known.reach)
         found, leaps = _behind_leaps(time[index], values[index], is_leap, near, None)
     wrong = np.zeros(len(values), dtype=bool)
@@ -360,7 +352,8 @@ def _end(
 
 def _moves_on(time: FloatArray, values: FloatArray, centre: float, reach: float) -> BoolArray:
     """Return True (n,) where the values after a leap have stayed among the usual ones so far, and have moved."""
-    among = np.logical_and.accumulate(np.abs(values - centre) <= _AMONG * reach)
-    moved = np.abs(values - values[0]) >= _MOVED * reach
-    on: BoolArray = among & moved & (time - time[0] >= _SETTLED)
+    # It counts again once it has stayed within 1.5 times the usual reach for 0.1 s, and has moved by 2 % of it.
+    among = np.logical_and.accumulate(np.abs(values - centre) <= 1.5 * reach)
+    moved = np.abs(values - values[0]) >= 0.02 * reach
+    on: BoolArray = among & moved & (time - time[0] >= 0.1)
     return on

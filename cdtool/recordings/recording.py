@@ -35,8 +35,6 @@ RIG_UNITS = {"force": "N", CONTACT_PRESSURE: "Pa"}
 # High or low, or one sample per event: without a unit.
 UNITLESS = ("label", "event", "trigger")
 CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
-# A load cell measures up to three axes, whatever the number of joints.
-_MOST_AXES = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,10 +123,6 @@ class TableRows:
         return float(self.time[at]), float(self.time[at if is_kept else at - 1])
 
 
-# Times since 1970 [s] between which a log was recorded.
-_IN_2001, _IN_2100 = 1e9, 4.1e9
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(StoresDerived):
     """One log: its channels as Series, on the load side, each at its own rate.
@@ -156,7 +150,8 @@ class Recording(StoresDerived):
             if name not in CHANNELS:
                 raise RecordingError(f"{self.name}: unknown channel '{name}'", nearest(name, CHANNELS))
             expected = (1,) if name in (*GROUND_TRUTH, *TRIGGER) else (len(self.joints),)
-            if series.joint_count not in expected and not (name == "force" and series.joint_count <= _MOST_AXES):
+            # A load cell measures up to three axes, whatever the number of joints.
+            if series.joint_count not in expected and not (name == "force" and series.joint_count <= 3):
                 raise RecordingError(
                     f"{self.name}: channel '{name}' has {series.joint_count} columns for {len(self.joints)} joints",
                     "give one column per joint in [channels], in the order of machine.joints",
@@ -204,7 +199,7 @@ class Recording(StoresDerived):
     def began(self) -> float | None:
         """Return the time of the first sample since 1970 [s]; None if the log's clock does not count from there."""
         began = self.origin + self.start
-        return began if _IN_2001 <= began < _IN_2100 else None
+        return began if 1e9 <= began < 4.1e9 else None  # from 2001 to 2100
 
     def between(self, start: float, end: float) -> Recording:
         """Return the recording cut to start <= time <= end [s], without channels that have no sample there."""

@@ -25,8 +25,9 @@ class Unit:
 # SI units of raw drive values: a scale converts them to a channel's own unit (N m per A, for example).
 RAW_UNITS = ("A", "V", "1", "count")
 
-_STANDARD_GRAVITY = 9.80665
-_INCH, _POUND = 0.0254, 0.45359237 * _STANDARD_GRAVITY
+STANDARD_GRAVITY = 9.80665  # m/s2, by definition (CGPM 1901)
+DAY_S = 86400.0  # s, without the leap seconds that no clock of a log counts
+_INCH, _POUND = 0.0254, 0.45359237 * STANDARD_GRAVITY  # m and N, by definition (1959)
 _PREFIXES = {"u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "da": 1e1, "h": 1e2, "k": 1e3, "M": 1e6}
 # Each symbol with its factor, what it measures, its prefixes, and its words in English and German, without a plural.
 _TABLE = (
@@ -40,12 +41,12 @@ _TABLE = (
     ("m", 1.0, "m", "u m c d k", "meter metre"),
     ("in", _INCH, "m", "", "inch zoll"),
     ("ft", 12.0 * _INCH, "m", "", "foot feet fuss fuß"),
-    ("g", _STANDARD_GRAVITY, "m/s2", "m", ""),
+    ("g", STANDARD_GRAVITY, "m/s2", "m", ""),
     ("N", 1.0, "N", "u m c d da h k M", "newton"),
-    ("gf", 1e-3 * _STANDARD_GRAVITY, "N", "k", "pond"),
-    ("kp", _STANDARD_GRAVITY, "N", "", ""),
-    ("kg", _STANDARD_GRAVITY, "N", "", "kilogram kilogramm"),
-    ("tf", 1e3 * _STANDARD_GRAVITY, "N", "", "tonne"),
+    ("gf", 1e-3 * STANDARD_GRAVITY, "N", "k", "pond"),
+    ("kp", STANDARD_GRAVITY, "N", "", ""),
+    ("kg", STANDARD_GRAVITY, "N", "", "kilogram kilogramm"),
+    ("tf", 1e3 * STANDARD_GRAVITY, "N", "", "tonne"),
     ("kip", 1e3 * _POUND, "N", "", "kip"),
     ("lbf", _POUND, "N", "k", "lb lbm pound"),
     ("ozf", _POUND / 16.0, "N", "", "oz ounce unze"),

@@ -7,10 +7,9 @@ from collections.abc import Hashable, Sequence
 from typing import NamedTuple
 
 from cdtool.base.findings import Finding
+from cdtool.base.plain_text import NAMED
 from cdtool.results.results import RecordingFinding, Skipped
 
-# Up to this many are listed each; of more, only the first with this many names of the others.
-_EACH, _NAMED = 3, 3
 _NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*")
 
 
@@ -54,11 +53,11 @@ def grouped(items: Sequence[AlikeText]) -> list[tuple[str, str]]:
         groups.setdefault(item.kind, []).append(item)
     found: list[tuple[str, str]] = []
     for first, *others in groups.values():
-        if len(others) < _EACH:
+        if len(others) < NAMED:
             found += [(item.name, item.text) for item in (first, *others)]
             continue
         names = list(dict.fromkeys(item.subject for item in others if item.subject not in ("", first.subject)))
-        listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
+        listed = ", ".join(names[:NAMED]) + (", ..." if len(names) > NAMED else "")
         found.append((first.name, f"{first.text}; {len(others)} more like it{f' ({listed})' if listed else ''}"))
     return found
 

@@ -66,8 +66,6 @@ TITLES = {
 }
 # Where only the worst and the failed cases are listed.
 TITLES_OF_MANY = {"latency": "Distribution of the latency", "recordings": TITLES["cases"]}
-# A text from a file that is part of a sentence is cut to this length.
-_LONGEST = 200
 
 _NOTES = {
     "latency": (
@@ -275,7 +273,8 @@ def _groups_note(evaluated: Evaluated) -> str:
 def _results_note(evaluated: Evaluated) -> str:
     """Return how to read the results: from when to when, what is in brackets, what counts where."""
     results = evaluated.results
-    onset = shorten(onset_words(results.provenance), _LONGEST)
+    # The name of a contact's channel comes from a file.
+    onset = shorten(onset_words(results.provenance), 200)
     resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
     resolution = f"; resolution up to {number(max(resolutions))} ms" if resolutions else ""
     note = (

@@ -14,9 +14,6 @@ from cdtool.statistics.interval import Interval
 NOTHING = "–"
 NOT_REACHED = "not reached"
 NOT_ASSESSABLE = "not assessable"
-# The remainder of rounding equal numbers is shown as 0: below this, or below this share of the interval's width.
-_ZERO_BELOW = 1e-12
-_ZERO_SHARE = 1e-9
 
 
 def spoken(word: str) -> str:
@@ -48,7 +45,8 @@ def value_and_interval(interval: Interval) -> tuple[str, ...]:
     if not interval.known:
         return (NOTHING,)
     width = interval.high - interval.low
-    least = max(_ZERO_BELOW, _ZERO_SHARE * width if math.isfinite(width) else 0.0)
+    # The remainder of rounding equal numbers is shown as 0.
+    least = max(1e-12, 1e-9 * width if math.isfinite(width) else 0.0)
     parts = [0.0 if abs(item) < least else item for item in (interval.value, interval.low, interval.high)]
     leading = next((item for item in (parts[0], parts[2], parts[1]) if item and math.isfinite(item)), 0.0)
     value, low, high = (_written(item, _decimals(leading)) for item in parts)

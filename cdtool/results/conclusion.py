@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, status_of
-from cdtool.base.plain_text import counted, plain
+from cdtool.base.plain_text import NAMED, counted, plain
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.limits import not_met
 from cdtool.results.recording_outcomes import MISSES
@@ -25,7 +25,6 @@ from cdtool.results.summary import Summary
 
 # Limits on these figures say how many contacts may be missed.
 _ON_MISSES = MISSES | {"detected", "max_ms"}
-_REASONS = 3
 
 Pair = tuple[str, str]
 """Detector and group."""
@@ -428,5 +427,5 @@ def _reasons_in_words(results: Results, item: Summary, of_contacts: Mapping[Pair
     reasons = of_contacts.get((item.detector, item.group)) or [
         f"{name} {100.0 * share:.0f} %" for row in exposures for name, share in row.not_judged.items()
     ]
-    more = f"; and {len(reasons) - _REASONS} more reasons" if len(reasons) > _REASONS else ""
-    return f"{'; '.join(reasons[:_REASONS]) or 'unknown reason'}{more}"
+    more = f"; and {len(reasons) - NAMED} more reasons" if len(reasons) > NAMED else ""
+    return f"{'; '.join(reasons[:NAMED]) or 'unknown reason'}{more}"

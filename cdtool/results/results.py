@@ -16,6 +16,7 @@ from typing import Any, Literal, Self, TypeVar, get_args, get_origin, get_type_h
 from cdtool.base.findings import Finding
 
 Row = TypeVar("Row")
+# Of the layout of results.json: a change of it counts on.
 SCHEMA_VERSION = 5
 # How reports introduce what is lost of a recording that was used.
 DAMAGED = "damaged, used as far as it goes"

@@ -16,8 +16,6 @@ from cdtool.truth.force.limits import ForceProfile, ForceStep
 from cdtool.truth.force.verdict import ForceVerdict, Outcome, StepVerdict
 from cdtool.truth.rest_level import rest_before
 
-# Onsets of a trace and of its row are the same number; a file may have rounded one.
-_SAME_ONSET = 1e-6
 _OUTCOMES: tuple[Outcome, ...] = ("pass", "fail", "not_assessable")
 
 
@@ -110,7 +108,8 @@ def _contacts(trace: Trace, onsets: Mapping[int, float]) -> Iterator[tuple[int, 
     ends = [*(contact.start for contact in trace.contacts[1:]), math.inf]
     for contact, until in zip(trace.contacts, ends, strict=False):
         for number, onset in onsets.items():
-            if abs(onset - contact.start) <= _SAME_ONSET:
+            # The same number, which a file may have rounded.
+            if abs(onset - contact.start) <= 1e-6:
                 yield number, contact, until
 
 

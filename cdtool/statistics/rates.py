@@ -15,8 +15,6 @@ from numbers import Integral
 from cdtool.base.errors import UsageError
 from cdtool.statistics.interval import Interval, check_level
 
-_MOST_COUNT = 10**15
-
 
 def poisson_rate(count: int, exposure: float, level: float = 0.95) -> Interval:
     """Return a rate of events with its exact interval.
@@ -344,7 +342,7 @@ def check_count(name: str, count: int) -> None:
     --------
     >>> check_count("number of events", 3)
     """
-    if not isinstance(count, Integral) or not 0 <= count <= _MOST_COUNT:
+    if not isinstance(count, Integral) or not 0 <= count <= 10**15:  # float64 counts to there
         raise UsageError(f"{name} is {count}", "give a whole number, 0 or more, at most 10^15")
 
 

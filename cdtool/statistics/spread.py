@@ -16,6 +16,9 @@ from cdtool.statistics.clusters import clusters_of
 from cdtool.statistics.interval import Interval, check_level
 from cdtool.statistics.small_sample import FEWEST, too_few
 
+# A standard deviation from the median absolute deviation of Gaussian noise.
+MAD_TO_STD = 1.4826
+
 
 @dataclass(frozen=True)
 class Spread:

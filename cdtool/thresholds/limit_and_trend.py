@@ -14,6 +14,7 @@ from cdtool.base.errors import UsageError
 from cdtool.base.settings import Positive, check, setting
 from cdtool.detectors.detection import Band, Signal
 from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.speed_course import COVERAGE
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.common_class import common_class
@@ -23,8 +24,6 @@ from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statisti
 from cdtool.thresholds.trend import trend_of
 
 SHAPES = ("line", "table")
-# A level of the trend has a limit of its own once this share of the runs has reached it.
-_COVERAGE = 0.8
 
 
 @dataclass(frozen=True)
@@ -193,6 +192,6 @@ def _level(runs: Sequence[FloatArray], before: Sequence[float], spread_before: S
     mean, spread = list(before), list(spread_before)
     for j in range(extremes.shape[1]):
         reached = extremes[np.isfinite(extremes[:, j]), j]
-        if len(reached) >= max(2.0, _COVERAGE * len(extremes)):
+        if len(reached) >= max(2.0, COVERAGE * len(extremes)):
             mean[j], spread[j] = float(np.mean(reached)), float(np.std(reached, ddof=1))
     return tuple(mean), tuple(spread)

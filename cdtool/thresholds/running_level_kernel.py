@@ -17,11 +17,8 @@ import math
 from cdtool.base.arrays import FloatArray
 from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.detectors.detection import Status, StatusArray
+from cdtool.recordings.motion.speed_range import GUARD, MEMORY
 
-# Age of a sample that is learned from, and time for which nothing is learned after a departure [s].
-GUARD = 0.3
-# The level is the mean over about this time in motion [s].
-MEMORY = 2.0
 # A deviation counts as at most so many spreads, and nothing is learned from one of more than so many.
 CLIP, FREEZE = 3.0, 4.0
 # The band is so many times as wide at the start, and as learned after this time in motion [s].

@@ -14,6 +14,7 @@ from cdtool.base.settings import NotNegative, Positive, check, setting
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.motion.progress import Alignment, Progress
+from cdtool.recordings.motion.speed_course import TIME_RESERVE
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import (
@@ -25,12 +26,11 @@ from cdtool.thresholds.fitted_signature import (
 from cdtool.thresholds.settings import Sides, SidesOfMachine
 from cdtool.thresholds.signature_curve import Curve, resample
 
+# With fewer runs a spread along the stroke is too uncertain for a limit: see Coverage in docs/signature.md.
 ENOUGH_RUNS = 10
 # Not even a forced signature has a spread below these.
 LEAST_RUNS = 2
 
-# The time curve reaches this much beyond the slowest run's acceleration.
-_TIME_RESERVE = 1.5
 #: 40 m in steps of 2 mm; memory and time grow with the places, and a wrong unit makes a thousand times as many.
 MOST_PLACES = 20_000
 
@@ -191,5 +191,5 @@ class Signature:
         for at in places:
             part = at.elapsed if self.alignment == "time" else at.elapsed[~at.running]
             lasting.append(float(np.nanmax(part, initial=0.0)))
-        reserve = 1.0 if self.alignment == "time" else _TIME_RESERVE
+        reserve = 1.0 if self.alignment == "time" else TIME_RESERVE
         return reserve * max(lasting, default=0.0)

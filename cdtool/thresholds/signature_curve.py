@@ -16,15 +16,12 @@ from cdtool.base.kernels import READ_ONLY, kernel
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion.progress import Progress
 from cdtool.recordings.motion.smoothing import moving_mean
+from cdtool.recordings.motion.speed_course import COVERAGE
 
-# A grid point has a limit once this share of the runs has been there.
-COVERAGE = 0.8
 # The spread is nowhere below this share of its median: a quantised signal may not vary at all at some points.
 _SMALLEST_SPREAD = 0.1
 # A sample stands for a grid point at most so many steps before it: of the grid, or of the log where those are wider.
 _FURTHEST_STEPS = 2.0
-# A window of more steps is no curve that was learned.
-_MOST_STEPS = 1e6
 
 
 @dataclass(frozen=True)
@@ -145,7 +142,7 @@ class Curve(SendsFields):
         alike = count.ndim == 2 and count.size and count.shape == mean.shape == squares.shape
         if not (alike and np.isfinite((count, mean, squares)).all() and min(count.min(), squares.min()) >= 0.0):
             raise ValueError(f"a curve of counts {count.shape}, means {mean.shape} and squares {squares.shape}")
-        if not 0.0 < step <= window <= _MOST_STEPS * step:
+        if not 0.0 < step <= window <= 1e6 * step:  # a window of more steps is no curve that was learned
             raise ValueError(f"a curve with step {step:g} and window {window:g}")
         return cls(step, window, count, mean, squares)
 

@@ -9,14 +9,12 @@ from typing import Annotated, ClassVar
 from cdtool.base.arrays import FloatArray
 from cdtool.base.settings import Positive, check, setting
 from cdtool.detectors.detection import Signal
+from cdtool.detectors.filters import SETTLED
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.first_order import filtered_slope
 from cdtool.thresholds.sections import filtered
 from cdtool.thresholds.settings import SafetyFactor, SidesOfMachine
 from cdtool.thresholds.statistic_limit import FittedStatisticLimit, fit_statistic_limit
-
-# Time constants until a first-order filter has settled to 5 %.
-SETTLE = 3.0
 
 
 @dataclass(frozen=True)
@@ -76,4 +74,4 @@ def trend_of(signal: Signal, time_constant: float) -> Signal:
     def slope(values: FloatArray, step: FloatArray) -> FloatArray:
         return filtered_slope(values, step, time_constant)
 
-    return filtered(signal, slope, SETTLE * time_constant, SETTLE * time_constant, f"{signal.unit}/s")
+    return filtered(signal, slope, SETTLED * time_constant, SETTLED * time_constant, f"{signal.unit}/s")

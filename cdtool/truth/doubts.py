@@ -10,25 +10,17 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.recordings.recording import Contact, Recording, Series
 from cdtool.statistics.correlation import correlation
+from cdtool.statistics.spread import MAD_TO_STD
 from cdtool.truth.force_vector import rest_of_axes
 from cdtool.truth.missing_samples import cell_samples, longest_step
 from cdtool.truth.onset_rule import OnsetRule
 
 # Above this magnitude of the correlation the force follows the torque.
 _FOLLOWS = 0.95
-# A cell that rests off zero by more than the upper level, or than this share of the first contact's peak, is not tared.
-_NOT_TARED = 0.05
-# It is compared around each contact: this long before its onset and after it [s].
+# They are compared around each contact: this long before its onset and after it [s].
 _BEFORE, _AFTER = 0.2, 0.5
-# A load cell that feels what the drive then answers leads the torque: shifts up to this one are tried [s].
-_LONGEST_SHIFT = 0.1
-_FEWEST = 10
-# Without a lower level by hand a shift of the rest level counts from this share of the peak on.
-_SHARE_OF_PEAK = 0.01
-# A force left at the log's end [s] is next to nothing below this share of the peak.
-_TAIL, _NEXT_TO_NOTHING = 0.2, 0.05
-# ... and above so many standard deviations of its noise, which are so many median deviations.
-_SIGMAS, _OF_NORMAL = 3.0, 1.4826
+# The force that is left is the median over this end of the log [s], in which noise averages out.
+_TAIL = 0.2
 
 
 def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[Finding]:
@@ -70,7 +62,8 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
 def _not_tared(contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
     """A warning where the load cell rests off zero before its first contact."""
     first = next((item for item in contacts if item.found_by == "load cell" and not item.in_progress), None)
-    if first is None or abs(first.rest) <= max(rule.above or 0.0, _NOT_TARED * first.peak_force):
+    # A cell that rests off zero by more than the upper level, or than 5 % of the first contact's peak, is not tared.
+    if first is None or abs(first.rest) <= max(rule.above or 0.0, 0.05 * first.peak_force):
         return None
     return Finding("not_tared", "force", {"rest": first.rest, "onset": first.start})
 
@@ -95,10 +88,11 @@ def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Fi
     contact = contacts[-1]
     tail = reading[time >= time[-1] - _TAIL]
     left = float(np.median(tail)) - contact.rest
-    noise = _OF_NORMAL * float(np.median(np.abs(tail - np.median(tail))))
-    if abs(left) <= max(rule.back_to or 0.0, _SIGMAS * noise):
+    noise = MAD_TO_STD * float(np.median(np.abs(tail - np.median(tail))))
+    if abs(left) <= max(rule.back_to or 0.0, 3.0 * noise):
         return None  # below the level at which a contact ends: the log was cut off while the axis rebounds
-    if abs(left) > _NEXT_TO_NOTHING * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:
+    # More than 5 % of the peak may be a contact that lasts.
+    if abs(left) > 0.05 * contact.peak_force or time[-1] - contact.start < _AFTER + _TAIL:
         return None
     return Finding("force_left", "force", {"force": left, "onset": contact.start})
 
@@ -117,7 +111,7 @@ def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[s
     near = _near(time, contacts)
     time, reading = time[near], reading[near]
     periods = [item.period for item in (force, torque) if np.isfinite(item.period)]
-    if len(time) < _FEWEST or not periods or np.ptp(reading) == 0.0:
+    if len(time) < 10 or not periods or np.ptp(reading) == 0.0:  # too few for a correlation
         return none
     period = max(periods)
     best = none
@@ -125,7 +119,8 @@ def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[s
         r = _correlation(reading, _at(torque, j, time))
         if not abs(r) > max(abs(best[1]) if best[0] else 0.0, _FOLLOWS):
             continue
-        count = int(np.ceil(_LONGEST_SHIFT / period))
+        # A load cell that feels what the drive then answers leads the torque: by up to 0.1 s.
+        count = int(np.ceil(0.1 / period))
         shifts = period * np.unique(np.linspace(2, max(count, 2), 12).astype(int))
         others = [_correlation(reading, _at(torque, j, time + shift)) for shift in (*shifts, *-shifts)]
         if abs(r) >= np.nanmax(np.abs([0.0, *others])):
@@ -160,7 +155,8 @@ def _correlation(a: FloatArray, b: FloatArray) -> float:
 
 
 def _has_drifted(contact: Contact, rule: OnsetRule) -> bool:
-    least = rule.back_to if rule.back_to is not None else _SHARE_OF_PEAK * contact.peak_force
+    # Without a lower level by hand a shift of the rest level counts from 1 % of the peak on.
+    least = rule.back_to if rule.back_to is not None else 0.01 * contact.peak_force
     return not contact.in_progress and abs(contact.shift) > least
 
 

@@ -27,7 +27,7 @@ from cdtool.truth.rest_lines import INTERVAL
 
 # The level of an axis after a contact that was in progress at the start is the median of this interval after it [s].
 _AFTER = 4 * INTERVAL
-_FEWEST = 3
+_FEWEST = 3  # samples of which the first show a rest level
 
 
 @dataclass(frozen=True, eq=False, repr=False)

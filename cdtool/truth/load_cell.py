@@ -22,18 +22,13 @@ from cdtool.truth.rest_lines import INTERVAL, IntArray
 
 # Standard deviation of the error of rounding to steps of 1: uniform between -1/2 and 1/2.
 ROUNDING = 12.0**-0.5
-# Readings closer than this share of the largest one differ by what arithmetic rounds, not by a step of the cell.
-_SAME = 1e-6
-# A step above this [N] must be proved by so many readings, none off its grid by more than this share of a step. Eight
-# deviations of its rounding are 46 N: a coarser load cell is no truth for contacts that limits of 65 N and more allow.
-_COARSEST, _GRID, _OFF_GRID = 20.0, 4, 0.01
+# A step above this [N] must be proved by its grid. Eight deviations of its rounding are 46 N: a coarser load cell is no
+# truth for contacts that limits of 65 N and more allow.
+_COARSEST = 20.0
 # The rest level is estimated again from the samples up to this long before the onset [s].
 BEFORE_ONSET = 0.05
-# A burst of noise: within this time [s] before and after, the force crosses both levels so often, goes to the other
-# side by this share, and holds on one side in no more than this share of its excursions.
-BURST, _CROSSINGS, _AS_FAR, _HELD = 0.03, 4, 0.4, 0.5
-# What was felt at the start was a contact if it was at least this share of the largest force until its release.
-_SHARE_OF_PEAK = 0.1
+# A burst of noise is looked for within this time before and after [s]: contacts last longer.
+BURST = 0.03
 # Released is what settles at this share of the first level, or less.
 _RELEASED = 0.5
 
@@ -49,14 +44,16 @@ def reading_step(force: FloatArray) -> float:
     """
     ordered = np.sort(force)
     distances = np.diff(ordered)
-    is_step = distances > _SAME * float(np.max(np.abs(force), initial=0.0))
+    # Readings closer than 1e-6 of the largest one differ by what arithmetic rounds, not by a step of the cell.
+    is_step = distances > 1e-6 * float(np.max(np.abs(force), initial=0.0))
     if not is_step.any():
         return 0.0
     step = float(distances[is_step].min())
     if step <= _COARSEST:
         return step
     on_grid = (ordered - ordered[0]) / step
-    proved = np.count_nonzero(is_step) >= _GRID - 1 and bool(np.all(np.abs(on_grid - np.round(on_grid)) < _OFF_GRID))
+    # At least four readings, none off the grid by more than a hundredth of a step.
+    proved = np.count_nonzero(is_step) >= 3 and bool(np.all(np.abs(on_grid - np.round(on_grid)) < 0.01))
     return step if proved else _COARSEST
 
 
@@ -173,11 +170,13 @@ class ContactSearch:
         large = np.flatnonzero(np.abs(part) > self.above)
         sides = np.sort([float(np.max(part)), -float(np.min(part))])
         crossings = np.count_nonzero(np.diff(np.sign(part[large])))
-        if crossings < _CROSSINGS or sides[0] < _AS_FAR * sides[1]:
+        # A burst crosses both levels at least four times, goes to the other side by 40 % at least, and holds on one
+        # side in at most half of its excursions.
+        if crossings < 4 or sides[0] < 0.4 * sides[1]:
             return None
         # A load cell that rings after an impact stays on each side for longer.
         held, _ = self._held_runs(since, np.where(np.abs(part) > self.above, np.sign(part), 0.0))
-        if len(held) > _HELD * (crossings + 1):
+        if len(held) > 0.5 * (crossings + 1):
             return None
         return since + int(large[-1]) + 1
 
@@ -302,7 +301,8 @@ class ContactSearch:
         if self.rest.reaches(onset, sample, -level, _RELEASED * level) or self._goes_on(sample, level, rest):
             return None
         over = self.force[: sample + 1] - rest
-        if abs(level - rest) < _SHARE_OF_PEAK * float(np.max(np.abs(over))):
+        # What was felt at the start was a contact if it was a tenth of the largest force until its release, or more.
+        if abs(level - rest) < 0.1 * float(np.max(np.abs(over))):
             return None
         _, ends = self._held_runs(0, np.where(np.abs(over) > self.back_to, np.sign(over), 0.0))
         return int(ends[-1]) if len(ends) else sample, rest

@@ -17,11 +17,10 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.recordings.recording import Series
 
+#: The interval of the slowest force meter that door standards allow [s].
 CLOSE_ENOUGH = 5e-3
 # A step longer than so many periods is no jitter of a regular clock: the force in it is not simply what is beside it.
 PERIODS = 1.5
-_ONE_LOST, _USUAL, _MORE = 2.5, 0.95, 1.1
-_BATCH = 5.0
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,8 @@ class CellClock:
         if len(self.time) < 2:
             return CLOSE_ENOUGH
         period, long_step = self._steps
-        return max(CLOSE_ENOUGH, _ONE_LOST * period, period + _MORE * long_step)
+        # With one sample lost; with jitter one period and 1.1 times the step that one in 20 exceeds.
+        return max(CLOSE_ENOUGH, 2.5 * period, period + 1.1 * long_step)
 
     @property
     def batch_length(self) -> float:
@@ -50,7 +50,7 @@ class CellClock:
         In batches the step that one in 20 exceeds is many times the median one.
         """
         period, long_step = self._steps
-        return long_step if long_step > _BATCH * period else 0.0
+        return long_step if long_step > 5.0 * period else 0.0  # many times the median step
 
     @cached_property
     def _steps(self) -> tuple[float, float]:
@@ -59,7 +59,7 @@ class CellClock:
             return 0.0, 0.0
         steps = np.diff(self.time)
         last = len(steps) - 1
-        place = last * _USUAL
+        place = last * 0.95
         before, middle = int(place), len(steps) // 2
         steps.partition(sorted({middle - 1 + len(steps) % 2, middle, before, min(before + 1, last)}))
         period = 0.5 * float(steps[middle - 1 + len(steps) % 2] + steps[middle])

@@ -18,9 +18,6 @@ from cdtool.truth.force_vector import ForceMagnitude, force_magnitude, magnitude
 from cdtool.truth.load_cell import load_cell_contacts
 from cdtool.truth.onset_rule import OnsetRule as OnsetRule
 
-# Where a label has no value between contacts, more missing samples than this, by its usual step, are no contact.
-_HOLE = 5
-
 
 def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
     """Return the contacts of a recording, by the load cell, else by the label channel, else by events.
@@ -111,7 +108,8 @@ def _from_label(recording: Recording) -> list[Contact]:
         kinds[values > 0.5] = 1
     # A missing sample does not end a contact, unless the log has no other samples without one.
     usual = float(np.median(np.diff(present))) if len(present) > 1 else 1.0
-    behind_hole = (np.diff(present, prepend=-1) > _HOLE * usual) & bool(np.all(kinds > 0))
+    # Where a label has no value between contacts, more than five missing samples, by its usual step, are no contact.
+    behind_hole = (np.diff(present, prepend=-1) > 5 * usual) & bool(np.all(kinds > 0))
     firsts = np.flatnonzero((np.diff(kinds, prepend=0) != 0) | behind_hole)
     ends = np.append(firsts[1:], len(time))[: len(firsts)]
     period = series.period if len(series) > 1 else 0.0

@@ -11,24 +11,20 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.statistics.spread import MAD_TO_STD
 
-# Readings are pooled over this long [s].
+#: Readings are pooled over this long [s]: noise and the hum of the mains average out, drift does not.
 INTERVAL = 0.05
-# The newest interval of a line ended at least this long before [s].
+#: The rest before a time ends so long before it [s]: a soft contact must not be mistaken for drift of the cell.
 GAP = 0.3
-# A line goes through this many intervals.
+#: Intervals that a line is fitted to: 1 s, over which drift is straight.
 WINDOW = 20
-# A line needs this many intervals and a slope of this many standard errors, more of them with few intervals n:
-# 3 (1 + 10 / n). Otherwise the level is constant.
-_LINE, _BEYOND_DOUBT, _FEW = 6, 3.0, 10.0
+#: Fewer intervals determine no slope: the level is constant.
+_LINE = 6
 # A line is extended for at most this long [s]; after that its last value is used.
 EXTENDED = 1.0
-# Until two intervals are old enough the level is that of the log's first samples [s], at least this many.
-_FIRST, _FEWEST = 0.1, 3
-# A standard deviation from the median absolute deviation of Gaussian noise; that of a median, in units of a mean's.
-_MAD, _OF_MEDIAN = 1.4826, 1.2533
-# Intervals deviate by more than so many times what the quietest third does: they say nothing about the noise at rest.
-_RESTLESS = 3.0
+# The standard deviation of a median of Gaussian noise, in units of a mean's: sqrt(pi / 2).
+_OF_MEDIAN = 1.2533
 # So many lines are fitted together: the slopes between each two intervals take 6 MB.
 _TOGETHER = 4096
 
@@ -53,20 +49,20 @@ def medians_of(values: FloatArray, first: IntArray) -> FloatArray:
 
 def line_of_start(time: FloatArray, force: FloatArray) -> FloatArray:
     """Return the constant line (5,) through the first samples."""
-    first = force[: max(int(np.searchsorted(time, time[0] + _FIRST)), _FEWEST)]
+    first = force[: max(int(np.searchsorted(time, time[0] + 0.1)), 3)]  # 0.1 s, as until two intervals are known
     level = float(np.median(first))
-    error = _OF_MEDIAN * _MAD * float(np.median(np.abs(first - level))) / np.sqrt(len(first))
+    error = _OF_MEDIAN * MAD_TO_STD * float(np.median(np.abs(first - level))) / np.sqrt(len(first))
     return np.array([level, 0.0, time[0], error, 0.0])
 
 
 def noise_about(force: FloatArray, first: IntArray, levels: FloatArray) -> float:
     """Return the standard deviation of the readings (n,) about the rest level (n,) [N].
 
-    In a contact the force is no line: intervals far noisier than the quietest third are not at rest.
+    In a contact the force is no line: intervals three times noisier than the quietest third are not at rest.
     """
     deviations = medians_of(np.abs(force - levels), first)
-    quiet = deviations[deviations <= _RESTLESS * np.quantile(deviations, 1.0 / 3.0)]
-    return _MAD * float(np.median(quiet))
+    quiet = deviations[deviations <= 3.0 * np.quantile(deviations, 1.0 / 3.0)]
+    return MAD_TO_STD * float(np.median(quiet))
 
 
 def lines_before(
@@ -100,7 +96,8 @@ def _fit(time: FloatArray, values: FloatArray, inside: BoolArray) -> FloatArray:
     off = np.where(inside, time - at[:, np.newaxis], 0.0)
     middle, about = _centre_and_spread(values - slope[:, np.newaxis] * off, inside)
     drift_error = np.where(size >= _LINE, about / np.sqrt((off * off).sum(axis=1)), 0.0)
-    drifts = (size >= _LINE) & (np.abs(slope) > _BEYOND_DOUBT * (1.0 + _FEW / size) * drift_error)
+    # A slope is beyond doubt at three standard errors, more of them with few intervals.
+    drifts = (size >= _LINE) & (np.abs(slope) > 3.0 * (1.0 + 10.0 / size) * drift_error)
     error = _OF_MEDIAN * np.where(drifts, about, spread) / np.sqrt(size)
     return np.column_stack((np.where(drifts, middle, level), np.where(drifts, slope, 0.0), at, error, drift_error))
 
@@ -108,7 +105,7 @@ def _fit(time: FloatArray, values: FloatArray, inside: BoolArray) -> FloatArray:
 def _centre_and_spread(values: FloatArray, inside: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Return the medians (k,) of the values `inside`, and standard deviations about them by the absolute deviation."""
     centre = _medians(values, inside)
-    return centre, _MAD * _medians(np.abs(values - centre[:, np.newaxis]), inside)
+    return centre, MAD_TO_STD * _medians(np.abs(values - centre[:, np.newaxis]), inside)
 
 
 def _medians(values: FloatArray, inside: BoolArray) -> FloatArray:

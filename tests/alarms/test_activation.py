@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.alarms.activation import Activation, begins_at, crossings_of
+from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import judge_alone
 from cdtool.base.errors import UsageError
 from cdtool.detectors.detection import Band, Signal
@@ -15,7 +15,6 @@ from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds.limit import Limit
-from tests.bits import VALUES, clocks, samples
 
 
 def alarms(values, status=None, debounce=3, rearm=0.5, period=1e-3):
@@ -129,39 +128,3 @@ def test_no_alarm_comes_before_the_one_before_it_is_armed_again(samples, debounc
         more = [0.0] * 10 + [2.0] * debounce
         whole = rearmed([*values[: k + 1], *more[10:]], [*status[: k + 1], *([0] * debounce)], debounce, rearm=4e-3)[0]
         assert len(whole) == len(raised) + 1
-
-
-def crossings_by_numpy(activation, statistic, band, inner, begins):
-    """(time, joint, value, limit, armed) of every crossing, with the samples outside marked by numpy."""
-    needed, fresh = activation.needed(statistic.time), begins_at(statistic.time, begins)
-    found = []
-    for joint in range(statistic.values.shape[1]):
-        value, lower, upper = (item[:, joint].copy() for item in (statistic.values, band.lower, band.upper))
-        outside = (value > upper) | (value < lower)
-        calm = ~outside
-        if inner is not None:
-            calm &= ~((value > inner.upper[:, joint]) | (value < inner.lower[:, joint]))
-        status = statistic.status[:, joint].copy()
-        at, armed = crossings_of(statistic.time, outside, calm, status, needed, activation.wait, fresh)
-        for k, was_armed in zip(at, armed, strict=True):
-            limit = upper[k] if value[k] > upper[k] else lower[k]
-            found.append((statistic.time[k], joint, value[k], limit, bool(was_armed)))
-    return sorted(found, key=lambda item: item[:2])
-
-
-@settings(deadline=None, max_examples=40)
-@given(st.data(), st.sampled_from([0, 1, 2, 40]), st.sampled_from([None, 1, 3]), st.booleans(), st.booleans())
-def test_samples_outside_are_marked_as_by_numpy(data, count, debounce, has_inner, begins_again):
-    time = data.draw(clocks(count))
-    likely = st.one_of(st.just(2.0), st.just(0.0), VALUES)
-    values, lower, upper = (data.draw(samples(count, 2, likely)) for _ in range(3))
-    status = data.draw(samples(count, 2, st.sampled_from([0.0, 0.0, 0.0, 1.0, 3.0]))).astype(np.uint8)
-    statistic, band = Signal(time, values, status, "N"), Band(lower - 1.0, upper - 1.0)
-    inner = Band(0.5 * band.lower, 0.5 * band.upper) if has_inner else None
-    begins = time[count // 2 : count // 2 + 1].tolist() if begins_again else []
-    activation = Activation(debounce, rearm=2e-3)
-    made = crossings_by_numpy(activation, statistic, band, inner, begins)
-    for needed in (None, lambda: activation.needed(time)):
-        alarms, crossings = activation.alarms(statistic, band, inner, begins, needed)
-        assert [(item.time, item.column, item.statistic, item.limit) for item in crossings] == [it[:4] for it in made]
-        assert [item.time for item in alarms] == [it[0] for it in made if it[4]]

@@ -11,7 +11,7 @@ from cdtool.alarms.judgement import Judgement, judgement_of
 from cdtool.base.arrays import FloatArray
 from cdtool.detectors.detection import Band, Signal, Status
 from cdtool.recordings.motion import MotionClass
-from cdtool.recordings.motion.applicable import GRACE, applicable_classes, speed_is_recent
+from cdtool.recordings.motion.applicable import speed_is_recent
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import with_limits
 from tests.bits import assert_same_bits
@@ -107,18 +107,3 @@ def test_the_merged_band_and_its_factors_have_the_bits_of_the_rule_for_arrays(cl
                 assert_same_bits(judgement.evaluated[0].values, values)
                 assert_same_bits(judgement.evaluated[0].status, status)
         assert_same_bits(judgement.met_at, met_at_by_arrays(judgement))
-
-
-@pytest.mark.parametrize("cut", ["whole", "motion"])
-def test_detectors_that_learned_the_same_classes_share_where_they_judge(cut):
-    recording = log((0.3, 1.2), (0.0, 1.3), (-0.3, 1.2), (0.0, 1.5))
-    signals = [made_up_signal(recording, seed, 1, 0.0) for seed in (0, 1)]
-    thresholds = [[MadeUp(replace(item), seed) for item in (FAST, BACK)] for seed in (0, 1)]
-    first, second = (judgement_of(recording, *pair, cut) for pair in zip(signals, thresholds, strict=True))
-    assert first.recording is second.recording
-    for one, other in zip(first._evaluations, second._evaluations, strict=True):
-        assert one.recording is other.recording
-        assert one.applies.base is other.applies.base
-    other = applicable_classes(recording, (SLOW,), first.strokes, signals[0].time)
-    again = applicable_classes(recording, (SLOW,), first.strokes, signals[0].time, 2.0 * GRACE)
-    assert sum(item.where.sum() for item in again) > sum(item.where.sum() for item in other) > 0

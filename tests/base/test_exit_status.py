@@ -6,7 +6,6 @@ import re
 from itertools import combinations
 from pathlib import Path
 
-import pytest
 import typer.main
 
 from cdtool.base.exit_status import STATUSES, STATUSES_OF, ExitStatus, Fact, status_of
@@ -74,9 +73,8 @@ def test_every_command_has_its_statuses_listed():
     assert all({ExitStatus.OK, ExitStatus.UNUSABLE} <= of for of in STATUSES_OF.values())
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "cdtool").rglob("*.py")), ids=lambda path: path.stem)
-def test_no_other_module_chooses_a_status(path):
-    text = path.read_text(encoding="utf-8")
-    chosen = re.findall(r"typer\.Exit\(([^)]*)\)|sys\.exit\(([^)\n]*)", text)
-    for words in (one or other for one, other in chosen):
-        assert words == "status" or words.startswith("status_of("), f"{path}: {words}"
+def test_no_other_module_chooses_a_status():
+    for path in sorted((ROOT / "cdtool").rglob("*.py")):
+        chosen = re.findall(r"typer\.Exit\(([^)]*)\)|sys\.exit\(([^)\n]*)", path.read_text(encoding="utf-8"))
+        for words in (one or other for one, other in chosen):
+            assert words == "status" or words.startswith("status_of("), f"{path}: {words}"

@@ -6,45 +6,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
 
-import numpy as np
 import pytest
 
 from cdtool.base import kernels
-from cdtool.base.arrays import FloatArray
-from cdtool.base.kernels import fields_of, kernel, read_only
+from cdtool.base.kernels import kernel
 
 _PROJECT = Path(__file__).parents[2]
-
-
-@kernel("float64(float64)")
-def _double(x: float) -> float:
-    return 2.0 * x
-
-
-@kernel("float64(float64)")
-def _twice_and_one(x: float) -> float:
-    return _double(x) + 1.0
-
-
-def test_a_kernel_may_call_a_kernel_of_its_module():
-    assert _twice_and_one(3.0) == 7.0
-
-
-class _Scale(NamedTuple):
-    factor: float
-    values: FloatArray
-
-
-@kernel(f"float64({fields_of(_Scale)}, int64)")
-def _scaled(scale: _Scale, k: int) -> float:
-    return scale.factor * scale.values[k]
-
-
-@pytest.mark.parametrize("values", [np.arange(3.0), np.arange(6.0)[::2] / 2.0, read_only(np.arange(3.0))])
-def test_a_named_tuple_gives_a_kernel_numbers_and_arrays_by_name(values):
-    assert _scaled(_Scale(values=read_only(values), factor=5.0), 2) == 10.0
 
 
 @pytest.fixture

@@ -20,7 +20,6 @@ from cdtool.base.settings import (
     Place,
     Positive,
     check,
-    keys_of,
     read,
     setting,
     tables_of,
@@ -176,12 +175,6 @@ def test_a_model_made_in_python_is_checked_by_the_same_annotations():
         Outer(limits=(1.0, -1.0))
 
 
-def test_a_key_has_its_meaning_and_unit():
-    key = keys_of(Outer)["mass_kg"]
-    assert (key.attribute, key.meaning, key.extra["unit"], key.required) == ("mass", "of the load", "kg", False)
-    assert "made" not in keys_of(Outer)
-
-
 @dataclass(frozen=True)
 class Day:
     day: dt.date | None = None
@@ -224,8 +217,3 @@ def test_an_empty_list_is_refused_unless_the_field_allows_it(key):
 def test_python_values_of_another_kind_are_refused(given):
     with pytest.raises(UsageError, match=next(iter(given))):
         Outer(**given)
-
-
-@pytest.mark.parametrize("limits", [[1.0, 2.0], np.array([1.0, 2.0]), (1, 2)])
-def test_python_lists_and_arrays_stand_for_tuples(limits):
-    assert list(Outer(limits=limits).limits) == [1.0, 2.0]

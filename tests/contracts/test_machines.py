@@ -11,13 +11,13 @@ import pytest
 
 from cdtool.commands.simulate.arm_model import simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters
-from cdtool.commands.simulate.arm_recordings import as_recording
 from cdtool.formats.machine_file import fingerprint, read_machine_file
 from cdtool.machines import MACHINES
 from cdtool.machines.dynamics import Machine
 from cdtool.machines.rotary_axis import RotaryAxis
 from cdtool.recordings.recording import Recording, Series
 from tests.project.pages import machine_files
+from tests.synthetic.arm_as_recording import as_recording
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 from tests.synthetic.motions import moving_recording
 from tests.synthetic.robots import six_joint_robot

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from cdtool.alarms.activation import Activation
-from cdtool.base.errors import SignatureError
+from cdtool.base.errors import SignatureError, UsageError
+from cdtool.base.settings import keys_of
 from cdtool.detectors.momentum import Momentum
 from cdtool.formats.signature_file import FactorOrigin, SignatureFile
 from cdtool.formats.signature_store import read_signature, write_signature
@@ -33,6 +34,16 @@ def test_it_is_a_frozen_dataclass_that_says_when_it_fails(name):
     assert threshold.name == name
     assert "Fails" in threshold.__doc__
     assert set(threshold.needs) <= set(CHANNELS) - set(GROUND_TRUTH)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_setting_without_meaning_is_refused_by_name(name):
+    rule = THRESHOLDS.load(name)
+    for key in keys_of(rule).values():
+        default = getattr(rule(), key.attribute)
+        for wrong in (np.nan, -1.0) if isinstance(default, float) and default > 0.0 else (np.nan,):
+            with pytest.raises(UsageError, match=key.attribute):
+                rule(**{key.attribute: wrong})
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -105,6 +116,7 @@ def test_shapes_fit_and_a_missing_value_is_never_valid(name, pairs, gate, simula
 @pytest.mark.parametrize("name", NAMES)
 def test_a_flaky_signal_is_judged_where_it_is_there_and_only_there(name, pairs, gate, simulated):
     fitted = THRESHOLDS.load(name)().fit(pairs)
+    fitted = fitted.with_safety_factor(2.0 * fitted.safety_factor)  # so wide that no chance leads out of it
     recording = simulated("none", 4)
     signal = Momentum().signal(recording, gate)
     whole, _ = fitted.evaluate(recording, signal)

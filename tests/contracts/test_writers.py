@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.base.errors import UsageError
 from cdtool.base.files.foreign import refuse_other_kind
-from cdtool.commands.compare.comparison import compare_builds
+from cdtool.commands.compare.comparison import compare
 from cdtool.commands.protocol.assessment.assessment import assess_point, judge
 from cdtool.commands.protocol.assessment.plan import MachineParticulars, MeasuringPoint, TestPlan
 from cdtool.commands.protocol.assessment.protocol import FileDigest, Protocol
@@ -37,7 +37,7 @@ def reports(request) -> dict[str, object]:
     builds = [build_results({("momentum", f"stiff{added}"): [40.0 + late] * 12}, window_s={}) for late in (0.0, 5.0)]
     return {
         "benchmark": benchmark,
-        "comparison": compare_builds(builds[0], builds[1]),
+        "comparison": compare(builds[0], builds[1]),
         "protocol": ProtocolReport(_protocol(added)),
     }
 

@@ -122,42 +122,6 @@ def test_half_the_sample_period_leaves_a_quarter_of_the_error(motions):
     assert worst[:-1] / worst[1:] == pytest.approx(4.0, rel=0.1)
 
 
-def test_a_balance_without_c_transposed_qd_shows_a_contact_without_one(motions):
-    motion = motions[1e-3]
-    time, position, speed, torque = values(motion)
-    residual = observed(motion, torque - ARM.gravity(position), ARM.momentum(position, speed))
-    assert np.max(np.abs(residual[:, 0] - expected(time))) > 1e-3
-
-
-def own_momentum(motion: Motion) -> tuple[FloatArray, ...]:
-    """What 6.28 and 6.31 use: time, own momentum, gravity, the other link's terms with its acceleration and speed."""
-    time, position, speed, torque = values(motion)
-    acceleration = np.column_stack([np.gradient(column, time, edge_order=2) for column in speed.T])
-    turn = (position[:, 1] - position[:, 0])[:, np.newaxis]
-    coupled = H * np.cos(turn) * acceleration[:, ::-1]
-    centrifugal = H * np.sin(turn) * speed[:, ::-1] ** 2 * np.array([1.0, -1.0])
-    gravity = np.array([G1, G2]) * np.cos(position)
-    return time, speed * np.array([M11, M22]), gravity, torque, coupled, centrifugal
-
-
-def test_6_28_and_6_31_put_right_follow_the_contact_and_as_printed_do_not(motions):
-    motion = motions[5e-4]
-    time, momentum, gravity, torque, coupled, centrifugal = own_momentum(motion)
-    away = time < CONTACT_AT - 0.01  # the numerical derivative sees the step in the acceleration too early
-    right = observed(motion, torque - gravity - coupled + centrifugal, momentum)
-    assert np.max(np.abs(right[away])) < 1e-5
-    speed = values(motion)[2]
-    gravity_2_as_printed = gravity[:, 1] * speed[:, 1] ** 2
-    printed = np.column_stack(
-        (
-            torque[:, 0] - 2.0 * coupled[:, 0] + centrifugal[:, 0],
-            torque[:, 1] - coupled[:, 1] + centrifugal[:, 1] - gravity_2_as_printed,
-        )
-    )
-    wrong = observed(motion, printed, momentum)
-    assert (np.max(np.abs(wrong[away]), axis=0) > 0.1).all()
-
-
 def test_the_energy_observer_follows_the_power_that_the_contact_takes_with_its_sign(motions):
     worst = []
     for period in (2e-3, 1e-3, 5e-4):
@@ -168,13 +132,3 @@ def test_the_energy_observer_follows_the_power_that_the_contact_takes_with_its_s
     assert worst[1] < 1e-4
     assert worst[0] / worst[1] == pytest.approx(4.0, rel=0.25)
     assert worst[1] / worst[2] == pytest.approx(4.0, rel=0.25)
-
-
-def test_2_9_as_printed_tends_to_minus_the_power(motions):
-    motion = motions[1e-3]
-    _, position, speed, torque = values(motion)
-    drive = drive_on_speed_clock(motion.log, ARM)
-    energy = ARM.energy(position, speed)
-    # res = k [E - int (v' tau + res) dt - E(0)]
-    printed, _ = observe_momentum(drive, -ARM.drive_power(torque, speed), -(energy - energy[0]), BANDWIDTH, READY[:1])
-    assert np.max(np.abs(printed[:, 0] + motion.filtered_power)) < 1e-4

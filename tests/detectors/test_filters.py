@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
-
 import numpy as np
 import pytest
 from scipy.signal import bilinear, butter, lfilter, lfilter_zi
 
-from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.detectors.desired_dynamics import DesiredDynamics
 from cdtool.detectors.detection import Status
 from cdtool.detectors.direct import Direct
-from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at, unsettled
-from cdtool.recordings.clock.recent_steps import usual_steps
+from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
 from cdtool.recordings.recording import Recording, Series
 from tests.synthetic.machines import machine_of
 
@@ -131,58 +127,3 @@ def test_a_reference_that_the_axis_does_not_follow_makes_the_method_not_applicab
     assert signal.valid[~lost & (TIME > 0.5)].all()
     rms = np.sqrt((3.0 * 0.01**2 + 1.0 * 0.06**2) / 4.0)
     assert signal.notes == (f"tracking error of axis: rms {rms:.3g} m, largest 0.06 m",)
-
-
-def random_clock_and_marks(seed: int) -> tuple[FloatArray, BoolArray]:
-    """A clock with jitter and pauses, and which samples of three joints are lost."""
-    rng = np.random.default_rng(seed)
-    count = int(rng.integers(1, 120))
-    time = np.cumsum(np.where(rng.random(count) < 0.05, rng.integers(2, 12, count), 1.0 + 0.1 * rng.random(count)))
-    lost = rng.random((count, 3)) < 0.1
-    lost[: rng.integers(0, count), 1] = True
-    return 1e-3 * time, lost
-
-
-@pytest.mark.parametrize("seed", range(60))
-def test_starts_and_what_has_not_settled_are_the_bits_of_masks_over_arrays(seed):
-    time, lost = random_clock_and_marks(seed)
-    steps = np.diff(time)
-    usual = np.concatenate((steps[:1], steps[:1], usual_steps(time)[1:-1]))
-    for j in range(3):
-        known = np.flatnonzero(~lost[:, j])
-        starts = [math.inf] * len(time)
-        for number, row in enumerate(known):
-            again = number == 0 or time[row] - time[known[number - 1]] > 0.01
-            starts[row:] = [time[row] if again else starts[row]] * (len(time) - row)
-        np.testing.assert_array_equal(started_at(time, lost, 0.01)[:, j], starts)
-        if len(time) < 3:
-            continue
-        seen = np.concatenate(([time[0]], np.where(lost[:, j], np.nan, time)[:-1]))
-        since = time - np.fmax.accumulate(seen)
-        behind = (since > 2.5 * usual) & ~lost[:, j]
-        until = np.maximum.accumulate(np.where(behind, time + np.minimum(since - usual, 0.01), -np.inf))
-        np.testing.assert_array_equal(unsettled(time, lost, 0.01)[:, j], time < until - 0.5 * usual)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_the_rates_are_those_of_exact_normal_equations(seed):
-    time, _ = random_clock_and_marks(seed + 100)
-    values = np.random.default_rng(seed).normal(size=len(time))
-    k = len(time) - 1
-    window = slice(max(k - 20, 0), k + 1)
-    x, y = ([Fraction(each) for each in (item[window] - item[k]).tolist()] for item in (time, values))
-    first, second = (item[k, 0] for item in polynomial_rates(time, values[:, np.newaxis], 21))
-    if len(x) < 5:
-        assert np.isnan(first) and np.isnan(second)
-        return
-    table = [[sum(a ** (row + c) for a in x) for c in range(4)] for row in range(4)]
-    table = [[*row, sum(b * a**power for a, b in zip(x, y, strict=True))] for power, row in enumerate(table)]
-    for p in range(4):
-        for row in range(4):
-            if row != p:
-                factor = table[row][p] / table[p][p]
-                table[row] = [a - factor * b for a, b in zip(table[row], table[p], strict=True)]
-    linear, square = (float(table[p][4] / table[p][p]) for p in (1, 2))
-    span = time[k] - time[window.start]
-    assert first == pytest.approx(linear, rel=1e-9, abs=1e-9 / span)
-    assert second == pytest.approx(2.0 * square, rel=1e-9, abs=1e-9 / span**2)

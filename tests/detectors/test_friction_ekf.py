@@ -74,40 +74,6 @@ def test_the_gates_bandwidth_falls_in_proportion_to_its_speed(speed, slow, quick
         assert variance == pytest.approx(3503.3, rel=1e-4)
 
 
-def test_the_friction_is_observable_in_motion_and_not_at_rest():
-    for speed, rank in ((150.0, 3), (0.0, 2)):
-        transition = np.array([[1, 0, 0], [-speed / INERTIA, 0, -FRICTION / INERTIA], [0, PERIOD, 1]])
-        observation = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        stacked = np.vstack([observation, observation @ transition, observation @ transition @ transition])
-        stacked = stacked / np.abs(stacked).max(axis=0).clip(1e-300)
-        assert np.linalg.matrix_rank(stacked, tol=1e-12) == rank
-
-
-def test_at_rest_the_frictions_variance_would_grow_by_its_drift_every_step():
-    p = (1e-8, 0.0, 0.0, 1.0, 0.0, 1.0)
-    for step in range(1, 200):
-        p = predict_covariance(p, 0.0, -FRICTION / INERTIA, PERIOD, *PROCESS)
-        p = update_second(p, *(np.array([p[1], p[3], p[4]]) / (p[3] + NOISE[0])), NOISE[0])
-        p = update_third(p, *(np.array([p[2], p[4], p[5]]) / (p[5] + NOISE[1])), NOISE[1])
-        assert p[0] == pytest.approx(1e-8 + step * PROCESS[0], rel=1e-12)
-
-
-def test_the_covariance_stays_positive_definite_over_a_long_alternating_motion():
-    ekf = FrictionEkf()
-    process = (ekf.friction_drift**2 * 1e-3, ekf.drift_acceleration**2, ekf.drift_speed**2)
-    noise = (ekf.sigma_acceleration**2, ekf.sigma_speed**2)
-    p = (ekf.friction_drift**2 * 10.0, 0.0, 0.0, noise[0], 0.0, noise[1])
-    smallest = np.inf
-    for k in range(100_000):
-        v = 0.2 * np.sin(k / 3000.0)
-        p = predict_covariance(p, -v / 1154.4, -900.0 / 1154.4, 1e-3, *process)
-        p = update_second(p, p[1] / (p[3] + noise[0]), p[3] / (p[3] + noise[0]), p[4] / (p[3] + noise[0]), noise[0])
-        p = update_third(p, p[2] / (p[5] + noise[1]), p[4] / (p[5] + noise[1]), p[5] / (p[5] + noise[1]), noise[1])
-        if k % 100 == 0:
-            smallest = min(smallest, float(np.linalg.eigvalsh(square(p))[0]))
-    assert smallest > 1e-8
-
-
 def moving(speed: FloatArray, force: FloatArray, acceleration: FloatArray | None = None) -> Recording:
     time = np.arange(len(speed)) * 1e-3
     rate = np.gradient(speed, 1e-3) if acceleration is None else acceleration
@@ -126,12 +92,6 @@ def test_a_constant_friction_is_found(gate):
     assert signal.unit == "N s/m"
     assert signal.values[-1, 0] == pytest.approx(900.0, rel=1e-4)
     assert signal.valid[-1, 0]
-
-
-def test_backward_motion_gives_the_same_positive_friction(gate):
-    n = 6000
-    log = moving(np.full(n, -0.2), np.full(n, -0.2 * 900.0), np.zeros(n))
-    assert FrictionEkf().signal(log, gate).values[-1, 0] == pytest.approx(900.0, rel=1e-4)
 
 
 def test_standing_still_is_not_applicable_and_the_estimate_holds(gate):

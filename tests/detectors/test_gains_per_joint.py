@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
-from cdtool.alarms.activation import Activation
-from cdtool.base.errors import ConfigurationError, FieldsError, SignatureError
+from cdtool.base.errors import ConfigurationError, FieldsError
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
-from cdtool.formats.machine_file import fingerprint, read_machine_file
-from cdtool.formats.signature_file import FactorOrigin, SignatureFile
-from cdtool.formats.signature_store import read_signature, write_signature
-from cdtool.thresholds.signature import Signature
+from cdtool.formats.machine_file import read_machine_file
 from tests.synthetic.machines import GATE, machine_of
 from tests.synthetic.motions import moving_recording
 
@@ -80,30 +76,3 @@ bandwidth = BANDWIDTH
         path.write_text(text.replace("BANDWIDTH", wrong))
         with pytest.raises(ConfigurationError, match=words):
             read_machine_file(path)
-
-
-def test_a_signature_keeps_them_and_is_checked_against_them(tmp_path, gate, simulated):
-    detector = Momentum(bandwidth=(10.0,))
-    runs = [(simulated("none", seed), detector.signal(simulated("none", seed), gate)) for seed in range(10, 20)]
-    fitted = Signature(position_step=0.02, position_window=0.1).fit(runs)
-    gains = {"bandwidth": detector.bandwidth}
-    stored = SignatureFile(
-        machine="gate",
-        machine_fingerprint=fingerprint(gate),
-        detector="momentum",
-        gains=gains,
-        unit="N",
-        joints=fitted.joints,
-        rule=Signature(),
-        origin=FactorOrigin(),
-        activation=Activation(),
-        current=(fitted,),
-        first=(fitted,),
-        runs=(),
-    )
-    write_signature(tmp_path / "s.json", stored)
-    again = read_signature(tmp_path / "s.json")
-    again.check(gate, detector)
-    assert again.gains == gains
-    with pytest.raises(SignatureError, match="bandwidth"):
-        again.check(gate, replace(detector, bandwidth=(11.0,)))

@@ -115,7 +115,7 @@ def test_residual_and_status_are_those_of_the_modes_of_every_step(joints, seed):
     expected, expected_status = observed_by_modes(*inputs, inertia, missing, gains)
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
     np.testing.assert_array_equal(status, expected_status)
-    assert {Status.GAP, Status.START_UP, Status.VALID} == set(status.ravel().tolist())
+    assert {Status.GAP, Status.START_UP} <= set(status.ravel().tolist())
     for part in (1, 5, 200):
         head, head_status = observe_velocity(
             *(item[:part] for item in inputs),

@@ -10,9 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.reading import survey
-from cdtool.formats.containers.container_checks import check_chunks
 from tests.formats import bombs
 from tests.time_bounds import check
 
@@ -90,18 +88,3 @@ def test_plain_files_pass_every_check(tmp_path):
 
 
 # --- HDF5
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (bombs.hdf5_one_chunk, "unpacks to 4096 MiB"),
-        (bombs.hdf5_packed_twice, "dataset 'a' is compressed more than once: refused"),
-    ],
-    ids=["one chunk", "packed twice"],
-)
-def test_a_chunk_that_decompresses_to_far_more_than_its_file_is_refused(tmp_path, make, message):
-    h5py = pytest.importorskip("h5py")
-    path = make(tmp_path / "a.h5")
-    with h5py.File(path) as file, pytest.raises(RecordingError, match=message):
-        check_chunks(path, "a", file["a"])

@@ -155,37 +155,6 @@ def test_wrong_kinds_of_a_label_name_their_key(tmp_path, kinds, said):
         read(tmp_path, MACHINE + LABEL.replace("KINDS", kinds))
 
 
-def test_a_misspelt_type_or_a_wrong_value_of_the_machine_hides_no_mistake_of_its_channels(tmp_path):
-    wrong = (
-        (MACHINE + CHANNELS)
-        .replace("linear_axis", "linear_axes")
-        .replace("load_mass = 620.0", "load_mas = 620.0\nstick_speed = 0")
-        .replace("coulomb_friction = 0.0", "coulomb_friction = true")
-        .replace(", scale = 0.56", "")
-        .replace('unit = "rad" }', 'unit = "kg" }')
-        .replace("time_offset", "time_offse")
-    )
-    with pytest.raises(MistakesError) as caught:
-        read(tmp_path, wrong)
-    assert [fault.key for fault in caught.value.mistakes] == [
-        "machine.type",
-        "machine.load_mas",
-        "machine.stick_speed",
-        "machine.coulomb_friction",
-        "channels.acceleration.time_offse",
-        "channels.torque.scale",
-        "channels.position.unit",
-    ]
-
-
-def test_without_a_machine_the_keys_of_the_channels_are_checked(tmp_path):
-    wrong = CHANNELS.replace("time_offset", "time_offse").replace('"rpm"', "3")
-    with pytest.raises(MistakesError) as caught:
-        read(tmp_path, '[machine]\ntype = "planar_arm"\ngravity = "low"\n' + wrong)
-    keys = [fault.key for fault in caught.value.mistakes]
-    assert {"machine.gravity", "channels.acceleration.time_offse", "channels.speed.unit"} < set(keys)
-
-
 MISTAKEN = """
 name = 3
 joints = ["a", "a"]

@@ -34,15 +34,6 @@ def test_a_matrix_with_more_columns_than_rows_is_transposed_with_a_note(saved):
     assert source.findings[0].kind == "rows_as_columns"
 
 
-def test_what_has_no_column_is_named_and_single_numbers_and_texts_are_details(saved):
-    cells = np.array([["a"], [2.0]], dtype=object)
-    source = Mat().columns(saved({"t": np.arange(3.0), "s": {"a": 1}, "c": cells, "w": "words", "z": np.ones(3) * 1j}))
-    left_out = {(finding.numbers["variable"], finding.numbers["what"]) for finding in source.findings}
-    assert left_out == {("c", "a cell"), ("z", "complex")}
-    assert source.details == {"s.a": "1", "w": "words"}
-    assert list(source.columns) == ["t"]
-
-
 def test_a_damaged_number_type_is_an_error_and_does_not_crash_the_process(saved):
     path = of_an_unknown_kind(saved({"q": np.arange(50.0)}))
     with pytest.raises(RecordingError, match=r"damaged at byte 128: .*unknown kind \(111\)"):
@@ -55,15 +46,6 @@ def of_an_unknown_kind(path: Path) -> Path:
     at = whole.index(b"\x09\0\0\0\x90\x01\0\0")  # miDOUBLE, 400 bytes
     path.write_bytes(whole[:at] + b"\x6f" + whole[at + 1 :])
     return path
-
-
-@pytest.mark.parametrize("compressed", [True, False])
-@pytest.mark.parametrize("size", [60, 130, 200, 900, -1])
-def test_a_cut_file_is_one_clear_error(saved, size, compressed):
-    path = saved({"t": np.arange(500.0), "q": np.random.default_rng(0).random(500)}, do_compression=compressed)
-    path.write_bytes(path.read_bytes()[:size])
-    with pytest.raises(RecordingError, match=r"log\.mat: (damaged at byte|is not a MATLAB file)"):
-        Mat().columns(path)
 
 
 def test_a_missing_variable_is_named_with_its_channel(saved, machine):

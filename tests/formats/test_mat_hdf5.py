@@ -129,27 +129,3 @@ def test_a_dataset_in_other_files_is_not_followed(tmp_path):
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
     assert [finding.numbers["what"] for finding in source.findings] == ["an array stored in other files"] * 2
-
-
-@pytest.mark.parametrize("at", [700, 1500, -1])
-def test_a_file_with_inserted_bytes_is_refused(tmp_path, at):
-    path = save_v73(tmp_path / "a.mat", {"t": np.arange(500.0), "q": np.arange(500.0)})
-    whole = path.read_bytes()
-    path.write_bytes(whole[:at] + bytes(37) + whole[at:])
-    with pytest.raises(RecordingError, match=r"a\.mat: damaged"):
-        survey(path)
-
-
-def test_damaged_bytes_are_one_line_or_the_remaining_values(tmp_path):
-    path = save_v73(tmp_path / "a.mat", {"t": np.arange(50.0), "q": np.ones((50, 3))}, compression="gzip")
-    whole, random = path.read_bytes(), np.random.default_rng(8)
-    for _ in range(150):
-        wrong = bytearray(whole)
-        wrong[int(random.integers(512, len(whole)))] ^= 1 << int(random.integers(8))
-        path.write_bytes(wrong)
-        try:
-            source = Mat().columns(path)
-        except RecordingError as fault:
-            assert "\n" not in str(fault)
-        else:
-            assert all(len(column.values) for column in source.columns.values())

@@ -117,50 +117,6 @@ def test_days_of_datenum_are_seconds_since_the_first(source_of):
     assert [fact.numbers["start"] for fact in facts(source, "days_of_matlab")] == ["2024-05-13T12:00:00.000"]
 
 
-def test_several_clocks_in_days_start_together(source_of):
-    later = NOON + (5.0 + T) / 86400
-    source = source_of({"a": {"t": NOON + T / 86400, "x": T}, "b": {"t": later, "y": T}})
-    np.testing.assert_allclose(source.columns["b.y"].time, 5.0 + T, rtol=0.0, atol=1.1e-5)
-    assert source.columns["a.x"].time[0] == 0.0 and source.origin == 1_715_601_600.0
-
-
-def test_an_image_in_a_struct_is_left_out_by_name(source_of):
-    source = source_of({"log": {"t": T, "image": np.ones((70, 90))}})
-    assert list(source.columns) == ["log.t"]
-    assert [fact.numbers["what"] for fact in facts(source, "variable_left_out")] == [
-        "a 70 x 90 matrix, too wide for a log"
-    ]
-
-
-def test_large_integers_are_counted(source_of):
-    source = source_of({"log": {"n": np.array([1, 2**60 + 1], dtype=np.int64)}})
-    assert [str(finding) for finding in source.findings if finding.channel == "log.n"] != []
-
-
-@pytest.mark.parametrize(
-    ("matlab_class", "advice"),
-    [
-        ("table", "save it as a struct: table2struct(log.x, 'ToScalar', true)"),
-        (
-            "timetable",
-            "save it as a struct: table2struct(timetable2table(log.x), 'ToScalar', true), with its row times",
-        ),
-        ("timeseries", "struct('time', log.x.Time, 'data', log.x.Data)"),
-        ("duration", "seconds(log.x)"),
-        ("my.Class", "save its properties as a struct of numbers"),
-    ],
-)
-def test_objects_are_named_with_what_makes_them_readable(tmp_path, matlab_class, advice):
-    h5py = pytest.importorskip("h5py")
-    path = save_v73(tmp_path / "log.mat", {"t": T, "log": {"a": 1.0}})
-    with h5py.File(path, "a") as file:
-        file["log"].create_dataset("x", data=np.zeros((1, 6), np.uint32)).attrs.update(
-            {"MATLAB_class": np.bytes_(matlab_class), "MATLAB_object_decode": np.int32(3)}
-        )
-    (finding,) = Mat().columns(path).findings
-    assert advice in finding.sentence and len(str(finding)) <= 300
-
-
 def test_an_object_of_version_7_is_named_by_its_class(tmp_path):
     """An opaque array: flags, name, type system, class, then what only MATLAB can read."""
     path = save_v7(tmp_path / "log.mat", {"t": T})
@@ -242,24 +198,6 @@ def test_any_struct_has_the_same_columns_in_both_versions(tmp_path_factory, fiel
     assert new.names == old.names and new.findings == old.findings and new.details == old.details
     for name, column in old.columns.items():
         assert new.columns[name].values.tobytes() == column.values.tobytes()
-
-
-@pytest.mark.parametrize("save", SAVE)
-def test_damaged_bytes_are_one_line_or_the_remaining_values(tmp_path, save):
-    if save is save_v73:
-        pytest.importorskip("h5py")
-    path = save(tmp_path / "a.mat", {"log": {"t": T, "c": (T, "x"), "j": trials()}})
-    whole, random = path.read_bytes(), np.random.default_rng(8)
-    for attempt in range(60):
-        wrong = bytearray(whole)
-        wrong[int(random.integers(128, len(whole)))] ^= 1 << int(random.integers(8))
-        path.write_bytes(wrong if attempt % 3 else whole[: int(random.integers(1, len(whole)))])
-        try:
-            source = survey(path)
-        except RecordingError as fault:
-            assert "\n" not in str(fault)
-        else:
-            assert all(len(column.values) for column in source.columns.values())
 
 
 def test_structs_nested_without_end_are_refused(tmp_path):

@@ -47,7 +47,7 @@ def test_a_damaged_file_yields_all_readable_messages_and_nothing_else_and_report
     assert not failures
 
 
-@pytest.mark.parametrize("number", [1126, 1133], ids=["a data end before the data's end", "an index beyond any file"])
+@pytest.mark.parametrize("number", [1126, 1261], ids=["a data end before the data's end", "an index beyond any file"])
 def test_cases_of_another_seed_that_have_failed_before(path, number):
     (case,) = cases(22, 1, number)
     assert not faults(case, path)

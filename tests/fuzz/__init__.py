@@ -1,1 +1,1 @@
-"""Fuzz targets of the readers, and the inputs they have found."""
+"""Hostile files and options to every command."""

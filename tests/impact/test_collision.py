@@ -128,15 +128,6 @@ def test_a_ball_that_falls_flies_as_long_as_gravity_says():
         assert after.approach_speed == pytest.approx(-before.rate[-1], rel=1e-9)
 
 
-def test_a_flight_with_friction_meets_the_integrated_motion():
-    time, speed = EXAMPLE.flight(-0.2181, 0.0) or (math.nan, math.nan)
-    at = np.linspace(0.0, time, 200_001)
-    settling, final = EXAMPLE.mass_1 / EXAMPLE.friction, EXAMPLE.push / EXAMPLE.friction
-    speeds = final + (-0.2181 - final) * np.exp(-at / settling)
-    assert np.trapezoid(speeds, at) == pytest.approx(0.0, abs=1e-10)
-    assert speed == pytest.approx(speeds[-1], rel=1e-12)
-
-
 @settings(max_examples=40, deadline=None)
 @given(laws(), st.floats(0.05, 50.0), st.floats(0.05, 50.0), st.floats(0.02, 3.0), st.floats(-2.0, 2.0))
 def test_a_passive_contact_never_makes_energy_never_pulls_and_keeps_the_momentum(law, mass_1, mass_2, approach, drift):
@@ -154,16 +145,6 @@ def test_a_passive_contact_never_makes_energy_never_pulls_and_keeps_the_momentum
     assert hit.impulse[-1] == pytest.approx(mass_1 * (hit.speeds[0, 0] - hit.speeds[-1, 0]), rel=1e-6)
     e = hit.restitution
     assert (e.poisson, e.stronge) == pytest.approx((e.newton, e.newton), abs=1e-5)
-
-
-@settings(max_examples=15, deadline=None)
-@given(st.floats(0.1, 10.0), st.floats(0.05, 2.0), st.floats(1e5, 1e10), st.floats(1.5, 20.0))
-def test_a_simulated_contact_of_hertz_scales_as_its_closed_form(mass, speed, stiffness, factor):
-    law = Hertz(stiffness)
-    first, second = (collide(law, Bodies(mass, v)).first for v in (speed, factor * speed))
-    assert first.duration == pytest.approx(2.9432752 * first.greatest_penetration / speed, rel=1e-6)
-    assert second.duration / first.duration == pytest.approx(factor**-0.2, rel=1e-6)
-    assert second.peak_force / first.peak_force == pytest.approx(factor**1.2, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -170,8 +170,3 @@ def test_a_swinging_leaf_on_its_hinge_hits_with_its_moment_and_can_be_locked_by_
 def test_an_impact_without_meaning_is_refused(arguments, said):
     with pytest.raises(UsageError, match=said):
         strike(*arguments)
-
-
-def test_a_body_without_mass_is_refused():
-    with pytest.raises(UsageError, match="0 kg"):
-        RigidBody(0.0, 1.0, ORIGIN)

@@ -11,7 +11,6 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError, RecordingError
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recordings.recording import Recording, Series
-from tests.base.findings.facts import fact_of
 from tests.synthetic.machines import ARM, arm_of
 from tests.synthetic.motions import moving_recording
 
@@ -68,21 +67,6 @@ def test_6_21_and_6_22_are_lagranges_equations_of_these_energies(arm):
     np.testing.assert_allclose(arm.inverse_dynamics(POSITION, SPEED, ACCELERATION), wanted, atol=1e-9)
 
 
-def test_momentum_velocity_force_and_gravity_make_the_rate_of_the_momentum(arm):
-    """dM/dt = C + C': dp/dt = tau + C'v - g wherever tau is what the motion needs."""
-    momentum, velocity_force, gravity = arm.momentum_terms(POSITION, SPEED)
-    needed = arm.inverse_dynamics(POSITION, SPEED, ACCELERATION)
-    step = 1e-4
-
-    def later(t: float) -> FloatArray:
-        position = POSITION + t * SPEED + 0.5 * t**2 * ACCELERATION
-        return arm.momentum(position, SPEED + t * ACCELERATION)
-
-    rate = (8.0 * (later(step) - later(-step)) - (later(2.0 * step) - later(-2.0 * step))) / (12.0 * step)
-    np.testing.assert_allclose(momentum, later(0.0), rtol=1e-12)
-    np.testing.assert_allclose(rate, needed + velocity_force - gravity, atol=1e-9)
-
-
 def sensed(arm: PlanarArm, elbow: bool = True) -> tuple[Recording, FloatArray]:
     """A log whose sensors feel what two accelerometers at imu_position would, and the links' true accelerations.
 
@@ -114,24 +98,6 @@ def test_the_sensors_specific_forces_become_the_links_angular_accelerations(arm)
     found = arm.link_acceleration(log)
     assert found.unit == "rad/s2"
     np.testing.assert_allclose(found.values, true, atol=1e-9)
-
-
-def test_a_log_of_motors_and_sensors_is_referred_to_the_links(arm):
-    log, true = sensed(arm)
-    as_logged = {
-        name: Series(series.time, series.values * 60.0, series.unit)
-        for name, series in log.channels.items()
-        if name in ("position", "speed")
-    }
-    as_logged["torque"] = Series(log["torque"].time, log["torque"].values / 60.0, "N m")
-    as_logged["acceleration"] = log["acceleration"]
-    referred = arm.referred_to_load(replace(log, channels=as_logged))
-    for name in ("torque", "position", "speed"):
-        np.testing.assert_allclose(referred[name].values, log[name].values, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(referred["acceleration"].values, true, atol=1e-9)
-    assert [fact_of(finding) for finding in referred.findings if finding.channel == "acceleration"] == [
-        ("link_accelerations", {})
-    ]
 
 
 @pytest.mark.parametrize(("lost", "named"), [(("position",), "position"), (("speed", "position"), "position")])

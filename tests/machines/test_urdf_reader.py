@@ -195,64 +195,11 @@ def test_broken_xml_is_reported_with_line_and_column(tmp_path):
     assert "broken XML in line 2, column 18: mismatched tag" in refused(path).message
 
 
-def test_an_xacro_file_must_be_expanded_first(tmp_path):
-    body = BODY.replace('"1.5"', '"${mass}"')
-    fault = refused(write(tmp_path, link("base", body), *ARM[1:]))
-    assert "link 'base': <mass> value is '${mass}'" in fault.message
-    assert "xacro" in fault.hint
-
-
 @needs_pinocchio
 def test_what_the_urdf_parser_finds_is_in_the_message_and_not_on_the_terminal(tmp_path, capfd):
     fault = refused(write(tmp_path, *ARM, link("island")))
     assert "Two root links found" in fault.message
     assert capfd.readouterr() == ("", "")
-
-
-def test_a_joint_that_is_not_there_lists_the_nearest_and_the_map_of_names(tmp_path):
-    fault = refused(write(tmp_path, *ARM), ["jj"])
-    assert "no moving joint 'jj'" in fault.message
-    assert "did you mean j?" in fault.hint
-    assert "joint_map" in fault.hint
-
-
-def test_joints_neither_logged_nor_locked_are_listed_with_the_line_to_write(tmp_path):
-    path = write(tmp_path, *ARM, link("tip"), TIP, link("end"), joint("slide", "prismatic", "tip", "end"))
-    fault = refused(path)
-    assert "neither logged nor locked: tip, slide" in fault.message
-    assert fault.hint == "locked = { tip = 0.0, slide = 0.0 }"
-
-
-@pytest.mark.parametrize(
-    ("joints", "locked", "message"),
-    [
-        (["j", "j"], {}, "joint 'j' is given twice"),
-        (["j"], {"j": 0.0}, "joint 'j' is both logged and locked"),
-        (["j"], {"k": 0.0}, "no moving joint 'k' to lock"),
-        ([], {"j": float("nan")}, "joint 'j' is locked at nan"),
-    ],
-)
-def test_names_that_do_not_fit_are_refused(tmp_path, joints, locked, message):
-    assert message in refused(write(tmp_path, *ARM), joints, locked).message
-
-
-@pytest.mark.parametrize("kind", ["floating", "planar", "spherical"])
-def test_other_types_of_joints_are_refused(tmp_path, kind):
-    fault = refused(write(tmp_path, link("base"), link("arm"), joint("j", kind, "base", "arm")))
-    assert f"joint 'j': type '{kind}' is not supported" in fault.message
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('value="1.5"', 'value="-1.5"', "link 'arm': mass -1.5 kg is negative"),
-        ('ixx="0.03"', 'ixx="nan"', "link 'arm': <inertia> ixx is 'nan'"),
-        ('xyz="0.1 -0.05 0.2"', 'xyz="0.1 inf 0.2"', "link 'arm': <origin> xyz is '0.1 inf 0.2'"),
-    ],
-)
-def test_masses_and_inertias_that_cannot_be_are_refused(tmp_path, old, new, message):
-    path = write(tmp_path, link("base"), link("arm", BODY.replace(old, new)), ARM[2])
-    assert message in refused(path).message
 
 
 @needs_pinocchio
@@ -277,13 +224,37 @@ def test_another_kind_of_xml_is_no_urdf(tmp_path):
     assert "its root is <sdf>" in refused(path).message
 
 
-def test_no_joint_at_all_is_refused(tmp_path):
-    assert "no joint is logged" in refused(write(tmp_path, *ARM), [], {"j": 0.0}).message
+LINKS = (link("base"), link("arm"))
+SLIDE = (link("tip"), TIP, link("end"), joint("slide", "prismatic", "tip", "end"))
 
 
-def test_an_axis_without_length_is_refused(tmp_path):
-    path = write(tmp_path, link("base"), link("arm"), joint("j", "revolute", "base", "arm", axis="0 0 0"))
-    assert "joint 'j': its axis has the length 0" in refused(path).message
+def heavy(old: str, new: str) -> tuple[str, ...]:
+    """The arm, one of the values of its body another."""
+    return (link("base"), link("arm", BODY.replace(old, new)), ARM[2])
+
+
+@pytest.mark.parametrize(
+    ("parts", "joints", "locked", "message", "hint"),
+    [
+        (ARM, ["jj"], {}, "no moving joint 'jj'", "did you mean j?"),
+        (ARM, ["jj"], {}, "no moving joint 'jj'", "joint_map"),
+        (ARM, ["j", "j"], {}, "joint 'j' is given twice", ""),
+        (ARM, ["j"], {"j": 0.0}, "joint 'j' is both logged and locked", ""),
+        (ARM, ["j"], {"k": 0.0}, "no moving joint 'k' to lock", ""),
+        (ARM, [], {"j": float("nan")}, "joint 'j' is locked at nan", ""),
+        (ARM, [], {"j": 0.0}, "no joint is logged", ""),
+        ((*ARM, *SLIDE), ["j"], {}, "neither logged nor locked: tip, slide", "locked = { tip = 0.0, slide = 0.0 }"),
+        ((*LINKS, joint("j", "planar", "base", "arm")), ["j"], {}, "joint 'j': type 'planar' is not supported", ""),
+        ((*LINKS, joint("j", "revolute", "base", "arm", "0 0 0")), ["j"], {}, "'j': its axis has the length 0", ""),
+        (heavy('value="1.5"', 'value="${mass}"'), ["j"], {}, "link 'arm': <mass> value is '${mass}'", "xacro"),
+        (heavy('value="1.5"', 'value="-1.5"'), ["j"], {}, "link 'arm': mass -1.5 kg is negative", ""),
+        (heavy('ixx="0.03"', 'ixx="nan"'), ["j"], {}, "link 'arm': <inertia> ixx is 'nan'", ""),
+        (heavy("0.1 -0.05 0.2", "0.1 inf 0.2"), ["j"], {}, "link 'arm': <origin> xyz is '0.1 inf 0.2'", ""),
+    ],
+)
+def test_a_robot_that_cannot_be_is_one_line_with_the_next_step(tmp_path, parts, joints, locked, message, hint):
+    fault = refused(write(tmp_path, *parts), joints, locked)
+    assert message in fault.message and hint in fault.hint
 
 
 def test_drive_inertias_that_are_not_one_per_joint_are_refused(tmp_path):

@@ -180,7 +180,3 @@ def test_a_force_at_a_known_point_of_the_last_link_is_recovered_from_the_residua
     force[:, :3] = [[30.0, -20.0, 10.0], [-5.0, 0.0, 40.0]]
     residual = robot.contact_torque(POSE, force, "link6", (0.05, 0.0, 0.1))
     np.testing.assert_allclose(robot.contact_force(POSE, residual, "link6", (0.05, 0.0, 0.1)), force[:, :3], atol=1e-9)
-
-
-def test_joints_have_to_be_named(tmp_path):
-    assert "machine.joints: is missing" in refused(tmp_path, joints=None).message

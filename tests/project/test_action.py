@@ -146,12 +146,6 @@ def test_a_violated_limit_is_commented_on_and_fails_the_last_step(runner):
     assert "limit violated" in runner.comments()[0]["body"]
 
 
-def test_without_a_summary_the_comment_states_the_exit_status(runner):
-    runner.environment["STATUS_TO_RETURN"] = "2"
-    assert runner.all_steps() == 2
-    assert "wrote no summary (exit status 2)" in runner.comments()[0]["body"]
-
-
 @pytest.mark.parametrize(
     ("fails", "why"), [("read", "cannot be read"), ("write", "a fork, or no pull-requests: write")]
 )

@@ -120,25 +120,6 @@ def test_a_benchmark_that_cannot_run_fails_the_job_and_later_steps_continue(shel
     assert shell(github_step("cdtool compare")).returncode == shell(github_step("GITHUB_STEP_SUMMARY")).returncode == 0
 
 
-def test_github_gets_least_permissions_pinned_actions_a_cache_and_an_end():
-    values, job = parsed("github-actions.yml"), github_job()
-    assert values["permissions"] == {} and job["permissions"] == {"contents": "read", "actions": "read"}
-    assert job["timeout-minutes"] <= 30
-    used = [step["uses"] for step in job["steps"] if "uses" in step]
-    assert [item.partition("@")[0] for item in used] == [
-        "actions/checkout",
-        "actions/setup-python",
-        "actions/upload-artifact",
-    ]
-    assert all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", item) for item in used)
-    (python,) = [step["with"] for step in job["steps"] if "setup-python" in step.get("uses", "")]
-    assert python["cache"] == "pip"
-    keep = job["steps"][-1]
-    assert keep["if"] == "always()" and keep["with"]["path"] == "out/"
-    fetch = github_step("gh run download")
-    assert f"--name {keep['with']['name']} --dir baseline" in fetch and "--branch main" in fetch
-
-
 def test_the_page_names_every_quantity_and_its_limits_are_valid():
     section = PAGE.partition("\n## Limits\n")[2].partition("\n## ")[0]
     table = [line for line in section.splitlines() if line.startswith("| `")]

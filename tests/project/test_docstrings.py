@@ -21,9 +21,8 @@ import dataclasses
 import doctest
 import inspect
 import re
-import shutil
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -43,6 +42,8 @@ ROOMS = ("detectors", "thresholds", "results")
 OF_RESULTS = ("truth", "statistics")  # with the results one room
 WHOLE_MODULES = ("cdtool.detectors.base", "cdtool.detectors.filters", "cdtool.thresholds.base")
 STATISTICS = "cdtool.statistics"
+# The classes of the API that have an example.
+RESULTS = ("BenchmarkResult", "DetectionResult", "DetectionResults")
 CONTRACTS = (Detector.signal, Threshold.fit, FittedThreshold.evaluate)
 
 _IMPORT = re.compile(
@@ -222,21 +223,9 @@ def test_a_class_of_the_api_has_a_summary_of_one_line_and_its_methods_are_descri
     assert not faults
 
 
-@pytest.mark.parametrize("name", ["BenchmarkResult", "DetectionResult", "DetectionResults"])
-def test_the_example_of_a_result_runs(name, folder):
-    test = examples_of(name, public()[name], {})
-    assert test.examples
-    assert not run([test])
-
-
 @pytest.mark.parametrize("name", sorted(rules()))
 def test_a_detector_or_threshold_describes_its_settings_with_units_its_equation_and_when_it_fails(name):
     assert not faults_of_class(rules()[name])
-
-
-def examples_of(name: str, item: Any, names: Mapping[str, Any]) -> doctest.DocTest:
-    """The examples in a docstring, which may use `names`."""
-    return doctest.DocTestParser().get_doctest(inspect.getdoc(item) or "", dict(names), name, name, 0)
 
 
 def run(tests: list[doctest.DocTest]) -> str:
@@ -248,33 +237,19 @@ def run(tests: list[doctest.DocTest]) -> str:
     return "".join(said)
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A fresh folder that looks like a checkout to an example."""
-    (tmp_path / "docs").mkdir()
-    shutil.copytree(ROOT / "sample_logs", tmp_path / "sample_logs")  # commands may write beside a benchmark file
-    (tmp_path / "docs" / "examples").symlink_to(ROOT / "docs" / "examples")
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.mark.parametrize("name", sorted(api()))
-def test_the_example_of_a_function_of_the_api_runs(name, folder):
-    test = examples_of(name, api()[name], {})
+@pytest.mark.usefixtures("checkout")
+@pytest.mark.parametrize("name", sorted({*api(), *rules(), *RESULTS}))
+def test_an_example_runs(name):
+    item = (public() | api() | rules())[name]
+    known = dict(vars(import_module(item.__module__))) if name in rules() else {}
+    test = doctest.DocTestParser().get_doctest(inspect.getdoc(item) or "", known, name, name, 0)
     assert test.examples
     assert not run([test])
 
 
-@pytest.mark.parametrize("name", sorted(rules()))
-def test_the_example_of_a_detector_or_threshold_runs(name, folder):
-    rule = rules()[name]
-    test = examples_of(name, rule, vars(import_module(rule.__module__)))
-    assert test.examples
-    assert not run([test])
-
-
+@pytest.mark.usefixtures("checkout")
 @pytest.mark.parametrize("room", ROOMS)
-def test_the_other_examples_of_the_method_run(room, folder):
+def test_the_other_examples_of_the_method_run(room):
     modules = [name for name, text in texts().items() if room_of(name) == room and ">>>" in text]
     tests = [test for name in modules for test in doctest.DocTestFinder().find(import_module(name), name)]
     tests = [test for test in tests if test.name not in rules()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import tomllib
 from types import ModuleType
 
@@ -40,3 +41,17 @@ def test_no_count_of_the_house_exceeds_its_bound(counts, bounds):
 def test_the_bounds_follow_what_has_left(counts, bounds):
     loose = {name: most for name, most in bounds.items() if most > counts.get(name, 0) + max(SLACK, SHARE * most)}
     assert not loose, "run python benchmarks/structure.py --lower"
+
+
+def test_every_number_of_a_module_has_its_reason(script):
+    bare = []
+    for module in script.modules_of(script.PACKAGE).values():
+        numbers, lines = set(script.number_constants(module)), ["", *module.text.splitlines()]
+        for node in module.tree.body:
+            stored = {
+                each.id for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)
+            }
+            is_number = isinstance(node, ast.Assign | ast.AnnAssign) and stored & numbers
+            if is_number and "#" not in lines[node.lineno] and not lines[node.lineno - 1].startswith("#"):
+                bare.append(f"{module.path}:{node.lineno}")
+    assert not bare, "say why it is so large, as a comment on its line or the line above"

@@ -24,7 +24,6 @@ SHOWN_BY = {
     "planning": {"plan"},
     "detection": {"detect"},
     "prepared": {"detect"},
-    "prepared_benchmark": {"detect"},
     "recovering": {"convert"},
     "score_triggers": {"score"},
     "study_file": {"study new", "study", "study run"},

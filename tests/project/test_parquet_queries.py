@@ -64,14 +64,6 @@ def test_a_contact_that_every_detector_missed_is_found(tmp_path, monkeypatch):
     assert by_all and {row["recording"] for row in rows} == by_all
 
 
-def test_false_alarms_are_counted_with_their_days(tmp_path, monkeypatch):
-    results = many_results(900)
-    rows = asked(results, FALSE_ALARMS, tmp_path, monkeypatch)
-    assert sum(row["false_alarms"] for row in rows) == len(results.false_alarms) > 0
-    days = {f"{day:%Y-%m-%d}" for row in rows for day in row["days"] or ()}
-    assert days == {item.recording.split("/")[2] for item in results.false_alarms}
-
-
 def test_the_step_that_is_exceeded_most_is_the_first(tmp_path, monkeypatch):
     results = many_results(900)
     failed = [step for item in results.forces for step in item.steps if step.verdict == "fail"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import shlex
 import shutil
@@ -21,10 +20,10 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 from tests.command import cdtool
+from tests.project.pages import ROOT, script_at
 
 yaml = pytest.importorskip("yaml")
 
-ROOT = Path(__file__).parents[2]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PROJECT = PYPROJECT["project"]
 WORKFLOWS = {path.name: path for path in (ROOT / ".github" / "workflows").glob("*.yml")}
@@ -35,12 +34,9 @@ def parsed(path: Path) -> Any:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 
-def release_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("release", ROOT / ".ci" / "release.py")
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@pytest.fixture(scope="module")
+def release() -> ModuleType:
+    return script_at(ROOT / ".ci" / "release.py")
 
 
 def built(source: Path, target: Path, kind: str) -> Path:
@@ -146,8 +142,7 @@ def ready(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_version_that_is_ready_is_released_with_its_section_as_notes(ready):
-    release = release_script()
+def test_a_version_that_is_ready_is_released_with_its_section_as_notes(release, ready):
     assert list(release.problems("v0.1.0", ready)) == []
     assert release.notes("v0.1.0", ready) == "### Added\n\n- One thing.\n"
 
@@ -162,14 +157,14 @@ def test_a_version_that_is_ready_is_released_with_its_section_as_notes(ready):
         ("pyproject.toml", "[project]\n", "no [project.urls]"),
     ],
 )
-def test_a_version_that_is_not_ready_is_refused_with_the_file_and_the_reason(ready, name, text, reason):
+def test_a_version_that_is_not_ready_is_refused_with_the_file_and_the_reason(release, ready, name, text, reason):
     (ready / name).write_text(text, encoding="utf-8")
-    found = list(release_script().problems("v0.1.0", ready))
+    found = list(release.problems("v0.1.0", ready))
     assert any(line.startswith(name) and reason in line for line in found), found
 
 
-def test_a_tag_of_another_form_is_refused(ready):
-    assert list(release_script().problems("0.1", ready)) == ["0.1: is not a tag as v1.2.3"]
+def test_a_tag_of_another_form_is_refused(release, ready):
+    assert list(release.problems("0.1", ready)) == ["0.1: is not a tag as v1.2.3"]
 
 
 def test_the_changelog_and_the_citation_name_the_version_of_the_fallback():
@@ -189,7 +184,8 @@ def test_ci_tests_each_python_that_the_project_accepts():
 
 
 def test_workflows_pin_their_actions_and_ask_for_few_rights():
-    for name, path in WORKFLOWS.items():
+    example = ROOT / "docs" / "examples" / "github-actions.yml"
+    for name, path in (*WORKFLOWS.items(), (example.name, example)):
         text, values = path.read_text(encoding="utf-8"), parsed(path)
         assert "pull_request_target" not in text, name
         for used in re.findall(r"uses: (\S+)", text):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import Any
 
 import pytest
@@ -52,20 +51,6 @@ def test_one_cell_is_computed():
     assert 40.0 < learned.mean("stiff") < 80.0 < learned.mean("soft") < 200.0
 
 
-def test_the_files_select_the_thresholds():
-    gate = 'machine = "machine.toml"\n\n[learn]\nlogs = ["free/*.csv"]\n'
-    arm = f'{gate}\n[signature]\nsides = "one"\n'
-    for name in script.threshold_names():
-        for simulated in (gate, arm):
-            read = tomllib.loads(script.benchmark_text(simulated, name, ["mass +10 %"]))
-            assert read["conditions"]["mass +10 %"]["impacts"]["soft"]["logs"] == ["changed_1/soft/*.csv"]
-            assert read.get("threshold") == (None if name in script.OPTIONS else name)
-            assert read.get("signature", {}).get("adaptive_level") == (6 if name == script.FOLLOWING else None)
-            assert read.get("signature", {}).get("speed_range") == (True if name == script.RANGE else None)
-            assert len(read["learn"]["logs"]) == (3 if name == script.RANGE else 1)
-    assert "conditions" not in tomllib.loads(script.benchmark_text(arm, "signature", []))
-
-
 @pytest.mark.parametrize(
     ("changed", "tolerated"),
     [
@@ -81,8 +66,3 @@ def test_the_files_select_the_thresholds():
 )
 def test_what_is_tolerated(changed, tolerated):
     assert script.tolerates({**FINE, "mass +10 %": changed}, "mass +10 %") is tolerated
-
-
-def test_nothing_is_tolerated_by_what_alarms_as_learned():
-    states = {**FINE, script.UNCHANGED: cell(20)}
-    assert not any(script.tolerates(states, state) for state in script.STATES)

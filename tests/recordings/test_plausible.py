@@ -234,11 +234,10 @@ def learn(gate: Path, out: Path):
     return cdtool("learn-signature", *logs, "-m", gate / "machine.toml", "-d", "feekf", "-o", out)
 
 
-@pytest.mark.parametrize("text", ["1e306", "9.99e37", "-3e7"])
-def test_wild_values_in_a_learned_log_are_a_loss_and_do_not_change_the_limits(gate, tmp_path, text):
+def test_wild_values_in_a_learned_log_are_a_loss_and_do_not_change_the_limits(gate, tmp_path):
     before, after = tmp_path / "before.json", tmp_path / "after.json"
     assert learn(gate, before).status == 0
-    spoil(gate / "free" / "03.csv", 1, [900, 1500], text)
+    spoil(gate / "free" / "03.csv", 1, [900, 1500], "9.99e37")
     done = learn(gate, after)
     assert done.status == 3
     assert "loss: " in done.err and "free/03.csv" in done.err and "2 values" in done.err

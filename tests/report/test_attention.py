@@ -50,16 +50,3 @@ def test_a_slow_contact_is_listed_only_if_it_violates_a_limit(results):
     table = attention_table(found, failed_recordings(found))
     assert [column.heading for column in table.columns] == ["recording", "group", "violates limits"]
     assert table.rows[0][2].text == "momentum: contact 1 is detected after 90 ms (gm.stiff.p95_ms: at most 50)"
-
-
-def test_detectors_have_short_names_and_a_miss_by_all_is_one_word(results):
-    rows = [contact(name, "stiff", None, "missed", "a") for name in results.detectors]
-    rows.append(contact("friction_ekf", "stiff", None, "missed", "b"))
-    found = replace(results, contacts=tuple(rows), false_alarms=(), recordings=())
-    cells = [row[2] for row in attention_table(found, failed_recordings(found)).rows]
-    assert [cell.line for cell in cells] == ["all detectors", "feekf: 1 of 2 detectors"]
-
-
-def test_changed_conditions_need_no_attention_by_themselves(results):
-    rows = (contact("momentum", "winter/stiff", None, "missed", "a"),)
-    assert names_of(replace(results, contacts=rows, false_alarms=(), recordings=())) == []

@@ -16,7 +16,7 @@ from cdtool.report.writers.base import Report
 from cdtool.report.writers.contacts import contacts_lines
 from cdtool.report.writers.junit import to_junit
 from cdtool.results.evaluated import evaluate
-from cdtool.results.results import SCHEMA_VERSION, ForceResult, ForceStepResult
+from cdtool.results.results import SCHEMA_VERSION
 from cdtool.results.traces.file import encode_traces, read_traces
 from tests.report.bench import Bench
 from tests.report.hostile import HOSTILE
@@ -76,12 +76,6 @@ def test_a_wrong_target_is_refused_before_any_work(tmp_path, name, words):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_good_targets_pass_and_nothing_is_written_yet(tmp_path):
-    (tmp_path / "report.v2").mkdir()
-    check_outputs([tmp_path / "a.json", tmp_path / "b.PDF", tmp_path / "new", tmp_path / "report.v2"])
-    assert [path.name for path in tmp_path.iterdir()] == ["report.v2"]
-
-
 def test_a_folder_without_permission_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("cdtool.report.outputs.os.access", lambda *_: False)  # root may write everywhere
     for target in (tmp_path, tmp_path / "a.json", tmp_path / "new"):
@@ -95,12 +89,3 @@ def test_slugs_are_safe_and_unique():
     assert len(set(found)) == len(found)
     assert found[-4:] == ["a-b", "a-b-2", "grun", "unnamed-2"]
     assert all(set(name) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for name in found)
-
-
-def test_a_folder_has_the_forces_where_there_are_any(done, results, tmp_path):
-    step = ForceStepResult("dynamic", 0.0, 400.0, 500.0, 12.0, "fail", "too much")
-    force = ForceResult("stiff/01.csv", "stiff", 1, "gap", "fail", 500.0, (step,))
-    assert not (write_outputs(done, [tmp_path / "without"])[0].parent / "forces.csv").exists()
-    judged = Report(evaluate(replace(results, forces=(force,))), ())
-    written = write_outputs(judged, [tmp_path / "with"])[0].parent / "forces.csv"
-    assert "stiff/01.csv,stiff,1,,gap,fail,500.0,dynamic" in written.read_text(encoding="utf-8")

@@ -9,10 +9,7 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.settings import Place
-from cdtool.report.markdown.report import to_markdown
 from cdtool.report.model import report_model
-from cdtool.report.writers.base import Report
-from cdtool.report.writers.junit import to_junit
 from cdtool.results.changed_conditions import condition_rows
 from cdtool.results.evaluated import evaluate
 from cdtool.results.files.results_file import read_results, to_json
@@ -121,23 +118,6 @@ def test_a_limit_is_about_a_condition_only_if_it_names_it():
     assert winter.conclusion.outcome == "violated" and winter.conclusion.exit_status == 1
     with pytest.raises(ConfigurationError, match=r"unknown group 'winter/hold'.*"):
         limits("momentum.winter/hold.false_alarms", 2)
-
-
-def test_every_report_has_them():
-    done = evaluate(BOTH)
-    table = report_model(done).tables["conditions"]
-    assert [column.heading for column in table.columns][2:] == [
-        "alarming impact-free runs",
-        "stiff [ms]",
-        "missed",
-        "contacts not assessable",
-        "samples not assessable",
-    ]
-    line = "3 of 6: 12 % to 88 %; unchanged 0 of 12"
-    assert table.rows[0][2].line == line and line in to_markdown(Report(done))
-    suite = to_junit(Report(done)).partition('<testsuite name="changed conditions" tests="4" failures="0"')[2]
-    assert "stiff [ms]: 25.5 (" in suite and "missed: 2 of 2, unchanged 1 of 3" in suite
-    assert "conditions" not in report_model(evaluate(UNCHANGED)).tables
 
 
 def test_results_files_carry_them_and_those_without_are_read(tmp_path):

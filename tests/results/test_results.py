@@ -27,12 +27,6 @@ def test_a_summary_counts_contacts_not_in_its_mean():
     assert (holdout.false_alarms, holdout.operations, holdout.hours) == (1, 9, 0.5)
 
 
-def test_the_json_is_strict_with_null_for_missing_values():
-    values = json.loads(to_json(RESULTS), parse_constant=lambda name: pytest.fail(name))
-    assert values["contacts"][0]["peak_force_n"] is None and values["contacts"][3]["latency_ms"] is None
-    assert values["provenance"]["gain"] is None and values["schema_version"] == SCHEMA_VERSION
-
-
 @pytest.mark.parametrize("results", [FULL, RESULTS, many_results(30, 3), case()[0].results], ids=range(4))
 def test_the_json_has_all_of_it_and_a_line_for_each_row(results):
     text = to_json(results)
@@ -107,24 +101,7 @@ def test_another_version_is_named_with_a_hint(tmp_path):
             r"results\.contacts\[0\]\.latency_ms: expected a number or null, got a text$",
         ),
         ('"contact": 1', '"contact": true', r"contacts\[0\]\.contact: expected a whole number, got true or false$"),
-        ('"contact": 1', '"contact": 1.5', r"contacts\[0\]\.contact: expected a whole number, got a number$"),
         ('"onset_s": 5.0,', "", r"results\.contacts\[0\]: object missing required field `onset_s`$"),
-        ('"onset_s": 5.0', '"onset_s": null', r"contacts\[0\]\.onset_s: expected a number, got `null`$"),
-        (
-            '"groups": [\n  "stiff",\n  "holdout"\n ]',
-            '"groups": "stiff"',
-            r"results\.groups: expected a list, got a text$",
-        ),
-        (
-            '"outcome": "missed"',
-            '"outcome": "mised"',
-            r"contacts\[3\]\.outcome: invalid enum value 'mised'$",
-        ),
-        (
-            '"outcome": "violated"',
-            '"outcome": "brokn"',
-            r"limits\[0\]\.outcome: invalid enum value 'brokn'$",
-        ),
         (
             '"detector": "momentum"',
             '"detector": "m"',

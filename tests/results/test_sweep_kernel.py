@@ -12,8 +12,8 @@ from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import FloatArray
 from cdtool.detectors.detection import Band, Signal, Verdict
 from cdtool.recordings.recording import Contact
-from cdtool.results.curves.sweep import MULTIPLES, sweep, sweep_operation
-from tests.results.detections import OPERATION, detection
+from cdtool.results.curves.sweep import sweep
+from tests.results.detections import OPERATION
 
 
 @dataclass(frozen=True)
@@ -52,19 +52,3 @@ def test_the_ends_of_waits_and_contacts_count_as_in_the_activation(met, starts, 
     activation = Activation(debounce=1, rearm=0.015625)
     swept = sweep(made, contacts, activation, 0.015625, np.ones(1))
     assert swept.false_alarms.tolist() == [count]
-
-
-def test_detections_of_one_operation_are_swept_each_with_its_own_clock_and_factors():
-    made = [detection(seed) for seed in range(3)]
-    slow = made[1].statistic.part(slice(0, None, 3))
-    slow = _Given(
-        OPERATION, "slow", slow, made[1].band, made[1].verdict, met_at=np.ascontiguousarray(made[1].exceedance()[::3])
-    )
-    contacts, factors = [Contact(3.0, 3.2, 0.005)], {"d": 3.0 * MULTIPLES, "slow": 2.0 * MULTIPLES}
-    blind = _Given(OPERATION, "alarms of a file", made[0].statistic, made[0].band, made[0].verdict)
-    together = sweep_operation([made[0], slow, blind, made[2]], contacts, Activation(), 1.0, factors)
-    assert together[2] is None
-    for found, one in zip((together[0], together[1], together[3]), (made[0], slow, made[2]), strict=True):
-        alone = sweep(one, contacts, Activation(), 1.0, factors[one.detector])
-        assert found.false_alarms.tolist() == alone.false_alarms.tolist() and alone.false_alarms.max() > 0
-        np.testing.assert_array_equal(found.latency, alone.latency)

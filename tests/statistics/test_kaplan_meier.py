@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.base.errors import UsageError
 from cdtool.statistics.interval import Interval
 from cdtool.statistics.kaplan_meier import latency_quantile, survival
 
@@ -122,15 +121,6 @@ def test_the_band_of_a_step_plot_has_no_holes():
     assert np.all((curve.low <= curve.share) & (curve.share <= curve.high))
 
 
-@given(LATENCIES, st.sampled_from([0.1, 0.25, 0.5, 0.75, 0.9, 0.95]))
-def test_the_interval_contains_the_value_and_a_higher_quantile_is_not_earlier(pairs, share):
-    latency, missed = columns(pairs)
-    quantile = latency_quantile(latency, missed, share)
-    later = latency_quantile(latency, missed, min(0.99, share + 0.1))
-    assert quantile.low <= quantile.value <= quantile.high
-    assert quantile.value <= later.value
-
-
 @given(LATENCIES, st.integers(0, 39))
 def test_a_detection_that_becomes_a_miss_makes_no_quantile_earlier(pairs, which):
     latency, missed = columns(pairs)
@@ -139,19 +129,3 @@ def test_a_detection_that_becomes_a_miss_makes_no_quantile_earlier(pairs, which)
     one_more[which % len(pairs)], later[which % len(pairs)] = True, 50.0
     for share in (0.25, 0.5, 0.9):
         assert latency_quantile(window, missed, share).value <= latency_quantile(later, one_more, share).value
-
-
-@pytest.mark.parametrize(
-    ("latency", "missed", "share", "level", "said"),
-    [
-        ([1.0, 2.0], [False], 0.5, 0.95, "do not match"),
-        ([1.0, math.nan], [False, True], 0.5, 0.95, "missing or below 0"),
-        ([-1.0], [False], 0.5, 0.95, "missing or below 0"),
-        ([1.0], [False], 95, 0.95, "quantile is 95"),
-        ([1.0], [False], 0.5, 95, "confidence level is 95"),
-    ],
-)
-def test_wrong_arguments_are_reported(latency, missed, share, level, said):
-    with pytest.raises(UsageError, match=said) as fault:
-        latency_quantile(latency, missed, share, level)
-    assert fault.value.hint

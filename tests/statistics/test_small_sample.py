@@ -21,14 +21,6 @@ def mixture(rng: np.random.Generator, n: int) -> np.ndarray:
     return np.where(rng.random(n) < 0.15, rng.normal(120.0, 8.0, n), rng.normal(38.0, 4.0, n))
 
 
-@pytest.mark.parametrize("n", range(1, 10))
-def test_fewer_than_ten_recordings_give_a_mean_without_interval_and_the_reason(n):
-    interval = mean_interval(np.arange(n) + 30.0, range(n))
-    assert interval.value == np.mean(np.arange(n) + 30.0)
-    assert math.isnan(interval.low) and math.isnan(interval.high)
-    assert interval.reason == f"an interval needs 10 recordings or campaigns; there are {n}"
-
-
 def test_ten_recordings_have_one_and_a_hundred_contacts_of_nine_have_none():
     ten = mean_interval(np.arange(10) + 30.0, range(10))
     assert ten.low < ten.value < ten.high and not ten.reason

@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.linear_axis import LinearAxis
 from cdtool.recordings.recording import Recording
+from tests.synthetic.gate_as_recording import as_recording
 
 GATE = GateParameters()
 ON_LOAD_SIDE = LinearAxis.of({"name": "gate", "coordinates": "load", "load_mass": GATE.leaf_mass + GATE.motor_mass})

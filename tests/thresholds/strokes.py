@@ -12,9 +12,9 @@ TIME = np.arange(N) * 1e-3
 STILL = Recording("still", "still", ("axis",), {})
 
 
-def stroke(direction: int = 1, speed: float = 0.2, time: np.ndarray = TIME) -> Recording:
-    """A clean stroke: a ramp of 0.2 m/s2 from 0.3 s to the nominal speed, with its reference."""
-    v = direction * np.clip(0.2 * (time - 0.3), 0.0, speed)
+def stroke(direction: int = 1, speed: float = 0.2, time: np.ndarray = TIME, start: float = 0.3) -> Recording:
+    """A clean stroke: a ramp of 0.2 m/s2 from `start` [s] to the nominal speed, with its reference."""
+    v = direction * np.clip(0.2 * (time - start), 0.0, speed)
     x = np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(time))))
     channels = {
         "speed": Series(time, v, "m/s"),

@@ -33,14 +33,6 @@ def test_it_alarms_where_any_or_all_of_its_members_do(members, activation, joine
     np.testing.assert_array_equal(ours[100:], theirs[100:])
 
 
-def test_one_factor_moves_all_members_together(members):
-    combined = Combined().fit(noise_runs(12)).with_safety_factor(2.0)
-    values = 100.0 + 60.0 * np.sin(40.0 * TIME)
-    moved = [member.with_safety_factor(2.0 * member.safety_factor) for member in members]
-    theirs = np.logical_or(*(outside(member, values) for member in moved))
-    np.testing.assert_array_equal(outside(combined, values)[100:], theirs[100:])
-
-
 def test_any_judges_where_one_member_can_and_all_only_where_each_can():
     pairs = noise_runs(12)
     values = signal(np.full(N, 100.0))

@@ -10,37 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.errors import SignatureError
-from cdtool.detectors.detection import Signal, Status
+from cdtool.detectors.detection import Status
 from cdtool.recordings.motion import MotionClass
-from cdtool.recordings.recording import Recording, Series
+from cdtool.recordings.recording import Series
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.signature_curve import Curve
-from tests.thresholds import strokes
-
-N = 4000
-TIME = np.arange(N) * 1e-3
-
-
-def stroke(direction: int = 1, speed: float = 0.2, start: float = 0.3) -> Recording:
-    """A clean stroke: a ramp of 0.2 m/s2 from `start` to the nominal speed."""
-    v = direction * np.clip(0.2 * (TIME - start), 0.0, speed)
-    x = np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1])) * 1e-3))
-    channels = {"speed": Series(TIME, v, "m/s"), "position": Series(TIME, x, "m")}
-    return Recording("stroke", "stroke", ("axis",), channels)
-
-
-def signal(values: np.ndarray, signed: bool = True) -> Signal:
-    return Signal(TIME, values.reshape(-1, 1), np.zeros((N, 1), dtype=np.uint8), "N", signed)
-
-
-def runs(count: int, sigma: float = 1.0, direction: int = 1, seed: int = 0, mean: float = 100.0):
-    rng = np.random.default_rng(seed)
-    return [(stroke(direction), signal(mean + sigma * rng.normal(size=N))) for _ in range(count)]
+from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
 
 
 def test_the_limit_is_the_mean_plus_the_factor_times_the_spread():
-    fitted = Signature(safety_factor=5.0).fit(runs(40))
+    fitted = Signature(safety_factor=5.0).fit(noise_runs(40))
     _, band = fitted.evaluate(stroke(), signal(np.zeros(N)))
     upper = band.upper[1500:3900, 0]
     assert np.median(upper) == pytest.approx(105.0, abs=0.2)
@@ -49,20 +29,20 @@ def test_the_limit_is_the_mean_plus_the_factor_times_the_spread():
 
 
 def test_backward_motion_is_watched_below_for_a_signed_signal_and_above_otherwise():
-    backward = runs(12, direction=-1)
+    backward = noise_runs(12, direction=-1)
     signed = Signature().fit(backward)
     _, band = signed.evaluate(stroke(-1), signal(np.zeros(N)))
     assert (band.upper[2000:3900] == np.inf).all() and np.isfinite(band.lower[2000:3900]).all()
     unsigned = Signature().fit([(recording, replace(s, signed=False)) for recording, s in backward])
-    _, band = unsigned.evaluate(stroke(-1), signal(np.zeros(N), False))
+    _, band = unsigned.evaluate(stroke(-1), signal(np.zeros(N), signed=False))
     assert (band.lower[2000:3900] == -np.inf).all() and np.isfinite(band.upper[2000:3900]).all()
 
 
 @pytest.mark.parametrize("rate", [10, 25, 50, 100])
 def test_a_log_with_fewer_samples_than_grid_points_has_a_limit_all_along(rate):
     time, rng = np.arange(4 * rate) / rate, np.random.default_rng(3)
-    moving = strokes.stroke(time=time)
-    learned = [(moving, strokes.signal(100.0 + rng.normal(size=len(time)), time)) for _ in range(40)]
+    moving = stroke(time=time)
+    learned = [(moving, signal(100.0 + rng.normal(size=len(time)), time)) for _ in range(40)]
     statistic, band = Signature(safety_factor=5.0).fit(learned).evaluate(moving, learned[0][1])
     # The last sample is beyond the last point of the grid, by less than a step of it.
     assert statistic.valid[time > 0.4 + 3.0 / rate][:-1].all()
@@ -70,7 +50,7 @@ def test_a_log_with_fewer_samples_than_grid_points_has_a_limit_all_along(rate):
 
 
 def test_beyond_the_learned_travel_no_limit_is_known():
-    fitted = Signature(alignment="position").fit(runs(12))
+    fitted = Signature(alignment="position").fit(noise_runs(12))
     longer = stroke(start=0.0)
     statistic, _ = fitted.evaluate(longer, signal(np.zeros(N)))
     learned = stroke()["position"].values[-1, 0]
@@ -90,23 +70,15 @@ def test_the_band_freezes_where_the_axis_stops_after_a_contact():
     assert band.upper[2499, 0] == pytest.approx(band.upper[2600, 0], abs=0.2)
 
 
-def test_too_few_runs_say_how_many_are_missing_unless_forced():
-    with pytest.raises(SignatureError, match=r"6 impact-free runs.*4 more"):
-        Signature().fit(runs(6))
-    assert Signature(force=True).fit(runs(6)).runs == 6
-    with pytest.raises(SignatureError):
-        Signature(force=True).fit(runs(1))
-
-
 def test_a_run_of_another_speed_or_direction_is_refused_by_name():
     for other in (stroke(speed=0.15), stroke(-1)):
         odd = replace(other, name="other class")
         with pytest.raises(SignatureError, match="other class"):
-            Signature().fit([*runs(11), (odd, signal(np.zeros(N)))])
+            Signature().fit([*noise_runs(11), (odd, signal(np.zeros(N)))])
 
 
 def test_the_thesis_rule_is_the_mean_plus_one_standard_deviation_point_by_point():
-    pairs = runs(15)
+    pairs = noise_runs(15)
     fitted = Signature(rule="thesis", alignment="position").fit(pairs)
     _, upper = fitted.limits(fitted.by_travel)
     point = 150
@@ -163,7 +135,7 @@ def flat_signature() -> FittedSignature:
     """Limits that rise by 9 over 2 m of travel, 1 above and below the mean."""
     mean = np.linspace(0.0, 9.0, 21)[:, np.newaxis]
     curve = Curve(0.1, 0.1, np.full((21, 1), 10.0), mean, np.ones((21, 1)))
-    return FittedSignature(MotionClass(1, 0.2), "position", "thesis", "two", 1.0, True, (), curve, curve)
+    return FittedSignature(MotionClass(1, 0.2), "position", "thesis", "two", 1.0, True, ("axis",), curve, curve)
 
 
 def test_signatures_with_other_grids_on_the_same_motion_have_their_own_limits():
@@ -179,9 +151,3 @@ def test_signatures_with_other_grids_on_the_same_motion_have_their_own_limits():
         upper = signature.evaluate(motion, signal(np.zeros(N)))[1].upper[2000, 0]
         spread = 0.5 * (upper - signature.evaluate(motion, signal(np.zeros(N)))[1].lower[2000, 0])
         assert upper - spread == pytest.approx(slope * travel, rel=0.02)
-
-
-def test_a_signal_with_more_columns_than_were_learned_is_refused():
-    two = Signal(np.arange(3.0), np.zeros((3, 2)), np.zeros((3, 2), dtype=np.uint8), "N")
-    with pytest.raises(SignatureError, match="learned for 1 joints, not for 2"):
-        flat_signature().evaluate(Recording("run", "", ("x",), {}), two)

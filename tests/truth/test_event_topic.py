@@ -7,7 +7,6 @@ import pytest
 
 import cdtool
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.truth.onset import OnsetRule, find_contacts
 
 MACHINE = """
 [machine]
@@ -38,15 +37,6 @@ def folder(tmp_path):
     write_mcap(tmp_path / "log.mcap", streams, start_ns=1_700_000_000 * 10**9)
     (tmp_path / "machine.toml").write_text(MACHINE)
     return tmp_path
-
-
-def test_each_message_is_a_contact_and_rebounds_are_one(folder):
-    recording = cdtool.read(folder / "log.mcap", folder / "machine.toml")
-    contacts = find_contacts(recording, OnsetRule())
-    assert [(item.start, item.found_by) for item in contacts] == [
-        (pytest.approx(1.5), "event"),
-        (pytest.approx(3.0), "event"),
-    ]
 
 
 def test_an_alarm_is_matched_with_it_and_no_detector_reads_it(folder):

@@ -12,7 +12,7 @@ from scipy import stats
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
-from cdtool.recordings.recording import Contact, Recording, Series
+from cdtool.recordings.recording import Recording, Series
 from cdtool.truth.force.curve import force_time_curve
 from cdtool.truth.force_vector import force_magnitude, quiet_level, with_scalar_force
 from cdtool.truth.missing_samples import cell_samples
@@ -54,16 +54,6 @@ def test_a_vector_has_the_contacts_of_a_cell_along_it(rule):
     assert all(item.rest == 0.0 and not item.in_progress for item in found)
 
 
-@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
-@pytest.mark.parametrize(
-    "time", [clock(100.0, 0.5), clock(500.0, 0.9)], ids=["100 Hz with jitter", "500 Hz with much jitter"]
-)
-def test_the_onset_on_a_slow_and_jittered_clock_is_within_its_uncertainty(time, rule):
-    vector = REST + np.outer(pulse(time, 3.0), OBLIQUE) + noise(time, 0.3)
-    (found,) = find_contacts(recording(time, vector), rule)
-    assert found.start - found.uncertainty <= 3.0 + 0.005 and found.start >= 3.0
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_the_mounting_of_the_sensor_does_not_matter(seed):
     time = clock(length=5.0)
@@ -100,13 +90,6 @@ def test_a_sample_without_one_axis_is_missing():
     assert curve.longest_hole() == pytest.approx(0.101, abs=2e-3)
 
 
-def test_the_force_over_time_of_a_labelled_contact_counts_from_zero():
-    time = clock()
-    reduced = with_scalar_force(recording(time, REST + np.outer(pulse(time, 3.0), OBLIQUE) + noise(time, 0.5)), GATE)
-    curve = force_time_curve(reduced, Contact(3.0, 3.3, 0.0, found_by="label file"))
-    assert curve.peak == pytest.approx(100.0, abs=2.0)
-
-
 def test_an_axis_at_its_stop_is_seen_although_the_magnitude_changes():
     time = clock()
     force = np.outer(pulse(time, 3.0, peak=300.0), [0.6, 0.5, -0.6245]) + noise(time, 0.3)
@@ -128,13 +111,6 @@ def test_a_vector_is_never_mistaken_for_its_first_axis():
 def test_a_magnitude_is_equal_to_itself_and_hashable_as_every_channel():
     magnitude = force_magnitude(Series(np.arange(100.0), np.ones((100, 3)), "N"), OnsetRule())
     assert magnitude == magnitude and isinstance(hash(magnitude), int)
-
-
-def test_a_vector_without_any_complete_sample_has_no_contact():
-    vector = np.full((100, 3), np.nan)
-    vector[::2, 0], vector[1::2, 1] = 1.0, 2.0
-    assert find_contacts(recording(np.arange(100) * 1e-3, vector), GATE) == []
-    assert np.isnan(force_magnitude(Series(np.arange(100) * 1e-3, vector, "N"), GATE).values).all()
 
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=RULES)

@@ -65,21 +65,10 @@ def test_a_rebound_after_a_hole_over_the_first_touch_is_not_the_onset(own_clock)
     assert whole.hole == 0.0 and whole.uncertainty < 2e-3
 
 
-def test_without_a_hole_and_with_single_samples_lost_nothing_is_marked():
-    rng = np.random.default_rng(7)
-    for _ in range(20):
-        force = bump(TIME)
-        force[rng.choice(len(TIME), 60, replace=False)] = np.nan
-        one = Recording("a", "a.csv", ("x",), {"force": Series(TIME, force, "N")})
-        (contact,) = find_contacts(one, RULE)
-        assert contact.hole == 0.0 and contact.uncertainty < 5e-3
-        assert assess_force(force_time_curve(one, contact), LENIENT).outcome == "pass"
-
-
 def test_a_slow_cell_with_jitter_and_a_lost_sample_is_assessable_unless_near_the_limit():
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 9.0, 1 / 60)
-    time = time + rng.uniform(-0.4, 0.4, len(time)) / 60
+    time = time + rng.uniform(-0.2, 0.2, len(time)) / 60
     force = bump(time)
     keep = np.ones(len(time), dtype=bool)
     keep[np.searchsorted(time, ONSET + 0.095)] = False
@@ -113,15 +102,6 @@ def test_an_unmeasured_force_never_passes(begin, end, own_clock):
     assert verdict.outcome == "not_assessable"
     assert f"missing for {1e3 * (end - begin) + 1:.0f} ms" in verdict.reason
     assert curve.longest_hole(contact.end) == pytest.approx(end - begin + 1e-3, abs=1e-4)
-
-
-def test_a_measured_violation_counts():
-    one = recording(bump(TIME), ONSET - 0.003, ONSET + 0.05, False)
-    (contact,) = find_contacts(one, RULE)
-    verdict = assess_force(force_time_curve(one, contact), PROFILE)
-    assert verdict.outcome == "fail"
-    (failed,) = [item for item in verdict.steps if item.outcome == "fail"]
-    assert "ms after it was first seen" in failed.reason and "after the onset" not in failed.reason
 
 
 def test_a_later_step_does_not_pass_where_it_may_have_begun_earlier():

@@ -32,22 +32,6 @@ def test_the_onset_is_where_the_force_left_the_lower_level():
     assert contact.peak_force == pytest.approx(1000.0)
 
 
-def test_an_offset_and_a_negative_load_cell_do_not_matter():
-    for sign in (1.0, -1.0):
-        (contact,) = find_contacts(recording(sign * ramp(2.0, 1000.0, noise=1.0, offset=300.0)), GATE_RULE)
-        assert contact.start == pytest.approx(2.008, abs=0.003)
-
-
-def test_without_levels_they_come_from_the_noise():
-    (contact,) = find_contacts(recording(ramp(2.0, 5000.0, noise=1.0)), OnsetRule())
-    assert contact.start == pytest.approx(2.001, abs=0.002)
-
-
-def test_noise_alone_is_no_contact():
-    assert find_contacts(recording(ramp(9.0, 0.0, noise=1.0)), OnsetRule()) == []
-    assert find_contacts(recording(np.zeros(4000)), OnsetRule()) == []
-
-
 @pytest.mark.parametrize("step", [0.05, 1.0, 20.0])
 @pytest.mark.parametrize("offset", [0.0, 312.7])
 def test_a_flicker_of_one_step_of_a_coarse_load_cell_is_no_contact(step, offset):
@@ -67,24 +51,6 @@ def test_without_noise_a_contact_begins_above_eight_deviations_of_the_rounding(s
     assert contact.start == pytest.approx(2.020)
     assert contact.uncertainty == pytest.approx(0.0005 + 0.010)
     assert contact.peak_force == pytest.approx(50 * step)
-
-
-def test_a_rebound_is_the_same_contact_and_a_later_touch_another():
-    force = np.where(
-        (TIME > 1.0) & (TIME < 1.2) | (TIME > 1.7) & (TIME < 1.8) | (TIME > 3.0) & (TIME < 3.1), 100.0, 0.0
-    )
-    contacts = find_contacts(recording(force), GATE_RULE)
-    assert [contact.start for contact in contacts] == pytest.approx([1.001, 3.001])
-    assert contacts[0].end == pytest.approx(1.799)
-
-
-def test_a_contact_from_the_first_sample_on_is_in_progress_until_its_release():
-    force = np.full(4000, 0.0)
-    force[:600] = 500.0
-    (contact,) = find_contacts(recording(force), GATE_RULE)
-    assert contact.in_progress
-    assert (contact.start, contact.end) == (0.0, pytest.approx(0.599))
-    assert contact.peak_force == 500.0
 
 
 def test_labels_replace_a_missing_load_cell():

@@ -29,6 +29,7 @@ from cdtool.base.remote.storage import StorageError
 if TYPE_CHECKING:
     from cdtool.base.settings import Place
 
+#: The unit of bounds and sizes, and what is read at once of a file [bytes].
 MIB = 2**20
 # Text written by a person: a machine, benchmark, label or trigger file, a URDF.
 MOST_TEXT = 16 * MIB
@@ -36,19 +37,11 @@ MOST_TEXT = 16 * MIB
 MOST_TOML = MIB
 # Results, signatures and traces, on disk and unpacked.
 MOST_JSON = 512 * MIB
+#: Files that cdtool writes are a few levels deep; Python's JSON reader ends at 1000.
 MOST_DEPTH = 64
-#: More broken lines are another kind of file.
-_MOST_BROKEN_LINES = 20
 _SWAPPED = ("a signature file", "a machine file")  # given, needed: commands take both
-# Upper bound of the memory for JSON as Python values: bytes per character (as bytes and text), element, list, object.
-_PER_CHARACTER, _PER_ELEMENT, _PER_LIST, _PER_OBJECT = 2, 40, 60, 200
-# A file may need this much memory, and this multiple of its size on disk; only hostile files need more.
-_FREE, _RATIO = 160 * MIB, 16
-# Traces are about 8 times larger unpacked, and their numbers need 9 times the memory of their digits.
-_PACKED_RATIO = 100
-_PIECE = MIB
-_MOST_DIGITS = 19
-_LARGEST_INTEGER = 2**63
+# A file may need this much memory, and a multiple of its size on disk; only hostile files need more.
+_FREE = 160 * MIB
 
 #: The beginning of a table or of a key with its value; not that of an item in a list.
 _STATEMENT = re.compile(r"""\s*+(?:\[\[?[\w.' "-]++\]|(?:[\w.-]++|"[^"]*+")\s*+=)""")
@@ -138,7 +131,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     except ValueError as fault:  # of `int`
         raise ContentError("a whole number of more than 4300 digits") from fault
     for key, number in _integers(values, ""):
-        if not -_LARGEST_INTEGER <= number < _LARGEST_INTEGER:
+        if not -(2**63) <= number < 2**63:
             raise ContentError(f"{key} is a whole number of {len(str(abs(number)))} digits: more than 64 bits")
     return values
 
@@ -152,7 +145,7 @@ def read_toml(path: Path, what: str, place: Place | None = None) -> dict[str, An
     """
     text = read_text(path, ConfigurationError, most=MOST_TOML)
     lines, mistakes = text.splitlines(), place.mistakes if place else []
-    for _ in range(_MOST_BROKEN_LINES):
+    for _ in range(20):  # more are another kind of file
         try:
             return parse_toml("\n".join(lines) + "\n")
         except ContentError as fault:
@@ -205,7 +198,7 @@ def _not_toml(path: Path, text: str, what: str, reason: str) -> ConfigurationErr
 
 def parse_json(content: bytes) -> Any:
     """Return the values of strict JSON in UTF-8: finite numbers, integers of at most 64 bits; raises ContentError."""
-    _check_memory(_memory(content), _FREE + _RATIO * len(content))
+    _check_memory(_memory(content), _FREE + 16 * len(content))
     if _depth(content) > MOST_DEPTH:
         raise ContentError(f"nested more than {MOST_DEPTH} deep")
     try:
@@ -234,7 +227,7 @@ def parse_own_json(text: str | bytes) -> Any:
 
 def unpack_json(content: bytes) -> Any:
     """Return the values of gzipped JSON that cdtool wrote; ContentError, also before it takes far too much memory."""
-    bound = _FREE + _PACKED_RATIO * len(content)
+    bound = _FREE + 100 * len(content)
     pieces: list[bytes] = []
     memory = 0
     for piece in _unpacked(content):
@@ -249,7 +242,7 @@ def _unpacked(content: bytes) -> Iterator[bytes]:
     packed = content
     try:
         while not stream.eof:
-            piece = stream.decompress(packed, _PIECE)
+            piece = stream.decompress(packed, MIB)
             packed = stream.unconsumed_tail
             if not piece and not packed and not stream.eof:
                 raise ContentError("truncated")
@@ -276,7 +269,8 @@ def _memory(content: bytes) -> int:
     """Return an upper bound of the memory for JSON as Python values [bytes]."""
     elements = content.count(b",")
     lists, objects = content.count(b"["), content.count(b"{")
-    return _PER_CHARACTER * len(content) + _PER_ELEMENT * elements + _PER_LIST * lists + _PER_OBJECT * objects
+    # Per character (as bytes and text), element, list and object.
+    return 2 * len(content) + 40 * elements + 60 * lists + 200 * objects
 
 
 def _check_memory(memory: int, bound: int) -> None:
@@ -310,8 +304,8 @@ def _finite(text: str) -> float:
 
 
 def _integer(text: str) -> int:
-    if len(text) > _MOST_DIGITS:
+    if len(text) > 19:  # those of 2^63
         digits = len(text.removeprefix("-"))
-        if digits > _MOST_DIGITS:
+        if digits > 19:
             raise ContentError(f"a whole number of {digits} digits: more than 64 bits")
     return int(text)

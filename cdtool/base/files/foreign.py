@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.base.errors import UsageError
+from cdtool.base.files.kinds import LOOKED_AT
 from cdtool.base.plain_text import plain
 from cdtool.base.remote.remote_path import is_remote
-
-_LOOKED_AT = 1 << 13
 
 
 @dataclass(frozen=True)
@@ -33,9 +32,9 @@ class Kind:
         """Whether a file is of this kind; an empty one is of every kind. Raises UsageError if it cannot be read."""
         try:
             with path.open("rb") as file:
-                head = file.read() if self.anywhere else file.read(_LOOKED_AT)
-                file.seek(max(len(head), path.stat().st_size - _LOOKED_AT))
-                tail = file.read(_LOOKED_AT)
+                head = file.read() if self.anywhere else file.read(LOOKED_AT)
+                file.seek(max(len(head), path.stat().st_size - LOOKED_AT))
+                tail = file.read(LOOKED_AT)
         except OSError as fault:
             raise UsageError(
                 f"{plain(path)}: already exists and cannot be read: {fault.strerror}", "choose another name"
@@ -87,6 +86,6 @@ def _unpacked(head: bytes) -> bytes:
     if not head.startswith(b"\x1f\x8b"):
         return b""
     try:
-        return zlib.decompressobj(16 + zlib.MAX_WBITS).decompress(head, _LOOKED_AT)
+        return zlib.decompressobj(16 + zlib.MAX_WBITS).decompress(head, LOOKED_AT)
     except zlib.error:
         return b""

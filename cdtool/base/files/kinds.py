@@ -18,10 +18,11 @@ _MARKS = (
     (re.compile(rb"\x89PNG"), "a PNG image"),
     (re.compile(rb"(?:[^\n]*\n){1,3}?[-+\d.eE]+(?:[,;\t ]\s*[-+\d.eE]+)+\r?\n"), "a table of numbers"),
 )
-_LOOKED_AT = 1 << 13
+#: The beginning or the end of a file, which has its mark [bytes]: behind comments and the first tables, too.
+LOOKED_AT = 1 << 13
 
 
 def kind_of(content: bytes) -> str:
     """Return the kind of a file by its beginning, with its article; empty if unknown."""
-    head = content[:_LOOKED_AT]
+    head = content[:LOOKED_AT]
     return next((words for mark, words in _MARKS if mark.match(head)), "")

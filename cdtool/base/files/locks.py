@@ -22,10 +22,10 @@ from pathlib import Path
 from cdtool.base.errors import OutputError
 from cdtool.base.plain_text import plain
 
+#: Longer than writing any file takes: whoever holds it hangs [s].
 LOCK_SECONDS = 60.0
 # Windows removes no file that a process has open.
 REMOVES_OPEN_FILES = os.name != "nt"
-_PAUSE_SECONDS = 0.01
 # A lock on Windows is one of bytes, which nobody else can read then: of one behind any content.
 _LOCKED_BYTE = 1 << 40
 # Two names of one error on Linux, of two on macOS.
@@ -85,7 +85,7 @@ def _acquire(mine: tuple[Path, int], shown: Path, needed: bool) -> bool:
                 raise OutputError(
                     f"{plain(shown)}: is being written by another process", "try again after it has ended"
                 )
-            time.sleep(_PAUSE_SECONDS)
+            time.sleep(0.01)
     except OSError as fault:
         if fault.errno not in _NO_LOCKS or needed:
             raise

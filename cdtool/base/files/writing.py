@@ -34,8 +34,6 @@ _BINARY = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os
 _temporaries: set[Path] = set()
 # The ETag of each file at a URL that is being updated: `locked`.
 _expected: dict[Path, str] = {}
-_HERE = -100  # AT_FDCWD
-_EXCHANGE = 2  # RENAME_EXCHANGE
 _UNABLE = (errno.ENOSYS, errno.EINVAL, errno.EXDEV, errno.EBUSY, errno.EOPNOTSUPP, errno.EPERM)
 
 
@@ -342,7 +340,7 @@ def _exchange(first: Path, second: Path) -> bool:
         call = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):
         return False
-    if call(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _EXCHANGE) == 0:
+    if call(-100, os.fsencode(first), -100, os.fsencode(second), 2) == 0:  # AT_FDCWD twice, RENAME_EXCHANGE
         return True
     fault = ctypes.get_errno()
     if fault in _UNABLE:

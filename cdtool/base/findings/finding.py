@@ -8,10 +8,9 @@ from typing import Any
 
 from cdtool.base.findings.kinds import Severity, kind_of
 from cdtool.base.findings.words import FindingWords
+from cdtool.base.plain_text import NAMED
 
 _SEVERITIES: tuple[Severity, ...] = ("loss", "warning", "note")
-# Of lines so many numbers are kept.
-_FIRST = 3
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ def remark(text: str, channel: str = "", severity: Severity = "warning") -> Find
 
 def lines_of(lines: Sequence[int]) -> dict[str, Any]:
     """Return the numbers of a finding about lines: how many, the first three and the last; a log may have millions."""
-    return {"count": len(lines), "first": tuple(lines[:_FIRST]), "last": lines[-1]}
+    return {"count": len(lines), "first": tuple(lines[:NAMED]), "last": lines[-1]}
 
 
 def worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -10,9 +10,6 @@ from typing import Any
 from cdtool.base.findings.kinds import FindingKind
 from cdtool.base.plain_text import counted, counted_lines, digits, first_of
 
-# Of a cell or a line so many characters are shown.
-_SHOWN = 40
-
 
 class FindingWords:
     """The words of a kind with the numbers of a finding, and with what is computed from them."""
@@ -86,7 +83,7 @@ _FORMATS: Mapping[str, Callable[[Any, str], str]] = {
     "list": lambda names, _: ", ".join(names),
     "quoted": lambda names, _: ", ".join(f"'{name}'" for name in names),
     "and": lambda values, _: " and ".join(map(str, values)),
-    "cell": lambda text, _: repr(text[:_SHOWN]),
+    "cell": lambda text, _: repr(text[:40]),
 }
 
 

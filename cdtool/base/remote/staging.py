@@ -19,10 +19,13 @@ from pathlib import Path
 from cdtool.base.remote import session, storage
 from cdtool.base.remote.storage import ObjectInfo, StorageError
 
-_BOUND, _BOUND_MIB, _MIB = "CDTOOL_CACHE_MIB", 4096, 1 << 20
+_BOUND = "CDTOOL_CACHE_MIB"
+#: Forty logs of 100 MB.
+_BOUND_MIB = 4096
 # An answer of the storage is asked for again after this time [s].
 _TRUSTED = 2.0
-_lock, _users = threading.RLock(), 0
+_lock = threading.RLock()
+_users = 0  # blocks of `copies_in_use` that run
 _numbers = itertools.count()
 # By URL; the copy that was used longest ago is the first.
 _copies: dict[str, tuple[Path, ObjectInfo]] = {}
@@ -108,9 +111,9 @@ def _fetched(url: str, found: ObjectInfo) -> Path:
         mib = float(os.environ.get(_BOUND, ""))
     except ValueError:
         mib = _BOUND_MIB
-    most = (mib if mib > 0.0 else _BOUND_MIB) * _MIB
+    most = (mib if mib > 0.0 else _BOUND_MIB) * 2**20
     if found.size > most:
-        why = f"has {found.size / _MIB:.0f} MiB; the cache for local copies has {most / _MIB:.0f}"
+        why = f"has {found.size / 2**20:.0f} MiB; the cache for local copies has {most / 2**20:.0f}"
         raise StorageError(url, why, f"set {_BOUND} to a larger number", errno.EFBIG)
     while _copies and found.size + sum(info.size for _, info in _copies.values()) > most:
         forget(next(iter(_copies)))

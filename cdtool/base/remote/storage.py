@@ -28,7 +28,6 @@ _HIERARCHICAL = frozenset(("sftp", "ssh", "ftp", "smb", "hdfs", "webhdfs", "arro
 _ETAGS = ("ETag", "etag", "md5Hash", "content_md5", "Content-MD5")
 _TIMES = ("LastModified", "last_modified", "mtime", "updated", "modified", "created")
 _NO_CREDENTIALS = ("NoCredentialsError", "PartialCredentialsError", "CredentialRetrievalError", "TokenRetrievalError")
-_LONGEST_REASON = 160
 
 
 class StorageError(CdtoolError, OSError):
@@ -196,7 +195,8 @@ def _filesystem(url: str) -> Any:
 
 
 def _words(fault: Exception) -> str:
-    return without_secrets(" ".join(str(fault).split()))[:_LONGEST_REASON] or type(fault).__name__
+    # The line has room for the URL, too.
+    return without_secrets(" ".join(str(fault).split()))[:160] or type(fault).__name__
 
 
 def _error_of(url: str, fault: Exception) -> StorageError:

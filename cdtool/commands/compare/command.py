@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.base.exit_status import Fact
-from cdtool.base.plain_text import shorten
+from cdtool.base.plain_text import LISTED, shorten
 from cdtool.commands.console.colour import coloured, shows_colour
 from cdtool.commands.console.console import columns_to_fill, fits_terminal, leave, plain, table
 from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from cdtool.commands.compare.questions import Figure
     from cdtool.commands.compare.rows import BuildRow
 
+# Longest names in the table [characters]: the other columns need the rest of the line.
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
-_SHOWN = 10
 # The colours of outcomes.
 _TONES = {"worse": "bad", "mixed": "bad", "better": "good", "inconclusive": "unknown"}
 
@@ -89,7 +89,7 @@ def compare(
     Example: cdtool compare old.json new.json -o compare.md
     """
     from cdtool.base.files.foreign import refuse_inputs
-    from cdtool.commands.compare.comparing import compare as run
+    from cdtool.commands.compare.comparison import compare as run
     from cdtool.commands.compare.comparison_json import to_json
     from cdtool.report.outputs import check_outputs, write_outputs
 
@@ -168,10 +168,10 @@ def _show_rows(rows: Sequence[BuildRow]) -> None:
 
 def _show_differences(found: BuildComparison) -> None:
     typer.echo()
-    for item in found.changed[:_SHOWN]:
+    for item in found.changed[:LISTED]:
         _say(f"differs: {item.key}: {item.old}, now {item.new}")
-    if len(found.changed) > _SHOWN:
-        _say(f"differs: and {len(found.changed) - _SHOWN} more settings")
+    if len(found.changed) > LISTED:
+        _say(f"differs: and {len(found.changed) - LISTED} more settings")
     for note in found.notes:
         _say(note)
 

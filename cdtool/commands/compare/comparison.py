@@ -13,12 +13,14 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from cdtool.alarms.activation import DEBOUNCE_TIME
 from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import counted, shorten
+from cdtool.base.remote.remote_path import location
 from cdtool.commands.compare.pairs import pair_recordings
 from cdtool.commands.compare.rows import (
     INCONCLUSIVE,
@@ -32,6 +34,7 @@ from cdtool.commands.compare.rows import (
 )
 from cdtool.commands.compare.words import SAME_RESULTS, gone_words, overall_words, pairing_words, row_words
 from cdtool.results.comparison import SIGNIFICANT, check_significance
+from cdtool.results.files.results_file import read_results
 from cdtool.results.results import Results
 
 # Provenance keys of settings that define the results, and where the benchmark file sets them.
@@ -69,7 +72,6 @@ _UNDER_TEST = (
     "plugins",
 )
 _BY_DETECTOR = ("gains", "signature_sha256")
-_LONGEST = 80
 _DEFAULT_DEBOUNCE = f"default ({1e3 * DEBOUNCE_TIME:g} ms)"
 _HASH = re.compile(r"[0-9a-f]{64}")
 _Leaf = tuple[str, Any, Any]
@@ -110,18 +112,22 @@ class BuildComparison:
         return (*found, *([Fact.INCOMPLETE] if self.only_old else []))
 
 
-def compare_builds(
-    old: Results, new: Results, significance: float = SIGNIFICANT, relevant_change: float = RELEVANT_CHANGE
+def compare(
+    old: str | Path | Results,
+    new: str | Path | Results,
+    *,
+    significance: float = SIGNIFICANT,
+    relevant_change: float = RELEVANT_CHANGE,
 ) -> BuildComparison:
-    """Compare every detector and group present in both results.
+    """Compare two builds: every detector and group present in both results.
 
     Parameters
     ----------
-    old, new : Results
-        The results of two builds.
-    significance : float
+    old, new : str, Path or Results
+        A results.json, or the results in memory.
+    significance : float, optional
         Family-wise error rate of "worse" and "better".
-    relevant_change : float
+    relevant_change : float, optional
         The smallest change for the worse that matters, as a share of the old mean latency and force, of the contacts
         missed or not assessable, and of a false alarm per operation.
 
@@ -132,10 +138,12 @@ def compare_builds(
 
     Raises
     ------
+    RecordingError
+        A file is not a results file.
     ConfigurationError
         A setting differs that defines the results; the message names the key.
     UsageError
-        Nothing is common to both, or a share is outside its range.
+        The two results have no detector and group in common, or a share is outside its range.
 
     Notes
     -----
@@ -145,8 +153,13 @@ def compare_builds(
 
     Examples
     --------
-    `cdtool.compare` compares two results files.
+    >>> import cdtool
+    >>> results = cdtool.score("docs/examples/triggers.csv", "sample_logs/gate/benchmark.toml").evaluated.results
+    >>> comparison = cdtool.compare(results, results)
+    >>> comparison.verdict, len(comparison.rows)
+    ('no change shown', 3)
     """
+    old, new = (item if isinstance(item, Results) else read_results(location(item)) for item in (old, new))
     check_significance(significance)
     if not 0.0 < relevant_change <= 1.0:
         raise UsageError(f"relevant change is {relevant_change:g}", "give a share above 0 and up to 1, such as 0.1")
@@ -283,4 +296,4 @@ def _shown(value: Any) -> str:
         return "none"
     text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
     # The beginning of a hash tells it apart as well.
-    return text[:12] if _HASH.fullmatch(text) else shorten(text, _LONGEST)
+    return text[:12] if _HASH.fullmatch(text) else shorten(text, 80)

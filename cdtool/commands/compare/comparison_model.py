@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from cdtool.base.plain_text import LISTED
 from cdtool.commands.compare.comparison import BuildComparison
 from cdtool.commands.compare.questions import Figure
 from cdtool.commands.compare.rows import BuildRow
@@ -15,7 +16,6 @@ from cdtool.report.number_text import NOTHING, number
 from cdtool.report.table import Cell, Fields, Heading, Table, name_cell, shown, tabulate
 
 _TONES = {"worse": "bad", "mixed": "bad", "inconclusive": "unknown"}
-_MOST_CHANGES = 10
 _MEANS = ("latency_ms", "force_at_alarm_n")
 _HOW_TO_READ = (
     "Two values are old / new. Contacts: the same ones in both, unless there are two numbers. Latency is a mean (of "
@@ -58,8 +58,8 @@ def comparison_model(comparison: BuildComparison) -> ComparisonModel:
     return ComparisonModel(
         verdict=comparison.words,
         short_results=_short_table(comparison.rows),
-        changes=[f"{shown(row.group)}, {shown(row.detector)}: {row.words}" for row in changed_rows[:_MOST_CHANGES]]
-        + ([f"and {len(changed_rows) - _MOST_CHANGES} more changes"] if len(changed_rows) > _MOST_CHANGES else []),
+        changes=[f"{shown(row.group)}, {shown(row.detector)}: {row.words}" for row in changed_rows[:LISTED]]
+        + ([f"and {len(changed_rows) - LISTED} more changes"] if len(changed_rows) > LISTED else []),
         results=_results_table(comparison.rows, few),
         changed=tabulate(
             "changed",

@@ -14,9 +14,6 @@ from dataclasses import dataclass
 from cdtool.base.errors import ConfigurationError
 from cdtool.results.results import ContactResult, RecordingResult, Results, grouped
 
-# An onset in seconds since 1970 is stored to some 2e-7 s.
-_CLOCK = 1e-6
-
 Onsets = Mapping[tuple[str, str], Mapping[int, tuple[float, float]]]
 """By group and recording: each contact's onset [s] and its uncertainty [s]."""
 
@@ -110,7 +107,8 @@ def _other_truth(name: str, problem: str) -> ConfigurationError:
 
 def _agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
     """Whether two onsets are within the uncertainty of either."""
-    return abs(one[0] - other[0]) <= min(one[1], other[1]) + _CLOCK
+    # An onset in seconds since 1970 is stored to some 2e-7 s.
+    return abs(one[0] - other[0]) <= min(one[1], other[1]) + 1e-6
 
 
 def _onsets(results: Results) -> Onsets:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -36,9 +36,7 @@ Ranges = tuple[tuple[float, float], tuple[float, float]]
 Labels = Mapping[str, str]
 """What each recording of a build is resampled with."""
 
-# Counts looked at for the least one that a test would show.
-_MOST = 10_000
-_COMPLETE_UNPAIRED = 0.05
+# Usual in planning a test (Cohen 1988): four of five differences are shown.
 POWER = 0.8
 # Clocks and interpolation leave traces far below a microsecond or a millinewton: they are no change [ms, N].
 LEAST_CHANGE = 5e-4
@@ -54,13 +52,14 @@ class Watched:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """One quantity of both builds and the p of no change.
+class Compared:
+    """One quantity of one detector in one group in both builds.
 
-    `old` and `new` are means over `old_of` and `new_of` contacts (medians of the force at the alarm, and of fewer than
-    ten latencies, as in a benchmark), or counts in that many contacts, operations or hours.
-    `detectable(alpha)` is the least change that would have been shown at that p: for a mean with 80 % power, else the
-    smallest count of the new build for which the test shows it. Infinite: the sample is too small for any change.
+    `old` and `new`: means over `old_of` and `new_of` contacts (medians of forces, and of latencies where `ranges` has
+    the shortest and the longest of either build: fewer than ten contacts), or counts in that many contacts, operations
+    or hours. `change` is new minus old, for counts a share or a rate without an interval. `p` of no change is NaN if
+    there was nothing to test; `reason` states why. `same`: every pair has the same value, which needs no test.
+    `complete_change_p`: the exact probability of a change so complete that it needs no test; NaN where it is not.
     """
 
     figure: Figure
@@ -70,16 +69,24 @@ class Asked:
     new_of: float
     change: Interval
     p: float
-    detectable: Callable[[float], float]
+    _: KW_ONLY
     reason: str = ""
     same: bool = False
-    """Whether every pair has the same value: a fact about these recordings that needs no test."""
-    left_open: Callable[[float], float] = lambda _: math.nan
-    """The change that is not ruled out, at that p where it is a mean, else with 95 %; NaN: there is nothing to ask."""
-    complete_p: float = math.nan
-    """Exact one-sided probability of a change that is complete; NaN where it is not."""
+    complete_change_p: float = math.nan
     ranges: Ranges | None = None
-    """Shortest and longest latency of the old and the new build where either has fewer than ten; else None."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(Compared):
+    """What is compared, and what depends on the p at which a change counts as shown.
+
+    `detectable(alpha)` is the least change that would have been shown: for a mean with 80 % power, else the smallest
+    count of the new build for which the test shows it. Infinite: the sample is too small for any change.
+    `left_open(alpha)` is the change that is not ruled out, of counts with 95 %; NaN: there is nothing to ask.
+    """
+
+    detectable: Callable[[float], float]
+    left_open: Callable[[float], float] = lambda _: math.nan
 
 
 def ask_mean(
@@ -128,8 +135,8 @@ def ask_mean(
         means[1].n,
         found.mean,
         found.p,
-        detectable,
-        reason,
+        detectable=detectable,
+        reason=reason,
         same=paired and not any(differences),
         left_open=left_open,
         ranges=ranges,
@@ -180,11 +187,21 @@ def ask_false_alarms(old: Watched, new: Watched, paired: bool) -> Asked:
 
     p = p_of(count_new) if count + count_new else math.nan
     change = Interval(count_new / hours_new - count / hours, math.nan, math.nan)
-    least = _least_count(p_of, math.floor(count * hours_new / hours), _MOST)
+    # Nobody counts more false alarms.
+    least = _least_count(p_of, math.floor(count * hours_new / hours), 10_000)
     same = paired and (count, hours) == (count_new, hours_new)
     open_rate = poisson_increase_at_most(count_new, new.operations, count, old.operations)
     return Asked(
-        "false_alarms", count, hours, count_new, hours_new, change, p, least, same=same, left_open=lambda _: open_rate
+        "false_alarms",
+        count,
+        hours,
+        count_new,
+        hours_new,
+        change,
+        p,
+        detectable=least,
+        same=same,
+        left_open=lambda _: open_rate,
     )
 
 
@@ -219,10 +236,10 @@ def _ask_flags(
         n,
         change,
         p,
-        least,
+        detectable=least,
         same=not only_old + only_new,
         left_open=lambda _: open_share,
-        complete_p=complete_p,
+        complete_change_p=complete_p,
     )
 
 
@@ -245,9 +262,9 @@ def _ask_counts(figure: Literal["missed", "not_assessable"], old: tuple[int, int
         of_new,
         change,
         p,
-        _least_count(p_of, before * of_new // of, of_new),
+        detectable=_least_count(p_of, before * of_new // of, of_new),
         left_open=lambda _: open_share,
-        complete_p=_complete_by_counts(before, of, after, of_new),
+        complete_change_p=_complete_by_counts(before, of, after, of_new),
     )
 
 
@@ -264,14 +281,23 @@ def _complete_by_counts(before: int, of: int, after: int, of_new: int) -> float:
     else:
         return math.nan
     p = math.comb(side, good) / math.comb(of + of_new, good)
-    return p if p <= _COMPLETE_UNPAIRED else math.nan
+    return p if p <= 0.05 else math.nan
 
 
 def _without(
     figure: Figure, old: tuple[float, float], new: tuple[float, float], reason: str, left_open: float = math.nan
 ) -> Asked:
     change = Interval(math.nan, math.nan, math.nan)
-    return Asked(figure, *old, *new, change, math.nan, lambda _: math.nan, reason, left_open=lambda _: left_open)
+    return Asked(
+        figure,
+        *old,
+        *new,
+        change,
+        math.nan,
+        detectable=lambda _: math.nan,
+        reason=reason,
+        left_open=lambda _: left_open,
+    )
 
 
 def _assessable(contact: ContactResult) -> bool:

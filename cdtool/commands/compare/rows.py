@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Final, Literal
 
 from cdtool.commands.compare.pairs import Pairing, pairs_of_contacts
 from cdtool.commands.compare.questions import (
     LEAST_CHANGE,
     Asked,
+    Compared,
     Figure,
     Labels,
-    Ranges,
     Watched,
     ask_false_alarms,
     ask_mean,
@@ -24,7 +24,6 @@ from cdtool.commands.compare.questions import (
 )
 from cdtool.results.results import ContactResult, ExposureResult, Results
 from cdtool.results.summary import campaigns
-from cdtool.statistics.interval import Interval
 from cdtool.statistics.paired import holm
 
 NOTHING_SHOWN: Final = "no change shown"
@@ -35,36 +34,20 @@ Outcome = Literal["worse", "better", "mixed", "no change shown", "inconclusive"]
 RELEVANT_CHANGE = 0.1
 
 
-@dataclass(frozen=True)
-class Question:
-    """One quantity of one detector in one group in both builds, and whether a change is shown.
+@dataclass(frozen=True, kw_only=True)
+class Question(Compared):
+    """What is compared, and whether a change is shown, with the p corrected over all questions (Holm).
 
-    `old` and `new`: means over `old_of` and `new_of` contacts (medians of forces, and of latencies where `ranges` has
-    the shortest and the longest of either build: fewer than ten contacts), or counts in that many contacts, operations
-    or hours. `change` is new minus old, for counts a share or a rate without an interval. `p` of no change and
-    `corrected_p` (Holm) are NaN if there was nothing to test; `reason` states why. `detectable`: the least change of a
-    mean that would have been shown with 80 % power, or the smallest new count that would have been; infinite if the
-    sample is too small.
-    `left_open`: the largest change for the worse that these recordings do not rule out, as a share of the old mean, of
-    the contacts, or per operation; NaN if there was nothing to test. `same`: every pair has the same value.
-    `complete_change_p`: the exact probability of a change so complete that it needs no test; NaN where it is not.
+    `detectable`: the least change of a mean that would have been shown with 80 % power, or the smallest new count that
+    would have been; infinite if the sample is too small. `left_open`: the largest change for the worse that these
+    recordings do not rule out, as a share of the old mean, of the contacts, or per operation; NaN if there was nothing
+    to test.
     """
 
-    figure: Figure
     outcome: Literal["worse", "better", "no change shown", "inconclusive", "not_asked"]
-    old: float
-    old_of: float
-    new: float
-    new_of: float
-    change: Interval
-    p: float
     corrected_p: float
     detectable: float
-    reason: str
     left_open: float
-    same: bool
-    complete_change_p: float
-    ranges: Ranges | None = None
 
 
 @dataclass(frozen=True)
@@ -256,29 +239,16 @@ def _answered(asked: Asked, corrected: float, significance: float, count: int, t
     alpha = significance / (count + math.isnan(asked.p))
     left_open = asked.left_open(alpha)
     outcome: Literal["worse", "better", "no change shown", "inconclusive", "not_asked"]
-    if not math.isnan(asked.complete_p) or corrected < significance:
+    if not math.isnan(asked.complete_change_p) or corrected < significance:
         # Latency, force, misses, contacts not assessable, false alarms: less is better of each.
         outcome = "worse" if asked.change.value > 0.0 else "better"
     elif left_open > tolerated:
         outcome = INCONCLUSIVE
     else:
         outcome = "not_asked" if math.isnan(corrected) else NOTHING_SHOWN
+    compared = {item.name: getattr(asked, item.name) for item in fields(Compared)}
     return Question(
-        figure=asked.figure,
-        outcome=outcome,
-        old=asked.old,
-        old_of=asked.old_of,
-        new=asked.new,
-        new_of=asked.new_of,
-        change=asked.change,
-        p=asked.p,
-        corrected_p=corrected,
-        detectable=asked.detectable(alpha),
-        reason=asked.reason,
-        left_open=left_open,
-        same=asked.same,
-        complete_change_p=asked.complete_p,
-        ranges=asked.ranges,
+        **compared, outcome=outcome, corrected_p=corrected, detectable=asked.detectable(alpha), left_open=left_open
     )
 
 

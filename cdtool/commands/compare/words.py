@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from cdtool.base.plain_text import counted, shorten
+from cdtool.base.plain_text import counted, first_of, shorten
 from cdtool.commands.compare.pairs import Pairing
 from cdtool.commands.compare.questions import Figure
 from cdtool.commands.compare.rows import INCONCLUSIVE, NOTHING_SHOWN, BuildRow, Question
@@ -13,8 +13,6 @@ from cdtool.statistics.interval import Interval
 
 # The reason of a verdict on a file compared with itself or with a copy.
 SAME_RESULTS = "both files contain the same results"
-# Number of names in the line of the verdict; `only_old` lists all.
-_NAMED = 3
 
 
 def row_words(row: BuildRow, asked: int) -> str:
@@ -71,8 +69,7 @@ def overall_words(
 
 def gone_words(only_old: Sequence[str]) -> str:
     """Return what is missing from the new results, to append to the verdict."""
-    more = f" and {len(only_old) - _NAMED} more" if len(only_old) > _NAMED else ""
-    return f"; only in old: {', '.join(shorten(name, 40) for name in only_old[:_NAMED])}{more}" if only_old else ""
+    return f"; only in old: {first_of([shorten(name, 40) for name in only_old])}" if only_old else ""
 
 
 def pairing_words(pairings: Mapping[str, Pairing]) -> list[str]:

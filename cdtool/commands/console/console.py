@@ -20,7 +20,7 @@ import typer
 from cdtool.base.errors import CdtoolError, MistakesError
 from cdtool.base.exit_status import Fact, status_of
 from cdtool.base.files.strict_json import strict_json
-from cdtool.base.plain_text import LINE_LENGTH, counted, one_line, reason_line, shorten_names, shorten_paths
+from cdtool.base.plain_text import LINE_LENGTH, LISTED, counted, one_line, reason_line, shorten_names, shorten_paths
 from cdtool.base.plain_text import plain as plain
 from cdtool.commands.console.colour import coloured, shows_colour, style_of
 
@@ -32,16 +32,11 @@ if TYPE_CHECKING:
     from cdtool.execution.workers import Progress
     from cdtool.results.results import RecordingFinding, Skipped
 
-_SHOWN = 10
-_ERROR, _SHORTEST_HINT = "error: ", 140
+_ERROR = "error: "
+# Columns: a narrower terminal cannot show a table; longer lines are hard to read.
 _NARROWEST, _WIDEST = 60, 100
-_PIPE = 160
 # Gap between two columns [characters].
 _GAP = 2
-# Sentences wrap at words, but not to a narrower column than this [characters].
-_LEAST_SENTENCE = 30
-# Time between two drawings of a progress bar [s].
-_REDRAWN = 0.1
 
 
 def print_error(fault: CdtoolError) -> None:
@@ -57,7 +52,7 @@ def print_error(fault: CdtoolError) -> None:
         print_line(one_line(note), err=True)
     message, hint = plain(fault.message), plain(fault.hint)
     room = LINE_LENGTH - len(_ERROR) - len(" ()")
-    hint = shorten_names(hint, max(_SHORTEST_HINT, room - len(message)))
+    hint = shorten_names(hint, max(140, room - len(message)))  # the next step, about half of the line
     message = shorten_paths(message, room - len(hint))
     print_line(f"{_ERROR}{message}{f' ({hint})' if hint else ''}", err=True)
 
@@ -105,10 +100,10 @@ def _print_alike(word: str, every: Sequence[Skipped | RecordingFinding]) -> None
     from cdtool.report.alike import alike
 
     items = alike([replace(item, reason=_bare(item)) for item in dict.fromkeys(every)])
-    for item in items[:_SHOWN]:
+    for item in items[:LISTED]:
         print_line(reason_line(word, item.recording, item.reason), err=True)
-    if len(items) > _SHOWN:
-        print_line(f"{word}: and {len(items) - _SHOWN} more", err=True)
+    if len(items) > LISTED:
+        print_line(f"{word}: and {len(items) - LISTED} more", err=True)
 
 
 def leave(
@@ -219,7 +214,8 @@ def _room(widths: Sequence[ColumnWidth]) -> int:
     """Return the width of the terminal. A pipe or a log file has none: columns are neither folded nor moved there."""
     if sys.stdout.isatty():
         return max(shutil.get_terminal_size().columns, _NARROWEST)
-    return max(_PIPE, sum(item.needed + _GAP for item in widths))
+    # In a pipe nothing wraps: a file has wide lines.
+    return max(160, sum(item.needed + _GAP for item in widths))
 
 
 def _stays(column: ColumnWidth) -> bool:
@@ -257,7 +253,7 @@ def progress(what: str, *, pulses: bool = False, quiet: bool = False) -> Iterato
         def advance(done: int, total: int) -> None:
             nonlocal drawn
             now = perf_counter()
-            is_due = not pulses and (now - drawn > _REDRAWN or done == total)
+            is_due = not pulses and (now - drawn > 0.1 or done == total)  # s: more is not seen
             drawn = now if is_due else drawn
             bar.update(task, completed=done, total=total, refresh=is_due)
 
@@ -286,7 +282,8 @@ def column_width(heading: str, side: str, cells: Sequence[str], leading: bool) -
     if side == "right" or leading:
         return ColumnWidth(leading, natural, natural)
     words = max((len(word) for line in lines for word in line.split()), default=0)
-    return ColumnWidth(False, max(words, min(natural, _LEAST_SENTENCE)), natural)
+    # Sentences wrap at words, but not to a narrower column.
+    return ColumnWidth(False, max(words, min(natural, 30)), natural)
 
 
 def column_blocks(columns: Sequence[ColumnWidth], width: int) -> list[list[int]]:

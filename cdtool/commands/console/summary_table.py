@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.base.exit_status import Fact
-from cdtool.base.plain_text import counted
+from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import fits_terminal, leave, number, print_line, say, table
 from cdtool.commands.console.truth_shown import show_truth
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from cdtool.results.summary import Summary
     from cdtool.statistics.interval import Interval
 
-_SHOWN = 10
 _HEADINGS = {
     "mean": "mean ms\n(95 %)",
     "std": "std\nms",
@@ -82,7 +81,7 @@ def show_table(evaluated: Evaluated) -> None:
         say(f"learned from each log until {provenance['learned_until']}")
     if others := provenance.get("scored_without_own_part"):
         say(f"{counted(len(others), 'recording')} scored with thresholds learned from the other recordings")
-    for line in partly_unassessed(evaluated.results, evaluated.summaries)[:_SHOWN]:
+    for line in partly_unassessed(evaluated.results, evaluated.summaries)[:LISTED]:
         say(line)
     show_truth(evaluated)
     _show_bounds(evaluated)
@@ -145,10 +144,10 @@ def show_conclusion(evaluated: Evaluated) -> None:
     tone = conclusion.tone
     say(conclusion.headline, tone=tone)
     say(counts_text(evaluated), indent="  ")
-    for reason in conclusion.reasons[:_SHOWN]:
+    for reason in conclusion.reasons[:LISTED]:
         say(reason, indent="  ", tone="unknown" if tone == "unknown" else "bad")
-    if len(conclusion.reasons) > _SHOWN:
-        print_line(f"  and {len(conclusion.reasons) - _SHOWN} more")
+    if len(conclusion.reasons) > LISTED:
+        print_line(f"  and {len(conclusion.reasons) - LISTED} more")
     _show_limits(evaluated)
 
 
@@ -160,13 +159,13 @@ def _show_limits(evaluated: Evaluated) -> None:
     if not limits:
         return
     failed = not_met(limits)
-    for item in failed[:_SHOWN]:
+    for item in failed[:LISTED]:
         name = f"{item.detector}.{item.group}.{item.figure}"
         outcome = item.outcome.replace("_", " ")
         tone = "bad" if item.outcome == "violated" else "unknown"
         say(f"limit {outcome}: {name}: {item.reason} (limit {item.limit})", indent="  ", tone=tone)
-    if len(failed) > _SHOWN:
-        print_line(f"  limits not met: and {len(failed) - _SHOWN} more")
+    if len(failed) > LISTED:
+        print_line(f"  limits not met: and {len(failed) - LISTED} more")
 
 
 def finish(evaluated: Evaluated) -> None:

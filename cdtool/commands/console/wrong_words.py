@@ -16,7 +16,7 @@ _EXPECTED = re.compile(r"Input should be ([^,]*)")
 def usage_error(fault: Any) -> UsageError:
     """Return what is wrong with a command line, with the nearest known word or where the help is."""
     context: Any = getattr(fault, "ctx", None)
-    see = f"see {context.command_path if context else 'cdtool'} --help"
+    see = f"see {context.command_path if context else 'the command with'} --help"
     message = " ".join(fault.message.split()).rstrip(".")
     quoted = _QUOTED.findall(message)
     if message.startswith("No such command"):
@@ -24,8 +24,8 @@ def usage_error(fault: Any) -> UsageError:
     if message.startswith("Got unexpected extra argument"):
         return UsageError(f"unexpected argument {message.rpartition(' (')[2].rstrip(')')}", see)
     if hasattr(fault, "possibilities"):
-        known = [name for item in context.command.params for name in item.opts]
-        close = get_close_matches(fault.option_name, known, n=2)
+        known = {name.lstrip("-"): name for item in context.command.params for name in item.opts}
+        close = [known[name] for name in get_close_matches(fault.option_name.lstrip("-"), known, n=2)]
         meant = f"did you mean {' or '.join(close)}? " if close else ""
         return UsageError(f"unknown option {fault.option_name}", f"{meant}{see}")
     if not getattr(fault, "param", None):

@@ -39,11 +39,6 @@ def convert(
             help="Machine file: write its channels in SI units. Default: all columns.",
         ),
     ] = None,
-    from_: Annotated[
-        str | None,
-        typer.Option("--from", help="Only from here: a time as 1.5s, or a distance travelled as 0.2m."),
-    ] = None,
-    to: Annotated[str | None, typer.Option("--to", help="Only up to here.")] = None,
     recover: Annotated[
         Literal["verified", "all"] | None,
         typer.Option(
@@ -60,21 +55,18 @@ def convert(
 
     Example: cdtool convert stiff/03.csv stiff-03.mcap -m machine.toml
     """
-    from cdtool.base.settings import Place as PlaceOfKey
     from cdtool.commands.convert.converting import convert as write
     from cdtool.commands.convert.recovering import Recovered
     from cdtool.commands.convert.recovering import recover as write_what_is_left
-    from cdtool.commands.judging.named_logs import LogPart
 
-    section = LogPart(begin=from_, end=to).section(PlaceOfKey("convert"))
-    if recover and (machine or section):
-        raise UsageError("--recover copies messages as they are", "recover first, then convert with -m, --from or --to")
+    if recover and machine:
+        raise UsageError("--recover copies messages as they are", "recover first, then convert with -m")
     done: Converted | Recovered
     with progress("recovering" if recover else "converting", pulses=True) as advance:
         if recover:
             done = write_what_is_left(source, output, recover == "all", force=force, progress=advance)
         else:
-            done = write(source, output, machine=machine, section=section, force=force, progress=advance)
+            done = write(source, output, machine=machine, force=force, progress=advance)
     if as_json:
         print_json(with_findings(done))
     else:

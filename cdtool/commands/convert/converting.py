@@ -1,16 +1,14 @@
 """`cdtool convert`: write a log's channels or all its columns to another file format, bit for bit, with provenance.
 
 The mapped channels of a log as `cdtool convert` writes them: as logged, in SI units, in memory.
-
-The rows of a section of a log, as `cdtool convert` writes them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +16,9 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError, UsageError
 from cdtool.base.files.writing import replaced
 from cdtool.base.findings import Finding
-from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import location
 from cdtool.base.version import __version__
 from cdtool.commands.convert.log_rows import ColumnRows
-from cdtool.commands.judging.runs import read
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.parts import join_digests
 from cdtool.formats.channels.reading import log_parts, read_as_logged
@@ -30,85 +26,10 @@ from cdtool.formats.columns import Column
 from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts
 from cdtool.formats.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.formats.written_files import files_of, machine_text, writer_of
-from cdtool.recordings.log_section import LogSection
 from cdtool.recordings.recording import Series
 
 if TYPE_CHECKING:
     from cdtool.execution.workers import Progress
-
-
-class Rows(Protocol):
-    """The groups of a log and their rows; `parts` can be called repeatedly."""
-
-    @property
-    def groups(self) -> Sequence[Group]:
-        """The groups, without their rows."""
-        ...
-
-    @property
-    def origin(self) -> float:
-        """The origin of the times [s]."""
-        ...
-
-    @property
-    def findings(self) -> Sequence[Finding]:
-        """What was found while reading."""
-        ...
-
-    def parts(self, groups: Sequence[Group]) -> Parts:
-        """Yield the rows of these groups."""
-        ...
-
-
-class SectionRows:
-    """The groups of a log that have rows in a section, and these rows; they keep their times.
-
-    A distance travelled is determined from the log's channels, so that it needs a machine file. Raises UsageError for a
-    distance without one and for columns without a clock, RecordingError if no row is in the section.
-    """
-
-    def __init__(self, log: Path, rows: Rows, section: LogSection, machine_file: MachineFile | None) -> None:
-        if untimed := [group for group in rows.groups if not group.timed]:
-            name = untimed[0].columns[0].name
-            raise UsageError(f"{log}: no clock is known for {name}, so that it cannot be cut {section}", "pass -m")
-        self._rows, self._begin, self._end = rows, *_times(log, section, machine_file)
-        self.origin, self.findings = rows.origin, rows.findings
-        counts, starts = [0] * len(rows.groups), [np.inf] * len(rows.groups)
-        for ready in self.parts(rows.groups):
-            for i, part in enumerate(ready):
-                if part is not None and part.time is not None:
-                    counts[i] += len(part)
-                    starts[i] = min(starts[i], float(part.time.min()))
-        numbered = zip(rows.groups, counts, starts, strict=True)
-        self.groups = [replace(group, rows=count, start=start) for group, count, start in numbered if count]
-        if not self.groups:
-            start = min(group.start for group in rows.groups)
-            raise RecordingError(
-                f"{log}: no sample {section}: the log starts at {digits(start)} s", "change from and to"
-            )
-
-    def parts(self, groups: Sequence[Group]) -> Iterator[list[Part | None]]:
-        """Yield the rows of these groups that are in the section, part by part."""
-        whole = {group.name: group for group in self._rows.groups}
-        for ready in self._rows.parts([whole[group.name] for group in groups]):
-            yield [None if part is None else self._inside(part) for part in ready]
-
-    def _inside(self, part: Part) -> Part | None:
-        assert part.time is not None, "groups without a clock are refused"
-        inside = (part.time >= self._begin) & (part.time <= self._end)
-        if inside.all():
-            return part
-        return Part(part.time[inside], tuple(item[inside] for item in part.values)) if inside.any() else None
-
-
-def _times(log: Path, section: LogSection, machine_file: MachineFile | None) -> tuple[float, float]:
-    by_distance = [mark for mark in (section.begin, section.end) if mark and mark.unit != "s"]
-    if by_distance and machine_file is None:
-        raise UsageError(f"{by_distance[0]} needs the log's position", "pass a machine file with -m, or give a time")
-    if machine_file is not None and by_distance:
-        return section.times(read(log, machine_file))
-    begin, end = section.begin, section.end
-    return -np.inf if begin is None else begin.value, np.inf if end is None else end.value
 
 
 # Rows of the longest clock per part.
@@ -171,7 +92,6 @@ def convert(
     output: str | Path,
     *,
     machine: str | Path | MachineFile | None = None,
-    section: LogSection = LogSection(),
     force: bool = False,
     progress: Progress | None = None,
 ) -> Converted:
@@ -186,8 +106,6 @@ def convert(
         is written to its own file, with `.1`, `.2` before the suffix.
     machine : str, Path or MachineFile, optional
         Maps the channels; they are written as logged, in SI units, with a machine file for each file written.
-    section : LogSection, optional
-        The part of the log that is written; the whole log by default. A distance travelled needs `machine`.
     force : bool, optional
         Replace existing files.
     progress : callable, optional
@@ -221,16 +139,15 @@ def convert(
     machine_file = (
         None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     )
-    rows: Rows = ChannelRows(log, machine_file) if machine_file else ColumnRows(log)
+    rows: ChannelRows | ColumnRows = ChannelRows(log, machine_file) if machine_file else ColumnRows(log)
     if not rows.groups:
         raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
-    rows = SectionRows(log, rows, section, machine_file) if section else rows
     pieces = files_of(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
     beside = [path for path in machine_file.files_beside(log) if path.is_file()] if machine_file else []
     _check_free([*names, *companions], [*parts, *beside], force)
-    provenance = _provenance(log, parts, rows, machine_file, section)
+    provenance = _provenance(log, parts, rows, machine_file)
     if beside:
         provenance |= {"load_cell": "; ".join(f"{path.name} {file_digest(path)}" for path in beside)}
     row_progress = _RowProgress(log, sum(group.rows for group in rows.groups), progress)
@@ -283,7 +200,7 @@ def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> No
 
 
 def _provenance(
-    log: Path, parts: Sequence[Path], rows: Rows, machine_file: MachineFile | None, section: LogSection
+    log: Path, parts: Sequence[Path], rows: ChannelRows | ColumnRows, machine_file: MachineFile | None
 ) -> dict[str, str]:
     """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
     digests = {part.name: file_digest(part) for part in parts}
@@ -295,8 +212,6 @@ def _provenance(
     }
     if log.is_dir():
         told["parts"] = "; ".join(f"{name} {digest}" for name, digest in digests.items())
-    if section:
-        told["section"] = str(section)
     if lost := [str(finding) for finding in rows.findings if finding.severity == "loss"]:
         told["lost"] = "; ".join(lost)
     if unverified := [finding.message for finding in rows.findings if finding.kind == "unverified"]:

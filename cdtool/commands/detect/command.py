@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from cdtool.commands.detect.contact_force import ForceSummary
     from cdtool.commands.detecting.detection import Detected
     from cdtool.commands.detecting.prepared import PreparedDetector
-    from cdtool.commands.detecting.prepared_benchmark import PreparedBenchmark
     from cdtool.machines.dynamics import Machine
     from cdtool.results.results import RecordingFinding, Skipped
 
@@ -118,7 +117,7 @@ def detect(
 class _DetectedLogs:
     """Detection in several logs: the steps for each, and the results so far."""
 
-    ready: PreparedDetector | PreparedBenchmark
+    ready: PreparedDetector
     plot_names: Mapping[Path, Path]
     estimate_force: Callable[[Detection], ForceSummary] | None
     skipped: list[Skipped]

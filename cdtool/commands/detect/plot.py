@@ -36,10 +36,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_PANELS = 6
-# A zoom is drawn if it shows less than this share of the log.
-_ZOOM_SHARE = 0.4
-_BEFORE, _AFTER = 0.2, 0.6
+# Before the event, and after the last alarm [s]: what led to it.
+_BEFORE = 0.2
 
 
 @dataclass(frozen=True)
@@ -194,7 +192,7 @@ def _shown_joints(found: Detected) -> tuple[list[int], list[int]]:
     """Return the joints that alarm, and those that are drawn."""
     alarming = sorted({alarm.column for item in found.detections for alarm in item.verdict.alarms})
     leading = sorted({item.leading for item in found.detections})
-    return alarming, (alarming or leading)[:_MOST_PANELS]
+    return alarming, (alarming or leading)[:6]  # panels that fit on a page: the joints of a robot
 
 
 def _event(matches: Sequence[Match], alarms: Sequence[Alarm]) -> _Event:
@@ -210,8 +208,9 @@ def _zoom(event: _Event, whole: Span) -> Span | None:
         return None
     last = max(event.zero, event.alarm.time if event.alarm else event.zero)
     start = max(event.zero - _BEFORE, whole[0])
-    end = min(max(event.zero + _AFTER, last + _BEFORE), whole[1])
-    return (start, end) if 0.0 < end - start < _ZOOM_SHARE * (whole[1] - whole[0]) else None
+    end = min(max(event.zero + 0.6, last + _BEFORE), whole[1])
+    # A zoom is drawn if it enlarges: it shows less than 40 % of the log.
+    return (start, end) if 0.0 < end - start < 0.4 * (whole[1] - whole[0]) else None
 
 
 def _overlap(detection: Detection, span: Span) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -15,7 +15,8 @@ from cdtool.alarms.pipeline import Detection
 from cdtool.base.errors import CdtoolError, OutputError, RecordingError, SignatureError, UsageError
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
-from cdtool.commands.detecting.detection import Detected, DetectedRuns, contact_of
+from cdtool.commands.detect.rows import AlarmRow, OperationRow, alarm_row, operation_row
+from cdtool.commands.detecting.detection import Detected, DetectedRuns
 from cdtool.commands.detecting.prepared import prepared
 from cdtool.commands.judging.runs import several_logs
 from cdtool.detectors.detection import Status
@@ -38,37 +39,6 @@ VERDICTS = ("alarm", "no alarm", "not_assessable")
 _SHOWN = ["operation", "verdict", "alarms", "first_alarm_s", "contacts", "latency_ms"]
 
 
-@dataclass(frozen=True)
-class AlarmRow:
-    """One alarm: a row of `DetectionResult.alarms`."""
-
-    recording: str
-    operation: str
-    detector: str
-    joint: str
-    time_s: float
-    side: str
-    statistic: float
-    limit: float
-    contact_onset_s: float | None
-
-
-@dataclass(frozen=True)
-class OperationRow:
-    """The verdict on one operation, its first alarm, its first latency: a row of `DetectionResult.summary()`."""
-
-    recording: str
-    operation: str
-    detector: str
-    verdict: str
-    alarms: int
-    first_alarm_s: float | None
-    contacts: int
-    latency_ms: float | None
-    assessed_s: float
-    reason: str | None
-
-
 class _Frames:
     """Alarms, contacts and verdicts of one log, or of several, as DataFrames."""
 
@@ -79,7 +49,12 @@ class _Frames:
     @cached_property
     def alarms(self) -> pd.DataFrame:
         """A row per alarm: joint, time, side, statistic, limit, and the onset of its contact (NaN: none is known)."""
-        rows = [row for run in self._each for row in _alarms(run)]
+        rows = [
+            alarm_row(run.detected, detection, alarm)
+            for run in self._each
+            for detection in run.detections
+            for alarm in detection.verdict.alarms
+        ]
         return rows_as_frame(AlarmRow, rows, {"side": ("above", "below")})
 
     @cached_property
@@ -90,7 +65,11 @@ class _Frames:
 
     def summary(self) -> pd.DataFrame:
         """Return a row per operation with its verdict."""
-        rows = [row for run in self._each for row in _operations(run)]
+        rows = [
+            operation_row(run.detected, *pair)
+            for run in self._each
+            for pair in zip(run.detections, run.detected.matchings, strict=True)
+        ]
         return rows_as_frame(OperationRow, rows, {"verdict": VERDICTS})
 
 
@@ -269,33 +248,6 @@ class DetectionResults(_Frames, Sequence[DetectionResult]):
     def _repr_html_(self) -> str:
         """Return the verdict on each operation as a table, which a notebook shows."""
         return notebook_table(repr(self), self.summary()[["recording", *_SHOWN]])
-
-
-def _alarms(run: DetectionResult) -> Iterator[AlarmRow]:
-    for detection in run.detections:
-        for alarm in detection.verdict.alarms:
-            contact = contact_of(run.detected, alarm)
-            onset = None if contact is None or contact.in_progress else contact.start
-            names = (run.recording.name, detection.operation.name, detection.detector, alarm.joint)
-            yield AlarmRow(*names, alarm.time, alarm.side, alarm.statistic, alarm.limit, onset)
-
-
-def _operations(run: DetectionResult) -> Iterator[OperationRow]:
-    for detection, matching in zip(run.detections, run.detected.matchings, strict=True):
-        verdict = detection.verdict
-        latencies = [1e3 * item.latency for item in matching.matches if item.alarm]
-        yield OperationRow(
-            run.recording.name,
-            detection.operation.name,
-            detection.detector,
-            verdict.outcome,
-            len(verdict.alarms),
-            verdict.alarms[0].time if verdict.alarms else None,
-            len(matching.matches),
-            latencies[0] if latencies else None,
-            detection.assessed_seconds,
-            verdict.reason or None,
-        )
 
 
 @overload

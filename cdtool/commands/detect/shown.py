@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdtool.base.plain_text import counted
+from cdtool.base.plain_text import LISTED, NAMED, counted
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import number, plain, print_line, say, table
 from cdtool.commands.console.contact_rows import contact_as_json
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from cdtool.results.results import ContactResult
     from cdtool.truth.matching import Matching
 
-# Operations whose sections that are not assessable are shown, and how many sections of each.
-_SHOWN, _SECTIONS = 6, 3
 # `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
 # The colours of outcomes.
@@ -38,10 +36,10 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
     _show(rows, done[0].threshold)
     _show_not_assessable(detections)
     _show_notes(detections)
-    for force in list(forces.values())[:_SHOWN]:
+    for force in list(forces.values())[:LISTED]:
         _show_force(force)
-    if len(forces) > _SHOWN:
-        print_line(f"estimated force: and {counted(len(forces) - _SHOWN, 'more operation')} (--json has all)")
+    if len(forces) > LISTED:
+        print_line(f"estimated force: and {counted(len(forces) - LISTED, 'more operation')} (--json has all)")
 
 
 def show_conclusion(done: Sequence[Detected]) -> None:
@@ -134,19 +132,19 @@ def _show_force(force: ForceSummary) -> None:
 def _show_notes(detections: list[Detection]) -> None:
     """Print the detector's notes on its signal, for as many operations as sections that are not assessable."""
     noted = [detection for detection in detections if detection.statistic.notes]
-    for detection in noted[:_SHOWN]:
+    for detection in noted[:LISTED]:
         for note in detection.statistic.notes:
             say(f"{detection.operation.name}: {note}")
-    if len(noted) > _SHOWN:
-        print_line(f"and {counted(len(noted) - _SHOWN, 'more operation')} with such a note (--json has all)")
+    if len(noted) > LISTED:
+        print_line(f"and {counted(len(noted) - LISTED, 'more operation')} with such a note (--json has all)")
 
 
 def _show_not_assessable(detections: list[Detection]) -> None:
     """Print the share of each operation that is not assessable, and the time, position and reason of long sections."""
     shown = [detection for detection in detections if detection.statistic.shares()]
-    for detection in shown[:_SHOWN]:
+    for detection in shown[:LISTED]:
         sections = detection.not_assessable_sections()
-        longest = sorted(sections, key=lambda item: item.start - item.end)[:_SECTIONS]
+        longest = sorted(sections, key=lambda item: item.start - item.end)[:NAMED]
         unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
         parts = []
         for item in sorted(longest, key=lambda item: item.start):
@@ -162,8 +160,8 @@ def _show_not_assessable(detections: list[Detection]) -> None:
             parts.append(detection.other_speed)
         share = 1.0 - float(detection.statistic.valid.mean())
         say(f"not assessable in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
-    if len(shown) > _SHOWN:
-        print_line(f"not assessable: and {counted(len(shown) - _SHOWN, 'more operation')} (--json has all)")
+    if len(shown) > LISTED:
+        print_line(f"not assessable: and {counted(len(shown) - LISTED, 'more operation')} (--json has all)")
 
 
 def _place(way: float) -> str:
@@ -179,35 +177,25 @@ def _as_json(
     rows: Sequence[ContactResult],
     force: ForceSummary | None,
 ) -> dict[str, Any]:
+    from cdtool.commands.detect.rows import alarm_row, operation_row
     from cdtool.commands.detecting.detection import contact_of, why_no_contact
 
-    belonging = {alarm: contact_of(found, alarm) for alarm in detection.verdict.alarms}
-    belonging |= {item.alarm: item.contact for item in matching.matches if item.alarm}
+    alarms = detection.verdict.alarms
+    why = [None if contact_of(found, alarm) else why_no_contact(found, alarm) for alarm in alarms]
     return {
         "log": str(log),
-        "operation": detection.operation.name,
-        "detector": detection.detector,
+        **asdict(operation_row(found, detection, matching)),
         "unit": detection.statistic.unit,
         "threshold": found.threshold,
-        "verdict": detection.verdict.outcome,
-        "reason": detection.verdict.reason or None,
         "alarms": [
-            {
-                "time_s": alarm.time,
-                "joint": alarm.joint,
-                "side": alarm.side,
-                "statistic": alarm.statistic,
-                "limit": alarm.limit,
-                "contact_onset_s": contact.start if contact else None,
-                "why_no_contact": None if contact else why_no_contact(found, alarm),
-            }
-            for alarm, contact in ((alarm, belonging[alarm]) for alarm in detection.verdict.alarms)
+            {**asdict(alarm_row(found, detection, alarm)), "why_no_contact": reason}
+            for alarm, reason in zip(alarms, why, strict=True)
         ],
         "contacts": [contact_as_json(detection, row) for row in rows],
         "not_judged": detection.statistic.shares(),
         "other_speed": detection.other_speed or None,
         "stretches_not_judged": [asdict(item) for item in detection.not_assessable_sections()],
-        "estimated_force": _force_as_json(force) if force else None,
+        "estimated_force": asdict(force) if force else None,
         "notes": list(detection.statistic.notes),
         "findings": _findings(found),
     }
@@ -219,9 +207,3 @@ def _findings(found: Detected) -> list[str]:
         (item.reason for item in found.findings if item.severity == "warning"),
     )
     return list(dict.fromkeys([*read, *of_log]))
-
-
-def _force_as_json(force: ForceSummary) -> dict[str, Any]:
-    figures = {"at_alarm_n": force.at_alarm, "largest_n": force.largest, "largest_at_s": force.largest_at}
-    known = {name: value if math.isfinite(value) else None for name, value in figures.items()}
-    return {"link": force.contact.link, "point_m": list(force.contact.point), **known}

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection
-from cdtool.commands.judging.runs import (
-    absent_truth,
-)
+from cdtool.commands.judging.runs import absent_truth
 from cdtool.detectors.detection import Alarm
 from cdtool.recordings.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.results.results import ContactResult, RecordingFinding, Skipped
 from cdtool.thresholds.normal_motion import NormalMotions
 from cdtool.truth.matching import Matching, belongs, windows
 from cdtool.truth.missing_samples import longest_step
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)
@@ -66,7 +60,10 @@ class DetectedRuns:
 
 
 def contact_of(found: Detected, alarm: Alarm) -> Contact | None:
-    """Return the contact that an alarm belongs to: by its window, or because the contact lasts until the alarm."""
+    """Return the contact that an alarm detected, or belongs to: by its window, or because it lasts until the alarm."""
+    matches = [item for matching in found.matchings for item in matching.matches]
+    if own := next((item.contact for item in matches if item.alarm == alarm), None):
+        return own
     spans = windows(found.contacts, found.window)
     return next((span[0] for span in reversed(spans) if belongs(alarm.time, [span])), None)
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cdtool.base.log_names import log_stem
-from cdtool.base.plain_text import counted
+from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.console import (
     leave,
     number,
@@ -38,10 +39,7 @@ from cdtool.commands.console.place import Place, location
 if TYPE_CHECKING:
     from cdtool.commands.explain.explaining import ExplainedRun
     from cdtool.results.explanation.explanation import Explanation
-    from cdtool.results.explanation.margin import Moment
 
-# Events that are printed and drawn; --json has all.
-_SHOWN = 20
 # Its reason already names the speeds.
 _BLIND = "not_assessable"
 
@@ -105,7 +103,7 @@ def _draw(runs: Sequence[ExplainedRun], plot: Path | None, stem: str, *, force: 
         return []
     from cdtool.commands.explain.margin_plot import plot_explanation
 
-    events = [event for run in runs for event in run.events][: _SHOWN if plot.is_dir() else 1]
+    events = [event for run in runs for event in run.events][: None if plot.is_dir() else 1]
     paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
     paths = [figure_name(path, force=force) for path in paths]
     for (detection, item), path in zip(events, paths, strict=True):
@@ -115,21 +113,21 @@ def _draw(runs: Sequence[ExplainedRun], plot: Path | None, stem: str, *, force: 
 
 def _show_explained(explained: ExplainedRun) -> None:
     """Print every event of a log, and the operations without one."""
-    shown = explained.events[:_SHOWN]
+    shown = explained.events[:LISTED]
     for _, item in shown:
         _show_event(item)
     if len(explained.events) > len(shown):
         print_line(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
     elsewhere = [item for item in explained.found.detections if item.other_speed and item.verdict.outcome != _BLIND]
-    for detection in elsewhere[:_SHOWN]:
+    for detection in elsewhere[:LISTED]:
         say(f"{detection.operation.name}, not assessable at another speed: {detection.other_speed}")
     pairs = zip(explained.found.detections, explained.explanations, strict=True)
     quiet = [detection for detection, events in pairs if not events]
-    for detection in quiet[:_SHOWN]:
+    for detection in quiet[:LISTED]:
         why = detection.verdict.reason or "no alarm and no missed contact"
         say(f"{detection.operation.name}, {detection.detector}: {why}")
-    if len(quiet) > _SHOWN:
-        print_line(f"and {counted(len(quiet) - _SHOWN, 'more operation')} without an event")
+    if len(quiet) > LISTED:
+        print_line(f"and {counted(len(quiet) - LISTED, 'more operation')} without an event")
 
 
 def _show_event(item: Explanation) -> None:
@@ -161,10 +159,11 @@ def _show_event(item: Explanation) -> None:
 
 
 def _as_json_value(log: str, explained: ExplainedRun) -> dict[str, Any]:
-    """Return the same as JSON values."""
+    """Return the same as JSON values: an event by the names that it has in Python."""
     from cdtool.commands.console.contact_rows import contact_as_json
+    from cdtool.report.explanation_words import words
 
-    items = [item for _, item in explained.events]
+    items = [{**asdict(item), "words": words(item)} for _, item in explained.events]
     return {
         "log": log,
         "verdicts": [
@@ -176,98 +175,6 @@ def _as_json_value(log: str, explained: ExplainedRun) -> dict[str, Any]:
             for detection, rows in zip(explained.found.detections, explained.found.contact_rows, strict=True)
             for row in rows
         ],
-        "alarms": [_alarm_as_json(item) for item in items if item.alarm],
-        "missed": [_miss_as_json(item) for item in items if not item.alarm],
-    }
-
-
-def _alarm_as_json(item: Explanation) -> dict[str, Any]:
-    assert item.alarm is not None, "of an alarm"
-    return {
-        **_common(item),
-        "role": item.role,
-        "time_s": item.alarm.time,
-        "side": item.alarm.side,
-        "statistic": item.alarm.statistic,
-        "limit": item.alarm.limit,
-        "onset_s": item.contact.start if item.contact else None,
-        "left_band_s": item.left,
-        "missing_samples_skipped": item.skipped,
-    }
-
-
-def _miss_as_json(item: Explanation) -> dict[str, Any]:
-    return {
-        **_common(item),
-        "outcome": item.role,
-        "reason": item.reason or None,
-        "onset_s": item.zero,
-        "watched_ms": 1e3 * item.watched,
-        "not_judged": dict(item.not_judged),
-        "joints": [
-            {
-                "joint": found.joint,
-                "nearest": _moment_as_json(found.nearest),
-                "longest_outside_samples": found.longest,
-                "longest_outside_from_s": found.outside_from,
-                "held_share_of_limit": found.held,
-                "outside_before_contact_from_s": found.latched_from,
-            }
-            for found in item.approaches
-        ],
-    }
-
-
-def _common(item: Explanation) -> dict[str, Any]:
-    from cdtool.report.explanation_words import words
-
-    return {
-        "operation": item.operation,
-        "detector": item.detector,
-        "joint": item.joint,
-        "unit": item.unit,
-        "debounce_samples": item.debounce,
-        "words": words(item),
-        "detector_reads": list(item.inputs),
-        "compared_with_runs": item.runs,
-        "not_compared_because": str(item.absent) if item.absent else None,
-        "moved": [
-            {
-                "channel": found.channel,
-                "joint": found.joint,
-                "time_s": found.time,
-                "direction": found.direction or None,
-                "reason": found.reason or None,
-                "unit": found.unit or None,
-                "value": found.value,
-                "normal_mean": found.mean,
-                "normal_spread": found.spread,
-            }
-            for found in item.departed
-        ],
-        "glitches": [
-            {
-                "kind": found.kind,
-                "channel": found.channel,
-                "joint": found.joint or None,
-                "unit": found.unit or None,
-                "start_s": found.start,
-                "end_s": found.end,
-                "samples": found.samples,
-                "size": found.size,
-            }
-            for found in item.glitches
-        ],
-        "margins": [_moment_as_json(moment) for moment in item.moments],
-    }
-
-
-def _moment_as_json(moment: Moment) -> dict[str, Any]:
-    return {
-        "time_s": moment.time,
-        "statistic": moment.statistic,
-        "limit": moment.limit,
-        "margin": moment.margin,
-        "share_of_limit": moment.share,
-        "reason": moment.reason or None,
+        "alarms": [item for item in items if item["alarm"]],
+        "missed": [item for item in items if not item["alarm"]],
     }

@@ -18,7 +18,6 @@ from cdtool.results.explanation.explanation import Explanation, explain_operatio
 from cdtool.results.results import RecordingFinding, Skipped
 
 if TYPE_CHECKING:
-    from cdtool.commands.detecting.prepared_benchmark import PreparedBenchmark
     from cdtool.commands.learning.learning import LearnedSignature
     from cdtool.detectors.base import Detector
     from cdtool.formats.signature_file import SignatureFile
@@ -100,7 +99,7 @@ def explain(
     return explain_log(log, ready)
 
 
-def explain_log(log: str | Path, ready: PreparedDetector | PreparedBenchmark) -> Explained:
+def explain_log(log: str | Path, ready: PreparedDetector) -> Explained:
     """Return the same as `explain`, which has the errors, with a detector that is ready."""
     detected = ready.detect(location(log))
     runs = tuple(_explained(found, ready.machine_file) for found in detected.runs)

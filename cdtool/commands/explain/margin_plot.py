@@ -15,7 +15,16 @@ from cdtool.base.plain_text import counted
 from cdtool.recordings.recording import Recording
 from cdtool.report.explanation_words import words
 from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
-from cdtool.report.plots.panels import Legend, count_from, draw_alarm, draw_force, draw_onset, draw_signal, frame_signal
+from cdtool.report.plots.panels import (
+    PIXELS,
+    Legend,
+    count_from,
+    draw_alarm,
+    draw_force,
+    draw_onset,
+    draw_signal,
+    frame_signal,
+)
 from cdtool.report.plots.style import BAND, look_of
 from cdtool.results.explanation.departure import Departure
 from cdtool.results.explanation.explanation import Explanation
@@ -28,8 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_PIXELS = 1000
-_MOST_CHANNELS = 5
 # Time shown before and after the events, and at most after a contact [s].
 _BEFORE, _AFTER, _LONGEST = 0.15, 0.06, 0.6
 _STEPS = (0.01, 0.02, 0.05, 0.1, 0.2)
@@ -79,7 +86,7 @@ def _channels(item: Explanation) -> list[Departure]:
     """Return the channels that moved, in order, then those that the detector reads and that did not."""
     moved = [found for found in item.departed if not math.isnan(found.time)]
     still = [found for found in item.departed if math.isnan(found.time) and found.channel in item.inputs]
-    return [*moved, *still][:_MOST_CHANNELS]
+    return [*moved, *still][:5]  # panels that fit on a page
 
 
 def _span(item: Explanation, recording: Recording) -> Span:
@@ -100,7 +107,7 @@ def _draw_channel(axes: Axes, recording: Recording, departure: Departure, item: 
     series = recording[departure.channel].between(*span)
     value = series.values[:, recording.joints.index(departure.joint)]
     colour = _colour(departure, item)
-    axes.plot(*decimate(series.time, value, _PIXELS), color=colour, linewidth=1.0)
+    axes.plot(*decimate(series.time, value, PIXELS), color=colour, linewidth=1.0)
     joint = f"\n{label(departure.joint, 14)}" if departure.joint != item.joint else ""
     _name(axes, f"{label(departure.channel, 20)}{joint}\n[{unit_label(series.unit)}]")
     if math.isnan(departure.time):
@@ -128,7 +135,7 @@ def _draw_margin(axes: Axes, detection: Detection, item: Explanation, span: Span
     if not np.isfinite(value).any():
         return
     colour = look_of(item.detector).colour
-    axes.plot(*decimate(time, value, _PIXELS), color=colour)
+    axes.plot(*decimate(time, value, PIXELS), color=colour)
     low, high = _range(value)
     axes.set_ylim(low, high)
     axes.axhspan(0.0, high, color=BAND, linewidth=0, zorder=0)

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from cdtool.execution.workers import Workers
 
 _PAYLOAD = re.compile(r"(?P<mass>[^@:]+?) ?kg(?:@(?P<link>[^:]+))?(?::(?P<centre>.+))?")
-# Error on unseen runs over the difference of equal strokes above which something is not in the model.
-_MUCH_MORE = 3.0
 _DOUBT = (
     "times what equal strokes differ by: a spring, a lag of the torque or friction along the travel is not in it, and "
     "its errors may be too small"
@@ -145,7 +143,8 @@ def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Pa
 
     for joint in done.joints:
         validation = joint.evidence.cross_validation if joint.evidence else None
-        if validation and (left := validation.left_over) > _MUCH_MORE:
+        # The error on unseen runs is three times the difference of equal strokes: something is not in the model.
+        if validation and (left := validation.left_over) > 3.0:
             print_line(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
     runs = counted(len(done.runs), "impact-free run")
     print_line(f"{plain(done.machine)}: identified from {runs}")

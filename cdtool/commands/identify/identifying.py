@@ -14,10 +14,10 @@ import numpy as np
 from cdtool.base.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
 from cdtool.base.files.bounded_loading import read_text, read_toml
 from cdtool.base.files.writing import write_texts
-from cdtool.base.plain_text import counted
+from cdtool.base.plain_text import NAMED, counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
-from cdtool.commands.identify.axis.speed_controller import ControllerSettings, identify_controller
+from cdtool.commands.identify.axis.speed_controller import SIGNIFICANT, ControllerSettings, identify_controller
 from cdtool.commands.identify.axis.two_mass import TwoMassSettings, identify_two_mass
 from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.commands.identify.identifying_robot import RobotIdentification, identify_joints
@@ -41,11 +41,6 @@ from cdtool.recordings.recording import Contact, Recording
 from cdtool.results.results import RecordingFinding, Skipped
 from cdtool.truth.onset_rule import OnsetRule
 
-# Reasons that the message of an error lists.
-_MOST_REASONS = 3
-# Constant force above this share of the Coulomb friction that the model of the starts cannot leave out, and the
-# standard errors by which it must be known.
-_MOST_CONSTANT, _SIGNIFICANT = 0.2, 3.0
 _COULOMB = ("coulomb_friction", "coulomb_forward", "coulomb_backward")
 
 
@@ -257,7 +252,7 @@ def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
     reasons = [text for joint in joints for name, text in joint.refused.items() if name != "controller"]
     missing = [item for joint in joints for item in joint.not_identifiable if item.section != "model.controller"]
     reasons += [f"{item.key} needs {', '.join(kind.value for kind in item.missing)}" for item in missing]
-    return list(dict.fromkeys(reasons))[:_MOST_REASONS]
+    return list(dict.fromkeys(reasons))[:NAMED]
 
 
 def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[Recording]) -> JointIdentification:
@@ -324,7 +319,7 @@ def _has_opposite_sign(fit: RigidAxisFit | None) -> bool:
     numbers = {item.key: item.numbers for item in fit.identified.not_identifiable} if fit else {}
     signs = (("load_mass", "total_mass"), ("coulomb_friction", "value"))
     return all(
-        numbers.get(key, {}).get(name, 0.0) < -_SIGNIFICANT * numbers.get(key, {}).get("standard_error", math.inf)
+        numbers.get(key, {}).get(name, 0.0) < -SIGNIFICANT * numbers.get(key, {}).get("standard_error", math.inf)
         for key, name in signs
     )
 
@@ -335,8 +330,9 @@ def _refuse_constant_force(fit: RigidAxisFit | None, unit: str) -> None:
         return
     constant = fit.identified["constant_force"]
     friction = [item.value for item in fit.identified.estimates if item.key in _COULOMB]
-    known = abs(constant.value) > _SIGNIFICANT * constant.standard_error
-    if known and friction and abs(constant.value) > _MOST_CONSTANT * float(np.mean(friction)):
+    known = abs(constant.value) > SIGNIFICANT * constant.standard_error
+    # Above a fifth of the Coulomb friction the model of the starts cannot leave it out.
+    if known and friction and abs(constant.value) > 0.2 * float(np.mean(friction)):
         raise IdentificationError(
             f"a constant force of {constant.value:.3g} {unit} acts, which the elastic drive's model does not have",
             "a vertical axis or one with a spring or counterweight: state [model.drive] stiffness from its data sheet",

@@ -35,12 +35,8 @@ from cdtool.recordings.recording import Recording
 
 # A joint of whose torque the best model explains less than this share has a wrong channel, or the robot a wrong URDF.
 _EXPLAINED = 0.5
-# More unexplained moments than this share of the motion are no exceptions.
-_MOST_UNEXPLAINED = 0.1
 # Units of inertia, force, travel and viscous friction.
 _REVOLUTE, _PRISMATIC = ("kg m2", "N m", "rad", "N m s/rad"), ("kg", "N", "m", "N s/m")
-# Physical links may raise the residual of least squares by this share.
-_MOST_RISE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +143,7 @@ def identify_joints(
             factors[item.joint] = item.value / present[item.joint]
         runs = [replace(run, torque=run.torque * factors) for run in runs]
     explained = without_unexplained(runs, machine)
-    if explained.share > _MOST_UNEXPLAINED:
+    if explained.share > 0.1:  # of the motion: these are no exceptions
         raise IdentificationError(
             f"no friction explains the torque during {100.0 * explained.share:.0f} % of the motion",
             "leave out logs with contacts and stops; check the order, signs and units of the channels",
@@ -276,7 +272,7 @@ def _new_urdf(
     fit: RobotFit, found: InertiaIdentification, joints: tuple[JointFriction, ...], path: Path
 ) -> tuple[InertiaIdentification, tuple[JointFriction, ...], str]:
     consistent = consistent_fit(fit)
-    if consistent.residual_rise > _MOST_RISE:
+    if consistent.residual_rise > 0.1:  # by more than physical links may
         raise IdentificationError(
             f"no physical links explain the torques: their residual is {100.0 * consistent.residual_rise:.0f} % higher",
             "check the signs and units of the channels, and the kinematics of the URDF",

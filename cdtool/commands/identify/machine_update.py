@@ -18,8 +18,7 @@ from cdtool.machines.urdf_robot import UrdfRobot
 
 # Keys of whole numbers.
 _WHOLE = ("speed_filter_order",)
-# Digits of a written value beyond the first digit of its standard error.
-_MORE_DIGITS = 1
+# Digits of a written value, unless its standard error needs more: nobody measures a machine more exactly.
 _DIGITS = 6
 
 
@@ -134,7 +133,8 @@ def _rounded(value: float, error: float) -> float:
     """Return a value with one digit more than its standard error has, and at least six."""
     if not math.isfinite(error) or error <= 0.0 or value == 0.0:
         return float(f"{value:.{_DIGITS}g}")
-    needed = math.ceil(math.log10(abs(value) / error)) + 1 + _MORE_DIGITS
+    # One digit beyond the first digit of its standard error.
+    needed = math.ceil(math.log10(abs(value) / error)) + 2
     return float(f"{value:.{max(needed, _DIGITS)}g}")
 
 

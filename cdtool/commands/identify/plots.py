@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: Inches, as the other figures of a page.
 _WIDTH = 9.0
 _MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RED, "0.85"
-# More points than pixels only make a picture large.
-_MOST_POINTS = 4000
 
 
 def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
@@ -152,7 +151,7 @@ def _compare(
 
 def _thinned(index: np.ndarray[Any, np.dtype[np.int64]]) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Return indices, evenly left out if they are more than a picture shows."""
-    return index[:: max(len(index) // _MOST_POINTS, 1)]
+    return index[:: max(len(index) // 4000, 1)]  # more points than pixels only make a picture large
 
 
 def _gaps(time: FloatArray, values: FloatArray) -> FloatArray:

@@ -25,15 +25,13 @@ from cdtool.formats.machine_file import MachineFile
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import SHOWS_CONTACTS, Recording
 from cdtool.results.results import Skipped
+from cdtool.statistics.spread import MAD_TO_STD
 from cdtool.thresholds.signature import ENOUGH_RUNS, MOST_PLACES, Signature
 from cdtool.truth.onset_rule import OnsetRule
 
 # Every fourth impact-free log is left for the hold-out, if the others are enough to learn from.
 _HOLDOUT = 4
-# With fewer logs of impacts, a threshold learned from the others is not worth it.
-_ENOUGH_IMPACTS = 3
 _FORCE_ONLY = "the logs have no channels of a machine: a protocol of the forces needs no detector"
-_NORMAL_MAD = 1.4826
 # Words, between anything but letters, in the names of logs without an impact.
 _FREE = re.compile(
     r"(?<![^\W\d_])(free|frei|ohne|(no|without)[ _-]?(contact|impact|collision)s?)(?![^\W\d_])",
@@ -154,7 +152,7 @@ def _noise(recording: Recording) -> float:
         return math.nan
     steps = np.diff(recording["force"].values[:, 0])
     steps = steps[np.isfinite(steps)]
-    return _NORMAL_MAD * float(np.median(np.abs(steps))) / math.sqrt(2.0) if len(steps) else math.nan
+    return MAD_TO_STD * float(np.median(np.abs(steps))) / math.sqrt(2.0) if len(steps) else math.nan
 
 
 def _detectors(recording: Recording, machine_file: MachineFile) -> tuple[list[str], list[str]]:
@@ -192,7 +190,7 @@ def _learning(impacts: Sequence[Path], free: Sequence[Path], folder: Path, by_po
         return [*lines, "", "[holdout]", f"logs = {_listed(patterns(held, folder))}"] if held else lines
     why = f"{counted(len(free), 'impact-free log')}: a signature needs {ENOUGH_RUNS}."
     both = [*free, *impacts]
-    if len(both) >= _ENOUGH_IMPACTS:
+    if len(both) >= 3:  # with fewer logs of impacts, a threshold learned from the others is not worth it
         return [
             *comment_lines(
                 f"{why} Limits are learned from what is before the contacts, and each log is scored with what was "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from cdtool.commands.init import motion_evidence as motion
-from cdtool.commands.init.column_blocks import of_blocks, on_circle
+from cdtool.commands.init.column_blocks import of_blocks
 from cdtool.commands.init.confirmation import confirm
 from cdtool.commands.init.names.name_evidence import BY_UNIT, Named, full_name, is_other, named, named_force, sides
 from cdtool.commands.init.names.units_in_names import label, may_be, pressure_unit
@@ -24,17 +24,8 @@ from cdtool.commands.init.streams import Channels, Found
 from cdtool.recordings.recording import CONTACT_PRESSURE
 from cdtool.recordings.units import find_unit
 
-# Above this correlation one column is treated as another's derivative; above the second one without any name.
-_FITS, _FITS_UNNAMED = 0.9, 0.98
-# Minimum share of a column's variance that inertia and friction explain if it has no name.
-_DRIVES = 0.6
-# The derivative of the speed, in its units, has this deviation from a slope of 1.
-_EQUAL = 0.02
-# From this number of joints on related blocks are better evidence than the circle of a tool.
-_ROBOT = 3
+# Columns of a kind that are compared, each with each: the time grows with their square.
 _MOST_PAIRS = 32
-# Above these correlations one stream is treated as another's set value; the second if its name agrees.
-_FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
 BY_VALUES = "guessed from its values only"
 # Below this correlation a letter alone (`a`, `s`, `n`) is no name of what the physics denies.
 _DENIES = 0.5
@@ -46,15 +37,16 @@ _REFERENCED = ("position", "speed", "torque")
 def guess_channels(streams: list[Stream], topics: bool) -> Channels:
     """Guess the channels of a log by values and names; offline, not used for detection."""
     if streams and not topics and all(stream.name.isdigit() for stream in streams):
-        channels = _without_names(streams)
+        blocks = of_blocks(streams)  # a table without a header
+        channels = Channels(blocks[0].width if blocks else 1, streams)
+        channels.free = blocks or channels.free
     else:
         joints = _joint_count(streams)
         if joints == 1 and topics:
             streams = [part for stream in streams for part in stream.elements()]
         channels = Channels(joints, list(streams))
-    if not channels.found:
-        _motion(channels)
-        _drive(channels)
+    _motion(channels)
+    _drive(channels)
     _acceleration(channels)
     for quantity in _REFERENCED:
         _reference(channels, quantity)
@@ -87,23 +79,6 @@ def _strong(quantity: str, stream: Stream) -> bool:
     return named(quantity, stream).strength >= BOUND and not says("reference", stream.name)
 
 
-def _without_names(streams: list[Stream]) -> Channels:
-    """Return the channels of a table without a header: an angle and its drive by a circle, or blocks of columns."""
-    blocks, circle = of_blocks(streams), on_circle(streams)
-    if circle is None or (blocks and blocks[0].width >= _ROBOT):
-        channels = Channels(blocks[0].width if blocks else 1, streams)
-        channels.free = blocks or channels.free
-        return channels
-    channels = Channels(1, streams)
-    angle, places, drives = circle
-    channels.take("position", angle, f"columns {' and '.join(places)} move on a circle of this angle", BY_VALUES)
-    if drives:
-        others = "".join(f"; or column {other.name}?" for other in drives[1:3])
-        channels.take("torque", drives[0], "moves like the force of a drive", BY_VALUES + others)
-    channels.free = []  # other columns without names are not guessed
-    return channels
-
-
 def _motion(channels: Channels) -> None:
     """Guess position and speed: by name and as integral of each other, or by one of both if the names are silent."""
     positions, speeds = (_named_for(channels, quantity) for quantity in ("position", "speed"))
@@ -123,7 +98,7 @@ def _motion(channels: Channels) -> None:
         _take(channels, quantity, chosen, known)
         unnamed = _unnamed_for(channels, other)
         pair = _best_pair([chosen], unnamed) if positions else _best_pair(unnamed, [chosen])
-        if pair and pair[2] > _FITS:
+        if pair and pair[2] > motion.FITS:
             _take(channels, other, pair[1] if positions else pair[0], ())
         return
     unnamed = _unnamed_for(channels, "position")
@@ -136,8 +111,8 @@ def _motion(channels: Channels) -> None:
             and motion.order(pair[0].stream, item.stream)[0] < 0.0
         ):
             later = _best_pair([item], rates)
-            pair = later if later and later[2] > _FITS else pair
-    if pair and pair[2] > _FITS_UNNAMED:
+            pair = later if later and later[2] > motion.FITS else pair
+    if pair and pair[2] > motion.FITS_ALONE:
         _take(channels, "position", pair[0], ())
         _take(channels, "speed", pair[1], ())
 
@@ -154,13 +129,15 @@ def _best_pair(positions: list[Named], speeds: list[Named]) -> tuple[Named, Name
         for s in speeds[:_MOST_PAIRS]
         if p.stream is not s.stream and (p.word or s.word or motion.stirs(p.stream, s.stream))
     ]
-    derived = {id(s.stream) for p, s, correlation in pairs if not p.word and not s.word and correlation > _FITS_UNNAMED}
+    derived = {
+        id(s.stream) for p, s, correlation in pairs if not p.word and not s.word and correlation > motion.FITS_ALONE
+    }
 
     def score(pair: tuple[Named, Named, float]) -> tuple[bool, float]:
         position, speed, correlation = pair
         found = position.strength + speed.strength
         found += is_actual(position.stream.name) + is_actual(speed.stream.name)
-        if abs(correlation) > _FITS:  # of opposite sign if one of them is reversed
+        if abs(correlation) > motion.FITS:  # of opposite sign if one of them is reversed
             found += _PHYSICS - 0.5 * (motion.integral_lead(position.stream, speed.stream) > motion.AHEAD)
         if not (position.word and speed.word):
             found += round(correlation, 2)
@@ -208,12 +185,12 @@ def _drive(channels: Channels) -> None:
             (share(item), item)
             for item in _unnamed_for(channels, "torque")
             if not (is_other("torque", item.stream, by_letter=True) or named_force(item.stream).strength)
-            and all(abs(motion.likeness(part, item.stream)) < _FOLLOWS for part in (rate, *found.values()))
-            and not abs(motion.integral_fit(rate, item.stream, centred=True).slope - 1.0) < _EQUAL  # an acceleration
+            and all(abs(motion.likeness(part, item.stream)) < motion.ALIKE for part in (rate, *found.values()))
+            and not abs(motion.integral_fit(rate, item.stream, centred=True).slope - 1.0) < 0.02  # an acceleration
         ]
         # Of efforts that are explained as well, the first is the measured one.
         explained, chosen = max(efforts, key=lambda item: round(item[0], 1), default=(0.0, None))
-        if chosen is not None and explained > _DRIVES:
+        if chosen is not None and explained > motion.DRIVES:
             _take(channels, "torque", chosen, ())
 
 
@@ -235,7 +212,10 @@ def _acceleration(channels: Channels) -> None:
     best = fits[id(chosen.stream)]
     if not doubtful or best >= _DENIES:
         _take(
-            channels, "acceleration", chosen, [item for item in top if best <= _FITS or fits[id(item.stream)] > _FITS]
+            channels,
+            "acceleration",
+            chosen,
+            [item for item in top if best <= motion.FITS or fits[id(item.stream)] > motion.FITS],
         )
 
 
@@ -272,7 +252,7 @@ def _follower(channels: Channels, quantity: str, measured: Found) -> None:
     ]
     correlation, other = max(candidates, key=lambda item: item[0], default=(0.0, stream))
     is_set = bool(says("reference", other.name))
-    if not (correlation > _FOLLOWS_BY_NAME if is_set else motion.same_values(stream, other)):
+    if not (correlation > 0.4 if is_set else motion.same_values(stream, other)):  # if its name agrees, too
         return
     own, its = word_for(quantity, label(stream))[1], word_for(quantity, label(other))[1]
     ahead, text = motion.order(stream, other)

@@ -1,29 +1,15 @@
-"""Find the channels of a table without names: blocks of J columns, one per joint, related by derivatives.
-
-Without speeds, an angle is known by the circle on which it moves a tool.
-"""
+"""Find the channels of a table without names: blocks of J columns, one per joint, related by derivatives."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.init import motion_evidence as motion
 from cdtool.commands.init.stream import Stream, joined
-from cdtool.machines.plausibility.drive import explained
 
+# Columns that are compared, each with each: the time grows with their square.
 _MOST = 48
-_FITS = 0.9
-# A single pair must fit better: of a tool on a circle one coordinate is nearly the derivative of the other.
-_FITS_ALONE = 0.98
-# A circle leaves at most this share of what a parabola leaves of a coordinate.
-_CIRCLE = 0.01
-# A column is a function of the place above this share. Friction and inertia change an effort by more than this share.
-_PLACE, _CHANGES = 0.9, 0.05
-# Share of an effort that inertia and friction must explain.
-_DRIVES = 0.6
 
 
 def of_blocks(streams: list[Stream]) -> list[Stream]:
@@ -49,34 +35,6 @@ def of_blocks(streams: list[Stream]) -> list[Stream]:
     return [_block(streams, start, joints) for start in range(first % joints, len(streams) - joints + 1, joints)]
 
 
-def on_circle(streams: list[Stream]) -> tuple[Stream, tuple[str, ...], list[Stream]] | None:
-    """Return the column that is an angle in degrees, the coordinates on its circle, and what moves like its drive.
-
-    x = c + r cos(q + phi): the first column q of which two others are such functions. None without.
-    """
-    moving = [stream for stream in streams[:_MOST] if stream.moves]
-    for angle in moving:
-        q = angle.values
-        circle, parabola = np.hstack([np.cos(np.radians(q)), np.sin(np.radians(q))]), np.hstack([q, q**2])
-        others = [stream for stream in moving if stream is not angle]
-        places = tuple(
-            stream.name
-            for stream in others
-            if 1.0 - explained(circle, stream.values[:, 0]) < _CIRCLE * (1.0 - explained(parabola, stream.values[:, 0]))
-        )
-        if len(places) > 1:
-            speed, place = motion.derived(angle), np.hstack([q, q**2, q**3])
-            drives = [
-                stream
-                for stream in others
-                if stream.reach * _CHANGES < np.ptp(stream.values)
-                and explained(place, stream.values[:, 0]) < _PLACE
-                and motion.drive_fit(stream, speed) > _DRIVES
-            ]
-            return replace(angle, unit="deg"), places[:2], drives
-    return None
-
-
 def _fits(streams: list[Stream]) -> FloatArray:
     """Return the correlation of each column with the integral of each other; NaN where one does not move."""
     fits = np.full((len(streams), len(streams)), np.nan)
@@ -91,11 +49,11 @@ def _runs(fits: FloatArray, lag: int) -> list[tuple[int, int]]:
     """Return (length, first position) of runs of joints that fit; one at rest may be among them, but not most."""
     found = []
     for first in range(len(fits)):
-        below = np.flatnonzero(fits[first:] <= _FITS)
+        below = np.flatnonzero(fits[first:] <= motion.FITS)
         length = min(int(below[0]) if len(below) else len(fits) - first, abs(lag))
         known = fits[first : first + length]
         known = known[np.isfinite(known)]
-        if len(known) > length // 2 and (length > 1 or known[0] > _FITS_ALONE):
+        if len(known) > length // 2 and (length > 1 or known[0] > motion.FITS_ALONE):
             found.append((length, first + max(0, -lag)))
     return found
 

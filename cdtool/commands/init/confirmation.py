@@ -9,12 +9,8 @@ from cdtool.commands.init.names.words import says
 from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
 
-# Correlations above which a position's derivative is the speed, and a set value that of the measured channel.
-_FITS, _FOLLOWS = 0.9, 0.9
 # Share of an effort that inertia, friction and weight must explain.
 _DRIVES = 0.4
-# A speed that is ahead of the position's derivative by more samples than this is doubtful.
-_AHEAD = 1.5
 
 
 def confirm(channels: Channels) -> None:
@@ -39,7 +35,7 @@ def _answer(name: str, streams: dict[str, Stream]) -> tuple[str, str]:
         if "speed" not in streams:
             return "", "no speed confirms it"
         correlation = motion.integral_fit(streams["speed"], streams[name], centred=True).correlation
-        fits = abs(correlation) > _FITS
+        fits = abs(correlation) > motion.FITS
         text = f"its integral {'fits' if fits else 'does not fit'} the speed, r = {correlation:.3f}"
         return (text, "") if fits else ("", text)
     if name.startswith("reference_"):
@@ -47,7 +43,7 @@ def _answer(name: str, streams: dict[str, Stream]) -> tuple[str, str]:
         if measured is None:
             return "", "no measured channel follows it"
         correlation = motion.likeness(measured, streams[name])
-        named = bool(says("reference", streams[name].name)) and correlation <= _FOLLOWS
+        named = bool(says("reference", streams[name].name)) and correlation <= motion.FITS
         return "", f"the measured channel does not follow it, r = {correlation:.2f}" if named else ""
     return "", ""
 
@@ -56,20 +52,21 @@ def _of_motion(name: str, streams: dict[str, Stream]) -> tuple[str, str]:
     position, speed, acceleration = (streams.get(item) for item in ("position", "speed", "acceleration"))
     if position is not None and speed is not None:
         correlation = motion.integral_fit(position, speed).correlation
-        if correlation < -_FITS:
+        if correlation < -motion.FITS:
             return "", "opposite in sign to the position's derivative: reverse one of them by scale = -1"
-        if correlation <= _FITS:
+        if correlation <= motion.FITS:
             return "", f"the position's derivative does not fit the speed, r = {correlation:.2f}"
         ahead = motion.integral_lead(position, speed) if name == "speed" else 0.0
         late = f"ahead of the position's derivative by {ahead:.1f} samples: is it a set value?"
         told = f"its derivative fits the speed, r = {correlation:.3f}" if name == "position" else ""
-        return told, late if ahead > _AHEAD else ""
+        # A speed that is further ahead of the position's derivative [samples] is doubtful.
+        return told, late if ahead > 1.5 else ""
     fit = (
         motion.integral_fit(speed, acceleration, centred=True)
         if speed is not None and acceleration is not None
         else None
     )
-    if fit is not None and abs(fit.correlation) > _FITS:
+    if fit is not None and abs(fit.correlation) > motion.FITS:
         return "", ""
     return "", f"no {'speed' if name == 'position' else 'position'} confirms it"
 

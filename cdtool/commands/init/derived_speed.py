@@ -10,12 +10,10 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.init.stream import Stream
 
-# The default of the machine file [Hz], and the lowest corner that is proposed.
-_DEFAULT, _LOWEST = 50.0, 1.0
+# The default of the machine file [Hz].
+_DEFAULT = 50.0
 # Noise of the derived speed that is accepted, as a share of its largest value.
 _NOISE = 0.01
-# The corner is at most this share of the sampling rate.
-_OF_RATE = 0.4
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ def propose_low_pass(position: Stream, in_seconds: float) -> LowPassGuess | None
         return None
     usual = steps[np.abs(steps - period) < period]  # without gaps
     jitter = float(np.std(usual)) / math.sqrt(2.0) if len(usual) > 2 else 0.0
-    resolutions, lowest = [0.0], _OF_RATE / period
+    resolutions, lowest = [0.0], 0.4 / period  # below the Nyquist frequency
     for column in position.values.T:
         known = np.isfinite(column)
         x, t = column[known], time[known]
@@ -64,7 +62,7 @@ def propose_low_pass(position: Stream, in_seconds: float) -> LowPassGuess | None
     if jitter > 0.02 * period:
         text += f" with a jitter of {1e3 * jitter:.2g} ms"
     why = f"{text}: up to this frequency its noise is below {100 * _NOISE:g} % of its largest value"
-    return LowPassGuess(max(_LOWEST, float(f"{lowest:.2g}")), why)
+    return LowPassGuess(max(1.0, float(f"{lowest:.2g}")), why)
 
 
 def _resolution(values: FloatArray) -> float:

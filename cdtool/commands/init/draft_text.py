@@ -18,6 +18,7 @@ from cdtool.commands.init.streams import Channels, column_key
 from cdtool.commands.init.unmapped import Unmapped
 from cdtool.recordings.recording import CONTACT_PRESSURE, RIG_UNITS, UNITLESS
 
+#: A person reads no longer list of columns.
 _MOST_LISTED = 200
 _GROUND_TRUTH = {
     "force": "ground truth only: is it the load cell of the test?",

@@ -45,12 +45,8 @@ from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.truth.force_vector import with_scalar_force
 from cdtool.truth.onset import OnsetRule
 
-# Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
-_SLOWEST = 2.0
 # Contradictions that a change of sign cures, and those of a channel that is another quantity.
 _REVERSED, _ANOTHER = ("friction", "sign"), ("place", "course", "still", "joints", "other joint")
-# So many words in columns of numbers may stand for missing values.
-_MOST_WORDS = 4
 
 
 @dataclass(frozen=True, repr=False)
@@ -322,7 +318,7 @@ def _with_words(path: Path, found: Format, csv: Mapping[str, Any]) -> tuple[Sour
     # A finding names one word of a column: behind it there may be others.
     while found.name == Csv.name and (more := _words(source.findings)):
         words += more
-        if len(words) > _MOST_WORDS:
+        if len(words) > 4:  # more do not stand for missing values
             return first, ()
         source = _surveyed(path, found, {**csv, "missing": [*given, *(word.text for word in words)]})
     return source, words
@@ -460,4 +456,5 @@ def _doubt(channels: Channels, clock: DraftedClock, ratio: Ratio | None) -> str:
         if other is not None and other.fitting and not other.tick:
             first = other.fitting[0]
             return f"{first.clock} with {first.position}, {first.speed} fits the ratio, {clock.unit} does not"
-    return f"steps of {clock.step:.4g} {clock.unit} are {rate:.3g} Hz" if rate < _SLOWEST else ""
+    # No log of contacts is so slow: the unit that a header states for its clock is doubtful.
+    return f"steps of {clock.step:.4g} {clock.unit} are {rate:.3g} Hz" if rate < 2.0 else ""

@@ -14,25 +14,19 @@ from cdtool.base.arrays import FloatArray
 from cdtool.commands.init.stream import Stream
 from cdtool.machines.plausibility.drive import explained
 
+# Windows in which a log is compared: noise averages out in them, strokes do not.
 _WINDOWS = 400
-_SURE = 0.9
-# A delay is clear if the derivative leaves less than this share of the difference.
-_CLEAR = 0.67
-# No controller follows its set value so late [s].
-_LONGEST_LEAD = 0.5
-# Inertia and friction of opposite signs, each above this share of the effort's spread, are not those of a drive.
-_CONTRADICTS = 0.2
-# Inertia and friction explain at least this share of what weight and springs leave of an effort; of the coordinates of
-# a tool less than 0.35, by chance.
-_OF_MOTION = 0.4
+# Above this correlation one column is treated as another's derivative.
+FITS = 0.9
+# A single pair, or one without names, must fit better: of a tool on a circle one coordinate is nearly the derivative of
+# the other.
+FITS_ALONE = 0.98
+# Share of the variance of an effort without a name that inertia and friction must explain.
+DRIVES = 0.6
 # A set value is ahead of its measured value by at least this share of a sample.
 AHEAD = 0.2
 # Above this correlation streams have a like course; a position is at most this share of its travel from its set value.
-_ALIKE, _APART = 0.97, 0.1
-# A joint moves by more than this, and its speed varies by more than this share of its largest value.
-_MOVES, _VARIES = 0.01, 0.5
-# Share of the windows that may contain impacts.
-_IMPACTS = 0.25
+ALIKE, _APART = 0.97, 0.1
 
 
 @dataclass(frozen=True)
@@ -61,7 +55,7 @@ def integral_fit(whole: Stream, rate: Stream, *, centred: bool = False) -> Fit:
             power = float(x @ x), float(y @ y)
             if min(power) > 0.0 and len(x) > 2:
                 correlations.append(float(x @ y) / np.sqrt(power[0] * power[1]))
-                slopes += [float(x @ y) / power[0]] * bool(abs(correlations[-1]) > _SURE)
+                slopes += [float(x @ y) / power[0]] * bool(abs(correlations[-1]) > FITS)
     return Fit(_median(correlations, 0.0), _median(slopes, float("nan")))
 
 
@@ -84,13 +78,14 @@ def lead(one: Stream, other: Stream) -> float:
     whole = np.nan_to_num(one.values)
     half = max(1, len(whole) // (2 * _WINDOWS))
     rates = (whole[2 * half :] - whole[: -2 * half]) / (2.0 * half)
-    longest = _LONGEST_LEAD / float(np.median(np.diff(one.time)))
+    longest = 0.5 / float(np.median(np.diff(one.time)))  # no controller follows its set value so late [s]
     leads = []
     for x, rate, y in zip(whole[half:-half].T, rates.T, np.nan_to_num(other.at(one.time))[half:-half].T, strict=True):
         if np.ptp(x) and np.ptp(y):
             known = np.column_stack([x, np.ones_like(x), rate])
             values, rest = _solved(known, y)
-            clear = float(np.var(rest)) < _CLEAR * float(np.var(_solved(known[:, :2], y)[1])) and values[0]
+            # A delay is clear if the derivative leaves less than two thirds of the difference.
+            clear = float(np.var(rest)) < 0.67 * float(np.var(_solved(known[:, :2], y)[1])) and values[0]
             ahead = float(values[2] / values[0]) if clear else 0.0
             leads.append(ahead if abs(ahead) < longest else 0.0)
     return _median(leads, 0.0)
@@ -138,7 +133,9 @@ def drive_fit(drive: Stream, speed: Stream, position: Stream | None = None) -> f
             weight = np.column_stack([middle, middle**2, middle**3])
             both = np.column_stack([motion, weight])
             # A tool's pose depends on places alone.
-            if 1.0 - explained(both, tau) < (1.0 - _OF_MOTION) * (1.0 - explained(weight, tau)):
+            # Inertia and friction explain at least 0.4 of what weight and springs leave of an effort; of the
+            # coordinates of a tool less than 0.35, by chance.
+            if 1.0 - explained(both, tau) < 0.6 * (1.0 - explained(weight, tau)):
                 share = max(share, _explained(tau, both))
         shares.append(share)
     return _median(shares, 0.0)
@@ -149,7 +146,7 @@ def same_values(one: Stream, other: Stream) -> bool:
 
     The joints of a robot often move in proportion, so that like courses alone say nothing.
     """
-    if likeness(one, other) <= _ALIKE:
+    if likeness(one, other) <= ALIKE:
         return False
     apart = np.nanmedian(np.abs(one.at(other.time) - other.values), axis=0)
     travel = np.nanmax(one.values, axis=0) - np.nanmin(one.values, axis=0)
@@ -177,7 +174,8 @@ def roughness(stream: Stream) -> float:
 
 def stirs(position: Stream, speed: Stream) -> bool:
     """Whether a joint moves and its speed varies; values of a joint at rest are noise, and all constants fit."""
-    return bool(np.ptp(position.known) > _MOVES and np.ptp(speed.known) > _VARIES * speed.reach)
+    # By more than 10 mm or 0.01 rad, and by more than half of its largest speed.
+    return bool(np.ptp(position.known) > 0.01 and np.ptp(speed.known) > 0.5 * speed.reach)
 
 
 def is_flag(stream: Stream) -> bool:
@@ -201,11 +199,12 @@ def _explained(tau: FloatArray, motion: FloatArray) -> float:
     for _ in range(3):  # impacts obey another law: the windows that fit worst are left out
         values, _ = _solved(known[kept], tau[kept])
         rest = np.abs(tau - known @ values)
-        kept = rest <= np.quantile(rest, 1.0 - _IMPACTS)
+        kept = rest <= np.quantile(rest, 0.75)  # the others may contain impacts
     inertia, *friction = values[:3] * np.std(known[kept, :3], axis=0)
     whole = float(np.var(tau[kept]))
     weaker = min(abs(inertia), abs(sum(friction)))
-    if not whole or (inertia * sum(friction) < 0.0 and weaker > _CONTRADICTS * whole**0.5):
+    # Inertia and friction of opposite signs, each above a fifth of the effort's spread, are not those of a drive.
+    if not whole or (inertia * sum(friction) < 0.0 and weaker > 0.2 * whole**0.5):
         return 0.0
     return 1.0 - float(np.var((tau - known @ values)[kept])) / whole
 

@@ -25,10 +25,6 @@ _PAIRS = (
     ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("mm", "mm/min"), ("m", "m/min"),
     ("rad", "deg/s"), ("um", "mm/s"), ("deg", "deg/min"),
 )  # fmt: skip
-# Largest deviation of a ratio that fits; below the second one the fit is certain.
-_NEAR, _SURE = 0.02, 0.01
-# Combinations less likely than the best by this much are not listed: stamps in minutes at 17 Hz.
-_FAR = 2.5
 # Largest positions and speeds of axes, and of the joints of robots.
 _LIMITS = {"m": 30.0, "m/s": 20.0}
 _ROBOT_LIMITS = {"rad": 4.0 * math.pi, "rad/s": 25.0, **_LIMITS}
@@ -95,7 +91,8 @@ class Ratio:
         """
         first = self.fitting[0]
         named = motion_kind("position", channels) == _KINDS[si_of(first.position)]
-        return named and not self.tick and len(self.fitting) == 1 and self.off(first) < _SURE and first.unlikely < 1.0
+        # Within 1 % a single fit is certain.
+        return named and not self.tick and len(self.fitting) == 1 and self.off(first) < 0.01 and first.unlikely < 1.0
 
 
 def stated(channel: str, stream: Stream) -> Stated:
@@ -147,8 +144,10 @@ def ratio_of(channels: Channels, clock: DraftedClock | None, messages_si: bool) 
     units.sort(key=lambda item: item.unlikely)
     if counts:
         ratio = replace(ratio, tick=max(0.0, ratio.raw * ratio.assumed * units[0].ratio) if units else 0.0)
-    fitting = [item for item in units if ratio.off(item) <= _NEAR and (ratio.tick or not counts)]
-    return replace(ratio, fitting=tuple(item for item in fitting if item.unlikely < fitting[0].unlikely + _FAR))
+    # Within 2 % a ratio fits: jitter and filters change it by less.
+    fitting = [item for item in units if ratio.off(item) <= 0.02 and (ratio.tick or not counts)]
+    # Combinations that are less likely are not listed: stamps in minutes at 17 Hz.
+    return replace(ratio, fitting=tuple(item for item in fitting if item.unlikely < fitting[0].unlikely + 2.5))
 
 
 def rotation_unit(stream: Stream) -> str:

@@ -18,9 +18,6 @@ from cdtool.formats.source import Source
 from cdtool.recordings.clock.lower_rate import sampled_rows
 
 _NUMBER = re.compile(r"\d+")
-_MOST = 1e100
-# Numbers with gaps are joints if at least so many families have the same.
-_SHARED = 3
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ def _of_topic(name: str, source: Source) -> Stream:
 
 def _possible(values: FloatArray) -> FloatArray:
     """Return values with NaN in place of those that no sensor delivers and whose squares would overflow."""
-    wrong = ~(np.abs(values) < _MOST) & ~np.isnan(values)
+    wrong = ~(np.abs(values) < 1e100) & ~np.isnan(values)
     return np.where(wrong, np.nan, values) if wrong.any() else values
 
 
@@ -132,7 +129,8 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
             and numbers[0] in (0, 1)
             and (
                 numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-                or (len(numbers) > 2 and shared[frozenset(numbers)] >= _SHARED)
+                # Numbers with gaps are joints if at least three families have the same.
+                or (len(numbers) > 2 and shared[frozenset(numbers)] >= 3)
             )
             and alike
         ):

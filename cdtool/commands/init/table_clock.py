@@ -8,27 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdtool.commands.init.names.units_in_names import factor_of, unit_in_name
-from cdtool.commands.init.names.words import is_counter, name_in_group, says, word_for, words
+from cdtool.commands.init.names.words import BOUND, is_counter, name_in_group, says, word_for, words
 from cdtool.formats.channels.clock_guess import GuessedClock, guess_clock
 from cdtool.formats.columns import Column
 from cdtool.formats.source import Source
 from cdtool.recordings.recording import MEASURED
-from cdtool.recordings.units import find_unit
+from cdtool.recordings.units import DAY_S, find_unit
 
 _NANOSECONDS = re.compile(r"(?<![a-z])n(?:ano)?s(?:ecs?|econds?)?$", re.IGNORECASE)
 _UNITS = ("s", "ms", "us", "ns", "min")
 # Sampling rates [Hz] that logs of a machine usually have, and those that are possible.
 _USUAL, _POSSIBLE = (20.0, 20e3), (0.5, 500e3)
-# A word for a quantity in the name of a clock makes it doubtful from this strength on: `t_pos`.
-_STRONG = 2.0
-# Fractions of a second wrap at a power of ten: the least number of turns, and the deviation of their logarithm.
-_WRAPS, _NEAR_POWER = 2, 0.02
-# Above this share of steps of exactly 1 a column counts samples, whatever its name.
-_BY_ONE = 0.9
-_DAY = 86400.0
 _RARE = 2.0  # minutes are this much less likely than an unusual rate
-# Above this rate [Hz] samples are timed by hardware: a jitter of more than this share of the step is unlikely.
-_TIMED_BY_HARDWARE, _JITTERS, _JITTERY = 2e3, 0.02, 1.5
 
 
 @dataclass(frozen=True)
@@ -58,7 +49,8 @@ class DraftedClock:
     def unlikely(self, unit: str) -> float:
         """Return 0 if the unit gives a usual sampling rate, more otherwise."""
         rate = 1.0 / (self.step * factor_of(unit))
-        rare = _RARE if unit == "min" else _JITTERY if rate > _TIMED_BY_HARDWARE and self.jitter > _JITTERS else 0.0
+        # Above 2 kHz samples are timed by hardware: a jitter of more than 2 % of the step is unlikely.
+        rare = _RARE if unit == "min" else 1.5 if rate > 2e3 and self.jitter > 0.02 else 0.0
         if _USUAL[0] <= rate <= _USUAL[1]:
             return rare
         return 1.0 + rare if _POSSIBLE[0] <= rate <= _POSSIBLE[1] else 2 * _RARE
@@ -76,7 +68,7 @@ def table_clock(source: Source) -> tuple[DraftedClock, GuessedClock] | None:
     # Numbers that rise by one without a name are those of the rows; the rate follows from position and speed.
     is_row = not re.search(r"[^\W\d_]", found.column) and bool((steps == 1.0).all())
     unit, days = guess["unit"], guess["unit"] == "days"
-    assumed = _DAY if days else factor_of(unit)
+    assumed = DAY_S if days else factor_of(unit)
     clock = DraftedClock(found.column, step, assumed, unit, "", is_counter(found.column) or is_row, jitter=jitter)
     if guess["evidence"] == "header":
         return replace(clock, told="the header, which states the unit", written=True), found
@@ -120,7 +112,8 @@ def _named(source: Source) -> GuessedClock | None:
     def rank(name: str) -> tuple[bool, ...]:
         column = source.columns[name]
         known = column.values[np.isfinite(column.values)]
-        counts = is_counter(name) or bool(np.mean(np.diff(known) == 1.0) > _BY_ONE) if len(known) > 1 else True
+        # With steps of exactly 1 a column counts samples, whatever its name.
+        counts = is_counter(name) or bool(np.mean(np.diff(known) == 1.0) > 0.9) if len(known) > 1 else True
         plain = all(says("clock", word) for word in words(name))
         return len(known) < len(column.values), counts, name.isdigit(), not _has_time_unit(column), not plain
 
@@ -142,7 +135,8 @@ def _unnamed(source: Source) -> GuessedClock | None:
 
 
 def _is_measured(name: str) -> bool:
-    return any(word_for(quantity, name)[0] >= _STRONG for quantity in (*MEASURED, "force"))
+    # A word for a quantity in the name of a clock makes it doubtful: `t_pos`.
+    return any(word_for(quantity, name)[0] >= BOUND for quantity in (*MEASURED, "force"))
 
 
 def _has_clock_name(name: str) -> bool:
@@ -160,8 +154,9 @@ def _wraps(column: Column) -> bool:
     known = column.values[np.isfinite(column.values)] if column.values.ndim == 1 else np.empty(0)
     steps = np.diff(known)
     back = steps[steps < 0.0]
-    if len(back) < _WRAPS:
+    # Fractions of a second wrap at a power of ten, at least twice.
+    if len(back) < 2:
         return False
     turns = np.log10(float(np.median(steps[steps > 0.0])) - back) if (steps > 0.0).any() else np.zeros(1)
     powers = np.rint(turns)
-    return bool(np.all(np.abs(turns - powers) < _NEAR_POWER) and np.ptp(powers) == 0.0 and powers[0] > 2.0)
+    return bool(np.all(np.abs(turns - powers) < 0.02) and np.ptp(powers) == 0.0 and powers[0] > 2.0)

@@ -12,8 +12,6 @@ from cdtool.commands.init.stream import Stream
 from cdtool.commands.init.streams import Channels
 from cdtool.recordings.recording import MEASURED
 
-_FOLLOWS = 0.97
-
 
 @dataclass(frozen=True)
 class Unmapped:
@@ -94,6 +92,6 @@ def _next_best(stream: Stream, channels: Channels) -> tuple[str, str]:
         if name in ("position", "speed", "torque") and found.stream.width == stream.width
     ]
     correlation, quantity = max(alike, default=(0.0, ""))
-    if correlation > _FOLLOWS:
+    if correlation > motion.ALIKE:
         return quantity, f"follows '{channels.found[quantity].stream.name}', r = {correlation:.3f}"
     return "", "neither name nor values indicate a channel"

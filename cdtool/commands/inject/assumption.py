@@ -14,12 +14,6 @@ from enum import Enum
 
 from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive
 
-# A drive beyond its known wind-up that is as good as rigid: its oscillation lasts so many periods of the controller.
-_PERIODS_OF_RIGID = 20.0
-_DAMPING_RATIO_OF_RIGID = 0.5
-# Without a controller in the model [s].
-_PERIOD = 1e-3
-
 
 class ControllerReaction(Enum):
     """How the drive reacts to the contact, where its controller is not known: two brackets."""
@@ -97,11 +91,14 @@ def assumptions_of(model: AxisModel) -> tuple[Assumption, ...]:
 def _rigid_beyond(model: AxisModel) -> ElasticDrive:
     """Return the drive with an end of its take-up travel at the observed wind-up that hardly gives way."""
     drive = model.drive
-    period = model.controller.period if model.controller is not None else _PERIOD
+    # Without a controller in the model 1 ms, as usual.
+    period = model.controller.period if model.controller is not None else 1e-3
     reduced = 1.0 / (1.0 / drive.motor_mass + 1.0 / (drive.load_mass - drive.front_mass))
-    rate = 2.0 * math.pi / (_PERIODS_OF_RIGID * period)
+    # Beyond its known wind-up as good as rigid: its oscillation lasts 20 periods of the controller, and is damped to
+    # half of critical.
+    rate = 2.0 * math.pi / (20.0 * period)
     stiffness = max(reduced * rate**2, drive.stiffness)
-    damping = 2.0 * _DAMPING_RATIO_OF_RIGID * math.sqrt(stiffness * reduced)
+    damping = math.sqrt(stiffness * reduced)
     return replace(
         drive, take_up_travel=drive.observed_wind_up, end_stiffness=stiffness, end_damping=max(damping, drive.damping)
     )

@@ -8,9 +8,7 @@ the effect of the contact alone; friction that the model does not know cancels t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,23 +16,18 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, DriveBeyond, SlewBeyond
 from cdtool.commands.inject.channel_change import ChannelChange
-from cdtool.machines.axis_model.axis_loop_kernel import ROWS
+from cdtool.commands.inject.injected_contact import Doubt, InjectedContact, Signals, injected_contact
 from cdtool.machines.axis_model.axis_run import USED, AxisRun
 from cdtool.machines.axis_model.obstacle import Obstacle
 from cdtool.machines.axis_model.parameters import AxisModel, Controller
-from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.machines.axis_model.simulation import AxisInputs, AxisMotion, simulate_axis
 
-# Time after contact [s] at which the model's own error begins to dominate the forces.
-RELIABLE_FOR = 0.2
 # What is simulated before the contact where the axis is never at rest before it [s].
 _LONGEST_APPROACH = 30.0
 # A rest is at least as long as this [s].
 _SHORTEST_REST = 0.2
 # A controller without which the motor would not notice the contact: as stiff as the sampling permits.
 _STIFF_SHARE = 0.2
-# Further, or faster, than known: by more than the error of a simulation.
-_BEYOND = 1.05
 # The speed is compared with the log's during the last time before the contact [s], and may differ by these shares.
 _COMPARED_TIME = 0.1
 _DOUBTFUL_DEVIATION, _LARGEST_DEVIATION = 0.05, 0.2
@@ -42,70 +35,6 @@ _DOUBTFUL_DEVIATION, _LARGEST_DEVIATION = 0.05, 0.2
 _OPPOSITE = -0.3
 # The brackets' controller has at most this period [s], whatever the log's: how it reacts must not depend on the log.
 _LONGEST_PERIOD = 1e-3
-# The load has lost the contact when the force is below this share of the peak so far.
-_SEPARATED = 1e-3
-
-
-class Doubt(Enum):
-    """What limits an injected contact."""
-
-    RIGID_DRIVE = "the drive is modelled as rigid"
-    WIND_UP_BEYOND_FREE_RUNS = "the drive winds up further than in impact-free logs"
-    SLOPE_BEYOND_FREE_RUNS = "the command rises faster than in impact-free logs, and its limit is not known"
-    SEPARATION = "the load separates from the obstacle"
-    CONTROLLER_UNKNOWN = "the reaction of the controller is an assumption"
-    APPROACH_SPEED = "before the contact the model's speed differs from the log's by more than 5 %"
-    ACCELEROMETER_UNKNOWN = "the bandwidth of the accelerometer is not known"
-
-
-@dataclass(frozen=True, eq=False)
-class InjectedContact:
-    """A contact of one joint: what it adds to each channel, and what its truth is; times in s on the recording's clock.
-
-    `force` is what the machine exerts on the obstacle [N], `reliable_until` when the model's error takes over: 0.2 s
-    after contact, or at the separation. `free_wind_up` and `wind_up`: the largest ones of the drive [m].
-    """
-
-    start: float
-    changes: Mapping[str, ChannelChange]
-    force: ChannelChange
-    peak_force: float
-    speed: float
-    reliable_until: float
-    separation: float
-    free_wind_up: float
-    wind_up: float
-    assumption: Assumption
-    doubts: tuple[Doubt, ...] = ()
-
-    @classmethod
-    def of(
-        cls,
-        changes: Mapping[str, ChannelChange],
-        force: ChannelChange,
-        speed: float,
-        wind_ups: tuple[float, float],
-        assumption: Assumption,
-    ) -> InjectedContact:
-        """Return the contact of the greatest `wind_ups`, free and hit; raises RecordingError if it changes nothing."""
-        start = force.start
-        if not np.any(force.values) or (changes["torque"].is_nothing and changes["speed"].is_nothing):
-            raise RecordingError(
-                f"the contact at {start:.3f} s changes nothing in the model", "its obstacle or its drive never acts"
-            )
-        separation = separation_time(force.time, force.values[:, 0])
-        until = min(start + RELIABLE_FOR, separation)
-        peak = float(np.max(force.values))
-        return cls(start, changes, force, peak, speed, until, separation, *wind_ups, assumption)
-
-    def with_doubts(self, doubts: Mapping[Doubt, bool]) -> InjectedContact:
-        """Return the contact with these doubts as far as they apply, and those that every machine may have."""
-        known = {
-            Doubt.SEPARATION: self.separation < self.start + RELIABLE_FOR,
-            Doubt.CONTROLLER_UNKNOWN: self.assumption.controller is not ControllerReaction.KNOWN,
-            **doubts,
-        }
-        return replace(self, doubts=tuple(doubt for doubt in Doubt if known.get(doubt)))
 
 
 def axis_contact(
@@ -151,7 +80,14 @@ def axis_contact(
     just_before = contact - begin - controller.period
     limited_from = -math.inf if assumption.slew is SlewBeyond.NO_LIMIT else just_before
     hit = simulate_axis(assumption.after_contact(model), against, placed, changes_at=(just_before, limited_from))
-    return _difference(model, free, hit, time, (contact, approach, deviation), assumption)
+    made = injected_contact(
+        (model,),
+        (_signals(free), _signals(hit)),
+        ChannelChange(time, hit["contact_force"][:, np.newaxis], contact),
+        approach,
+        assumption,
+    )
+    return made.with_doubts({Doubt.APPROACH_SPEED: deviation > _DOUBTFUL_DEVIATION})
 
 
 def _require_samples(run: AxisRun, contact: float) -> None:
@@ -278,62 +214,11 @@ def _filled(time: FloatArray, values: FloatArray, clock: FloatArray) -> FloatArr
     return filled
 
 
-def _difference(
-    model: AxisModel,
-    free: AxisMotion,
-    hit: AxisMotion,
-    time: FloatArray,
-    contact: tuple[float, float, float],
-    assumption: Assumption,
-) -> InjectedContact:
-    start, approach, deviation = contact
-    change = hit.rows - free.rows
-    rows = dict(zip(ROWS, change, strict=True))
-    sensors, period = model.sensors, hit.period
-    channels = {
-        "torque": first_order_low_pass(rows["drive_force"], sensors.torque_filter_time, period),
-        "speed": _measured_speed(model, rows, period),
-        "position": rows["motor_position"],
-        "reference_torque": rows["command"],
-    }
-    if sensors.accelerometer_hz > 0.0:
-        channels["acceleration"] = second_order_low_pass(
-            rows["load_acceleration"], sensors.accelerometer_hz, sensors.accelerometer_damping, period
-        )
-    held = {"reference_torque", "speed"} if sensors.speed_hz == 0.0 else {"reference_torque"}
-    changes = {
-        name: ChannelChange(time, values[:, np.newaxis], start, held=name in held) for name, values in channels.items()
-    }
-    force = ChannelChange(time, hit["contact_force"][:, np.newaxis], start)
-    wind_ups = (float(np.max(np.abs(free["wind_up"]))), float(np.max(np.abs(hit["wind_up"]))))
-    made = InjectedContact.of(changes, force, approach, wind_ups, assumption)
-    reliable = time <= made.reliable_until
-    doubts = {
-        Doubt.RIGID_DRIVE: model.drive.is_rigid,
-        Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, free, hit, reliable),
-        Doubt.SLOPE_BEYOND_FREE_RUNS: assumption.slew is SlewBeyond.NO_LIMIT
-        and _rises_beyond(model, hit, reliable & (time >= start)),
-        Doubt.APPROACH_SPEED: deviation > _DOUBTFUL_DEVIATION,
-        Doubt.ACCELEROMETER_UNKNOWN: sensors.accelerometer_hz == 0.0,
-    }
-    return made.with_doubts(doubts)
-
-
-def _winds_up_beyond(model: AxisModel, free: AxisMotion, hit: AxisMotion, reliable: BoolArray) -> bool:
-    """Whether the contact winds the drive up by 5 % more than its stiffness is known for."""
-    if model.drive.is_rigid:
-        return False
-    known = max(float(np.max(np.abs(free["wind_up"]))), model.drive.observed_wind_up)
-    return float(np.max(np.abs(hit["wind_up"][reliable]))) > _BEYOND * known
-
-
-def _rises_beyond(model: AxisModel, hit: AxisMotion, reliable: BoolArray) -> bool:
-    """Whether a command without a known slew limit rises by 5 % faster than it was observed to."""
-    controller = model.controller
-    if controller is None or math.isfinite(controller.slew_limit) or controller.observed_slope == 0.0:
-        return False
-    slope = np.abs(np.diff(hit["command"], prepend=hit["command"][0])) / hit.period
-    return float(np.max(slope[reliable])) > _BEYOND * controller.observed_slope
+def _signals(motion: AxisMotion) -> Signals:
+    """Return what the sensors and the drive of the axis would log of a motion."""
+    names = {"torque": "drive_force", "speed": "measured_speed", "position": "motor_position"}
+    names |= {"acceleration": "load_acceleration", "reference_torque": "command", "wind_up": "wind_up"}
+    return Signals(motion.period, {name: motion[row][:, np.newaxis] for name, row in names.items()})
 
 
 def _moves_backward(run: AxisRun, contact: float) -> bool:
@@ -366,20 +251,3 @@ def _turned_model(model: AxisModel) -> AxisModel:
 def _turned_contact(contact: InjectedContact) -> InjectedContact:
     changes = {name: replace(change, values=-change.values) for name, change in contact.changes.items()}
     return replace(contact, changes=changes, speed=-contact.speed)
-
-
-def _measured_speed(model: AxisModel, rows: Mapping[str, FloatArray], period: float) -> FloatArray:
-    """Return the change of the speed channel: the controller's own, or the log's derivative of the position."""
-    corner = model.sensors.speed_hz
-    if corner == 0.0:
-        return rows["measured_speed"]
-    constant = 1.0 / (2.0 * math.pi * corner)
-    steps = np.diff(rows["motor_position"], prepend=0.0) / period
-    return first_order_low_pass(first_order_low_pass(steps, constant, period), constant, period)
-
-
-def separation_time(time: FloatArray, force: FloatArray) -> float:
-    """Return when the force first falls to nothing after the contact [s]; infinite if it does not."""
-    peak = np.maximum.accumulate(force)
-    lost = (peak > 0.0) & (force <= _SEPARATED * peak)
-    return float(time[np.argmax(lost)]) if lost.any() else math.inf

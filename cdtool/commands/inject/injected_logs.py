@@ -24,9 +24,9 @@ from cdtool.base.log_names import log_stem
 from cdtool.base.plain_text import digits
 from cdtool.base.version import __version__
 from cdtool.commands.inject.assumption import Assumption, DriveBeyond, SlewBeyond, assumptions_of
-from cdtool.commands.inject.axis_contact import Doubt, InjectedContact
 from cdtool.commands.inject.channel_change import ChannelChange
 from cdtool.commands.inject.inject_section import InjectSection, NamedObstacle
+from cdtool.commands.inject.injected_contact import Doubt, InjectedContact
 from cdtool.commands.inject.robot_contact import RobotLog
 from cdtool.commands.inject.struck_machine import StruckAxis, StruckRobot, struck_machine
 from cdtool.commands.judging.impact_free import contacts_shown

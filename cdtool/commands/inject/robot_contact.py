@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.base.arrays import BoolArray, FloatArray
+from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.commands.inject.axis_contact import Doubt, InjectedContact, last_rest
+from cdtool.commands.inject.axis_contact import last_rest
 from cdtool.commands.inject.channel_change import ChannelChange
+from cdtool.commands.inject.injected_contact import InjectedContact, Signals, injected_contact
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.obstacle import Obstacle
 from cdtool.machines.axis_model.parameters import AxisModel, Controller
-from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.machines.robot_model.parameters import RobotModel, Vector, point_in_joint
 from cdtool.machines.robot_model.simulation import PointContact, RobotInputs, RobotMotion, simulate_robot
 
@@ -34,8 +34,6 @@ _AT_REST = 0.02
 _STIFF_SHARE, _STIFF_PERIOD = 0.2, 1e-3
 # A point that moves along a plane, or not at all, does not meet it: share of its speed, and of the greatest one.
 _ALONG_PLANE, _STANDS = 0.02, 1e-3
-# Further, or faster, than known: by more than the error of a simulation.
-_BEYOND = 1.05
 
 
 @dataclass(frozen=True)
@@ -143,7 +141,9 @@ def robot_contact(
     frozen = assumption.controller is ControllerReaction.FROZEN
     against = replace(inputs, command=free["command"]) if frozen else inputs
     hit = simulate_robot(model, against, placed)
-    return _difference(model, (free, hit), time, (contact, approach), assumption, log.acceleration_unit)
+    signals = [_signals(model, motion, log.acceleration_unit) for motion in (free, hit)]
+    force = ChannelChange(time, hit.contact_force[:, np.newaxis], contact)
+    return injected_contact(model.axes, (signals[0], signals[1]), force, approach, assumption)
 
 
 def least_known_joint(model: RobotModel) -> AxisModel:
@@ -260,70 +260,12 @@ def _velocity(model: RobotModel, joint: int, point: Vector, position: FloatArray
     return np.array([float(model.point_along(position, joint, point, axis)[1] @ speed) for axis in axes])
 
 
-def _difference(
-    model: RobotModel,
-    motions: tuple[RobotMotion, RobotMotion],
-    time: FloatArray,
-    contact: tuple[float, float],
-    assumption: Assumption,
-    acceleration_unit: str,
-) -> InjectedContact:
-    free, hit = motions
-    start, approach = contact
-    period = hit.period
-    torque, command = hit["drive_torque"] - free["drive_torque"], hit["command"] - free["command"]
-    channels = {
-        "torque": _filtered(model, torque, period, "torque"),
-        "speed": _measured_speed(model, motions),
-        "position": hit["motor_position"] - free["motor_position"],
-        "reference_torque": command,
-    }
-    knows_accelerometer = all(axis.sensors.accelerometer_hz > 0.0 for axis in model.axes)
-    if knows_accelerometer:
-        sensed = _sensed(model, hit, acceleration_unit) - _sensed(model, free, acceleration_unit)
-        channels["acceleration"] = _filtered(model, sensed, period, "acceleration")
-    held = {"reference_torque"}
-    if all(axis.sensors.speed_hz == 0.0 for axis in model.axes):
-        held.add("speed")
-    changes = {name: ChannelChange(time, values, start, held=name in held) for name, values in channels.items()}
-    force = ChannelChange(time, hit.contact_force[:, np.newaxis], start)
-    wind_ups = (float(np.max(np.abs(free["wind_up"]))), float(np.max(np.abs(hit["wind_up"]))))
-    made = InjectedContact.of(changes, force, approach, wind_ups, assumption)
-    reliable = time <= made.reliable_until
-    doubts = {
-        Doubt.RIGID_DRIVE: model.is_rigid,
-        Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, motions, reliable),
-        Doubt.SLOPE_BEYOND_FREE_RUNS: _rises_beyond(model, hit, reliable),
-        Doubt.ACCELEROMETER_UNKNOWN: not knows_accelerometer,
-    }
-    return made.with_doubts(doubts)
-
-
-def _filtered(model: RobotModel, change: FloatArray, period: float, channel: str) -> FloatArray:
-    """Return a change (n, J) as the sensors of its channel show it."""
-    columns = []
-    for axis, column in zip(model.axes, change.T, strict=True):
-        sensors = axis.sensors
-        if channel == "torque":
-            columns.append(first_order_low_pass(column, sensors.torque_filter_time, period))
-        else:
-            damping = sensors.accelerometer_damping
-            columns.append(second_order_low_pass(column, sensors.accelerometer_hz, damping, period))
-    return np.column_stack(columns)
-
-
-def _measured_speed(model: RobotModel, motions: tuple[RobotMotion, RobotMotion]) -> FloatArray:
-    """Return the change of the speed channel: the controller's own, or the log's derivative of the position."""
-    free, hit = motions
-    change = hit["measured_speed"] - free["measured_speed"]
-    position = hit["motor_position"] - free["motor_position"]
-    for joint, axis in enumerate(model.axes):
-        if axis.sensors.speed_hz > 0.0:
-            constant = 1.0 / (2.0 * math.pi * axis.sensors.speed_hz)
-            steps = np.diff(position[:, joint], prepend=0.0) / hit.period
-            once = first_order_low_pass(steps, constant, hit.period)
-            change[:, joint] = first_order_low_pass(once, constant, hit.period)
-    return change
+def _signals(model: RobotModel, motion: RobotMotion, acceleration_unit: str) -> Signals:
+    """Return what the sensors and drives of the joints would log of a motion."""
+    names = {"torque": "drive_torque", "speed": "measured_speed", "position": "motor_position"}
+    names |= {"reference_torque": "command", "wind_up": "wind_up"}
+    rows = {name: motion[row] for name, row in names.items()}
+    return Signals(motion.period, {**rows, "acceleration": _sensed(model, motion, acceleration_unit)})
 
 
 def _sensed(model: RobotModel, motion: RobotMotion, unit: str) -> FloatArray:
@@ -333,23 +275,3 @@ def _sensed(model: RobotModel, motion: RobotMotion, unit: str) -> FloatArray:
             motion["link_position"], motion["link_speed"], motion["link_acceleration"]
         )
     return motion["link_acceleration"]
-
-
-def _winds_up_beyond(model: RobotModel, motions: tuple[RobotMotion, RobotMotion], reliable: BoolArray) -> bool:
-    """Whether the contact winds a joint's drive up by 5 % more than its stiffness is known for."""
-    free, hit = (np.abs(motion["wind_up"]) for motion in motions)
-    observed = np.array([axis.drive.observed_wind_up for axis in model.axes])
-    elastic = np.array([not axis.drive.is_rigid for axis in model.axes])
-    known = np.maximum(np.max(free, axis=0), observed)
-    return bool(np.any(elastic & (np.max(hit[reliable], axis=0) > _BEYOND * known)))
-
-
-def _rises_beyond(model: RobotModel, hit: RobotMotion, reliable: BoolArray) -> bool:
-    """Whether a command without a known slew limit rises by 5 % faster than it was observed to."""
-    command = hit["command"]
-    slope = np.abs(np.diff(command, axis=0, prepend=command[:1])) / hit.period
-    highest = np.max(slope[reliable], axis=0)
-    return any(
-        math.isinf(controller.slew_limit) and 0.0 < _BEYOND * controller.observed_slope < own
-        for controller, own in zip(_controllers(model), highest, strict=True)
-    )

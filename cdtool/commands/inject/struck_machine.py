@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.inject.assumption import Assumption
-from cdtool.commands.inject.axis_contact import InjectedContact, axis_contact
+from cdtool.commands.inject.axis_contact import axis_contact
 from cdtool.commands.inject.inject_section import InjectSection
+from cdtool.commands.inject.injected_contact import InjectedContact
 from cdtool.commands.inject.robot_contact import RobotLog, StruckPoint, least_known_joint, robot_contact
 from cdtool.formats.channels.channel_assembly import LoggedRecording
 from cdtool.formats.machine_file import MachineFile

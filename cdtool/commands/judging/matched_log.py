@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,8 +31,7 @@ class MatchedLog:
 
     `judged`, `contacts` and `false_alarms` have one entry per operation, the latter two its rows. `curves` is the force
     by the contact's number.
-    `not_scored` lists contacts that have no onset or are outside all operations; `about_log` are the findings that do
-    not depend on the detectors. `uncut`: the strokes in one operation, and those that each detector cannot assess.
+    `not_scored` lists contacts that have no onset or are outside all operations; `findings` are about the log itself.
     """
 
     judged: tuple[Judged, ...]
@@ -40,38 +39,7 @@ class MatchedLog:
     false_alarms: tuple[tuple[FalseAlarmResult, ...], ...]
     curves: dict[int, ForceTimeCurve]
     not_scored: tuple[Skipped, ...]
-    about_log: tuple[RecordingFinding, ...]
-    uncut: UncutStrokes
-
-    @property
-    def findings(self) -> tuple[RecordingFinding, ...]:
-        """Return the findings about the log itself."""
-        return (*self.about_log, *self.uncut.findings)
-
-
-@dataclass(frozen=True)
-class UncutStrokes:
-    """The strokes of a log that is one operation: their number, and by detector those that hide a contact from it.
-
-    The first stroke is never among these: a detector that cannot assess it has other reasons. Nor is a stroke without
-    a contact in a log with contacts: the rebound after an impact.
-    """
-
-    recording: str
-    strokes: int = 0
-    not_assessable: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-
-    @property
-    def findings(self) -> list[RecordingFinding]:
-        """Return a warning with the strokes that any of the detectors cannot assess, if there are such strokes."""
-        numbers = sorted({number for numbers in self.not_assessable.values() for number in numbers})
-        if not numbers:
-            return []
-        return [
-            RecordingFinding.of(
-                self.recording, Finding("log_not_cut", "", {"strokes": self.strokes, "not_assessable": tuple(numbers)})
-            )
-        ]
+    findings: tuple[RecordingFinding, ...]
 
 
 @dataclass(frozen=True)
@@ -100,6 +68,7 @@ def match_log(
         *_unseen_onsets(contacts, rules.window),
         *_unseen_forces(contacts, curves),
         *doubts,
+        *_uncut_strokes(log, found),
     ]
     crossings = _pooled(found)
     judged = []
@@ -124,7 +93,6 @@ def match_log(
         curves,
         tuple(_not_scored(recording, contacts, inside, log.cut_by)),
         (*warned, *(RecordingFinding.of(recording.name, item) for item in findings)),
-        _uncut_strokes(log, found),
     )
 
 
@@ -223,25 +191,22 @@ def force_curves(
     return found, missing
 
 
-def _uncut_strokes(log: CutLog, found: Sequence[Sequence[Detection]]) -> UncutStrokes:
-    """Return by detector the strokes of an uncut log that are not assessable although the first one is."""
+def _uncut_strokes(log: CutLog, found: Sequence[Sequence[Detection]]) -> list[Finding]:
+    """Return a warning with the strokes of an uncut log that some detector cannot assess although it can the first one.
+
+    A detector that cannot assess the first stroke has other reasons. A stroke without a contact in a log with contacts
+    does not matter: the rebound after an impact.
+    """
     recording, contacts = log.recording, log.contacts
     detections = [item for of_operation in found for item in of_operation if not np.all(item.statistic.valid)]
-    if log.cut_by != "whole" or not detections:
-        return UncutStrokes(recording.name)
-    strokes = _strokes(recording)
-    relevant = [
-        (number, stroke)
+    strokes = _strokes(recording) if log.cut_by == "whole" and detections else []
+    numbers = tuple(
+        number
         for number, stroke in enumerate(strokes[1:], 2)
         if not contacts or any(stroke[0] <= contact.start <= stroke[1] for contact in contacts)
-    ]
-    unassessable = {
-        item.detector: tuple(number for number, stroke in relevant if not _mostly_judged(item, *stroke))
-        for item in detections
-        if strokes and _mostly_judged(item, *strokes[0])
-    }
-    known = {detector: numbers for detector, numbers in unassessable.items() if numbers}
-    return UncutStrokes(recording.name, len(strokes), known)
+        if any(_mostly_judged(item, *strokes[0]) and not _mostly_judged(item, *stroke) for item in detections)
+    )
+    return [Finding("log_not_cut", "", {"strokes": len(strokes), "not_assessable": numbers})] if numbers else []
 
 
 def _strokes(recording: Recording) -> list[tuple[float, float]]:

@@ -11,11 +11,9 @@ from cdtool.commands.judging.impact_free import contacts_shown
 from cdtool.commands.judging.runs import absent_truth, lost
 from cdtool.commands.judging.scoring_rules import ScoringRules
 from cdtool.recordings.recording import SHOWS_CONTACTS, Contact, Recording
+from cdtool.truth.force.curve import TAIL
 from cdtool.truth.missing_samples import cell_samples
 from cdtool.truth.onset import find_contacts
-
-# A load cell that ends earlier than this [s] before its log does not cover all of it.
-_TAIL = 0.1
 
 
 def unwanted_contacts(recording: Recording, rules: ScoringRules) -> tuple[Contact, ...]:
@@ -79,7 +77,7 @@ def missing_truth(recording: Recording) -> str:
         return ""
     clock = cell_samples(recording["force"]).clock
     present = clock.time
-    if len(present) and present[-1] > recording.end - _TAIL:
+    if len(present) and present[-1] > recording.end - TAIL:
         marks = np.concatenate(([recording.start], present))
         steps = np.diff(marks)
         k = int(np.argmax(steps))

@@ -10,20 +10,18 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.recordings.motion import MotionClass, measured_class
-from cdtool.recordings.motion.motion_class import averaged
+from cdtool.recordings.motion.motion_class import AVERAGED_SAMPLES, AVERAGED_SECONDS, averaged
 from cdtool.recordings.motion.speed_course import stroke_progress
 from cdtool.recordings.operations import Operation
 from cdtool.results.results import Skipped
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 
-# Nominal speeds that differ from the next one by more than this share belong to two classes.
-_STEP = 0.05
-# A run is left out if its speed is off by this share of the nominal one over this share of the stroke.
-_OFF, _OFF_SHARE = 0.1, 0.1
+# A run is left out if its speed is off by a tenth of the nominal one over this share of the stroke.
+_OFF_SHARE = 0.1
 # With fewer runs no common speed along the stroke can be determined.
 _ENOUGH = 3
+# Points along the stroke at which the speeds of runs are compared: every 1 % of it.
 _POINTS = 100
-_AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5.0
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,8 @@ def _by_speed(operations: Sequence[_ClassedRun]) -> list[list[_ClassedRun]]:
     ordered = sorted(operations, key=lambda run: run.motion.nominal_speed)
     groups: list[list[_ClassedRun]] = [[ordered[0]]]
     for before, run in pairwise(ordered):
-        if run.motion.nominal_speed > (1.0 + _STEP) * before.motion.nominal_speed:
+        # Nominal speeds that differ from the next one by more than 5 % belong to two classes.
+        if run.motion.nominal_speed > 1.05 * before.motion.nominal_speed:
             groups.append([])
         groups[-1].append(run)
     made: list[list[_ClassedRun]] = []
@@ -88,7 +87,7 @@ def _alike(runs: list[_ClassedRun]) -> tuple[list[_ClassedRun], list[Skipped]]:
     usual = np.array(
         [np.median(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0 for column in speeds.T]
     )
-    off = known & (np.abs(np.nan_to_num(speeds - usual))[:, inner] > _OFF * nominal)
+    off = known & (np.abs(np.nan_to_num(speeds - usual))[:, inner] > 0.1 * nominal)
     share = off.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
     alike = [run for run, part in zip(runs, share, strict=True) if part <= _OFF_SHARE]
     if len(alike) < max(_ENOUGH, len(runs) // 2):
@@ -136,7 +135,7 @@ def _course(run: _ClassedRun, nominal: float) -> tuple[FloatArray, FloatArray]:
     use = np.isfinite(at.travel) & np.isfinite(speed)
     travel, smooth = (
         at.travel[use],
-        averaged(series.time[use], speed[use], max(_AVERAGED_SECONDS, _AVERAGED_SAMPLES * series.period)),
+        averaged(series.time[use], speed[use], max(AVERAGED_SECONDS, AVERAGED_SAMPLES * series.period)),
     )
     rising = np.concatenate(([True], np.diff(travel) > 0.0)) if len(travel) else np.empty(0, dtype=bool)
     return travel[rising], smooth[rising]

@@ -32,7 +32,9 @@ def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
 
 def normals_for(operations: Sequence[Operation], rule: Threshold) -> NormalMotions:
     """Return the normal motions of the operations that a rule learned from, or why they are missing."""
-    return NormalMotions(normal_motions(operations), Absence.PER_RUN if is_per_run(rule) else Absence.FEW_RUNS)
+    absent = Absence.PER_RUN if is_per_run(rule) else Absence.FEW_RUNS
+    absent = Absence.BY_HAND if getattr(rule, "limits", ()) else absent
+    return NormalMotions(normal_motions(operations), absent)
 
 
 def normals_of(file: SignatureFile) -> NormalMotions:

@@ -10,7 +10,7 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, statuses_words
-from cdtool.base.plain_text import counted
+from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.console import leave, plain, print_json, print_line, say
 from cdtool.commands.console.options import ForceOption, JsonOption
 from cdtool.commands.console.place import Place, location
@@ -27,7 +27,6 @@ protocol = typer.Typer(
     rich_markup_mode=None,
 )
 _FACTS: Mapping[str, tuple[Fact, ...]] = {"fail": (Fact.FORCE_VIOLATED,), "incomplete": (Fact.INCOMPLETE,), "pass": ()}
-_SHOWN = 10
 
 
 @protocol.callback()
@@ -162,10 +161,10 @@ def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
 
     outcome, headline, *sentences = protocol_statement(made)
     say(headline, tone={"pass": "good", "fail": "bad"}.get(outcome, "unknown"))
-    for sentence in sentences[:_SHOWN]:
+    for sentence in sentences[:LISTED]:
         say(f"- {sentence}", indent="  ")
-    if len(sentences) > _SHOWN:
-        print_line(f"  and {len(sentences) - _SHOWN} more, all in the protocol")
+    if len(sentences) > LISTED:
+        print_line(f"  and {len(sentences) - LISTED} more, all in the protocol")
     for line in written_lines(made, written):
         print_line(line)
 

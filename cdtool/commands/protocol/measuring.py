@@ -18,7 +18,7 @@ from cdtool.commands.judging.matched_log import CutLog, force_curves
 from cdtool.commands.judging.runs import absent_truth, find_logs, resolve_all
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.commands.protocol.assessment.plan import MeasuringPoint
-from cdtool.commands.protocol.assessment.pressure import pressure_record
+from cdtool.commands.protocol.assessment.pressure import EARLY, FIRST, pressure_record
 from cdtool.commands.protocol.assessment.reasons import Reason
 from cdtool.commands.protocol.assessment.speed import speed_before
 from cdtool.commands.protocol.protocol_file import ProtocolFile
@@ -30,12 +30,9 @@ from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.limits import ForceProfile
 from cdtool.truth.missing_samples import cell_samples
 
-# A record that begins within this time [s] before a contact may show no rest at all: a slow contact begins with it.
-_EARLY = 0.6
-# Its first readings, over this time [s], are those nearest to the rest.
-_FIRST = 0.01
 # A contact that is slower than this from zero to the level at rest [s] is no contact, but a drift of the cell.
 _SLOWEST = 10.0
+# A difference of three standard errors is no noise.
 _BEYOND_DOUBT = 3.0
 # The end of a record over which it shows where the reading returned to [s].
 _LAST = 0.2
@@ -234,9 +231,9 @@ def _rest_error(recording: Recording, contact: Contact, curve: ForceTimeCurve) -
         return 0.0
     samples = cell_samples(recording["force"])
     begin = float(samples.time[0])
-    first = samples.force[samples.time <= begin + _FIRST]
+    first = samples.force[samples.time <= begin + FIRST]
     moved, length = rest - float(np.mean(first)), contact.start - begin
-    is_early = length <= _EARLY
+    is_early = length <= EARLY
     is_moving = is_early and abs(moved) > _BEYOND_DOUBT * float(np.std(first)) / np.sqrt(len(first))
     slope = moved / length if is_moving and length > 0.0 else contact.drift
     at_peak = samples.force[np.searchsorted(samples.time, contact.start + curve.time[np.argmax(curve.force)] - _EXACT)]

@@ -37,6 +37,7 @@ from cdtool.thresholds.normal_motion import NormalMotions
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
+# A trigger file has times to a millisecond [Hz].
 _CLOCK_RATE = 1000.0
 _CUT_LOG = "is cut into runs: its rows are left out (name a run, as {name}#1)"
 _NO_RUN = "no such run is scored: its rows are left out"
@@ -131,7 +132,7 @@ class _TriggerScoring:
     path: Path
     said: Mapping[str, Mapping[str, Triggered]]
 
-    def __call__(self, group: str, path: Path, wanted: Wanted | None, _: object = None) -> list[LogOutcome]:
+    def __call__(self, group: str, path: Path, wanted: Wanted | None) -> list[LogOutcome]:
         found = score_runs(self.setup, group, path, self._detect, {})
         if self.setup.has_runs:
             found = self._listed_runs(found)

@@ -191,21 +191,12 @@ class _LogScoring:
     normals: NormalMotions
     runs: tuple[Operation, ...]
 
-    def __call__(
-        self, group: str, path: Path, wanted: Wanted | None, detectors: tuple[str, ...] | None
-    ) -> list[LogOutcome]:
+    def __call__(self, group: str, path: Path, wanted: Wanted | None) -> list[LogOutcome]:
         refused = self.setup.impacts[group].refused if group in self.setup.impacts else {}
-        if refused:
-            wanted_here = detectors or tuple(item.name for item in self.detectors)
-            detectors = tuple(name for name in wanted_here if name not in refused)
-        chosen = self if detectors is None else self._with_only(detectors)
-        detect = detect_with(chosen.setup, chosen.detectors, chosen.thresholds.without, chosen.unusable)
-        scored = score_runs(chosen.setup, group, path, detect, chosen.factors, chosen.ranges)
-        return [outcome_of(item, chosen.setup, partial(chosen._normals_for, item), wanted) for item in scored]
-
-    def _with_only(self, names: tuple[str, ...]) -> _LogScoring:
-        chosen = tuple(detector for detector in self.detectors if detector.name in names)
-        return replace(self, detectors=chosen, thresholds=self.thresholds.with_only(names))
+        tested = [detector for detector in self.detectors if detector.name not in refused]
+        detect = detect_with(self.setup, tested, self.thresholds.without, self.unusable)
+        scored = score_runs(self.setup, group, path, detect, self.factors, self.ranges)
+        return [outcome_of(item, self.setup, partial(self._normals_for, item), wanted) for item in scored]
 
     def _normals_for(self, scored: ScoredLog) -> NormalMotions:
         """Return the normal motion that a log is compared with: without its own."""

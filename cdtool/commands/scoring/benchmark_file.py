@@ -49,6 +49,7 @@ from cdtool.formats.labels.labels import Labels
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.machines import MACHINES
 from cdtool.recordings.log_section import LogSection
+from cdtool.recordings.motion.applicable import GRACE
 from cdtool.recordings.operations import RunCut
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.limits import ALL, Bounds, LimitRule, limit_rules
@@ -209,8 +210,9 @@ class BenchmarkFile:
     `impacts` are the scored groups: those of impacts, the hold-out, then those of changed conditions.
 
     `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock.
-    `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `sections` are the parts of scored logs
-    that are used, `learned_sections` those of the logs learned from, which end `guard` [s] before
+    `mass_before_cell` [kg]. `window` [s] and `section` apply to a log outside all groups; without a file, `detect` has
+    only those, and `checks_channels`: of each log by the mechanics of the machine. `sections` are the parts of scored
+    logs that are used, `learned_sections` those of the logs learned from, which end `guard` [s] before
     their first contact; None: they have no contact. `split`: which runs stay together where runs set a limit for
     others. `made`: the groups that a command makes before they are scored; `not_made`: their logs and contacts that
     were left out. `force_limits`: the file of the force profiles; None: the shipped ones. `settings`: what took the
@@ -230,13 +232,15 @@ class BenchmarkFile:
     labels: Labels | None
     synchronisation: float
     mass_before_cell: float
-    learn: tuple[Path, ...]
-    impacts: Mapping[str, ImpactGroup]
-    campaigns: Mapping[Path, str]
-    points: Mapping[Path, str]
-    limits: tuple[LimitRule, ...]
-    digest: str
+    learn: tuple[Path, ...] = ()
+    impacts: Mapping[str, ImpactGroup] = field(default_factory=dict)
+    campaigns: Mapping[Path, str] = field(default_factory=dict)
+    points: Mapping[Path, str] = field(default_factory=dict)
+    limits: tuple[LimitRule, ...] = ()
+    digest: str = ""
     window: float = 1.0
+    section: LogSection = LogSection()
+    checks_channels: bool = False
     sections: Mapping[Path, LogSection] = field(default_factory=dict)
     learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
@@ -290,6 +294,11 @@ class BenchmarkFile:
             "scored_without_own_part": others,
             **({"split": self.split.value} if self.split is not Split.RECORDING else {}),
         }
+
+    @property
+    def grace(self) -> float:
+        """Return how long a class of motion is monitored after its motion [s]: for the longest matching window."""
+        return max(GRACE, *([group.window for group in self.impacts.values()] or [self.window]))
 
     @cached_property
     def both(self) -> tuple[Path, ...]:

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# A repr is one line.
-_LONGEST_HEADLINE = 100
 _COUNTS = ("contacts", "detected", "missed", "not_assessable", "false_alarms", "operations", "hours")
 _SHOWN = ["group", "detector", "detected", "missed", "not_assessable", "median_ms", "mean_ms", "false_alarms"]
 
@@ -201,7 +199,7 @@ class BenchmarkResult:
                 (results.recordings, "recording"),
             )
         )
-        return f"BenchmarkResult({size}: {shorten(self.headline, _LONGEST_HEADLINE)})"
+        return f"BenchmarkResult({size}: {shorten(self.headline, 100)})"  # one line
 
     def _repr_html_(self) -> str:
         """Return the statistics as a table, which a notebook shows."""

@@ -75,28 +75,24 @@ def results_of(
     # The unit of the value compared with the limits may differ from that of the signal.
     units, beside = dict[str, str](), dict[str, str]()
     for group, outcome in outcomes:
-        skipped += outcome.skipped
-        findings += outcome.findings
+        skipped += outcome.rows.skipped
+        findings += outcome.rows.findings
         assumed_free += outcome.rows.unchecked
-        recording = outcome.recording
+        recording = outcome.rows.recording
         if recording is None:
             continue
         recordings.append(recording)
         if recording.sha256:
             _check_content(setup, recording, contents.get(recording.sha256, ""), learned.get(recording.sha256, ""))
             contents[recording.sha256] = recording.recording
-        for detector in outcome.detectors:
-            found = [item for item in detector.operations if item is not None]
-            for item in found:
-                units.setdefault(detector.detector, item.unit)
-                exposure[group, detector.detector].add(item)
-                sweep.add(group, detector.detector, item)
-            if found:
-                exposure[group, detector.detector].recordings += 1
+        for made in (made for operation in outcome.operations for made in operation):
+            units.setdefault(made.detector, made.unit)
+            exposure[group, made.detector].add(made, recording.recording)
+            sweep.add(group, made)
+            contacts += made.contacts
+            false_alarms += made.false_alarms
         if recording.point:
             tests[group, recording.point] += outcome.rows.verdicts
-        contacts += outcome.contacts
-        false_alarms += outcome.false_alarms
         forces += outcome.rows.forces
         beside |= {f"{recording.recording}, {name}": digest for name, digest in outcome.rows.beside}
     findings += unchecked(assumed_free)
@@ -151,15 +147,16 @@ def _check_content(setup: BenchmarkFile, recording: RecordingResult, scored: str
 class _Exposure:
     """How long one detector monitored one group."""
 
-    recordings: int = 0
+    recordings: set[str] = field(default_factory=set)
     operations: int = 0
     seconds: float = 0.0
     not_assessable: int = 0
     samples: int = 0
     by_reason: Counter[str] = field(default_factory=Counter)
 
-    def add(self, outcome: OperationOutcome) -> None:
-        """Add one operation."""
+    def add(self, outcome: OperationOutcome, recording: str) -> None:
+        """Add one operation of a recording."""
+        self.recordings.add(recording)
         self.operations += 1
         self.seconds += outcome.seconds
         self.not_assessable += outcome.is_not_assessable
@@ -171,7 +168,9 @@ class _Exposure:
         """Return the row of results.json."""
         shares = {reason: count / max(self.samples, 1) for reason, count in sorted(self.by_reason.items())}
         hours = self.seconds / 3600.0
-        return ExposureResult(group, detector, self.recordings, self.operations, hours, self.not_assessable, shares)
+        return ExposureResult(
+            group, detector, len(self.recordings), self.operations, hours, self.not_assessable, shares
+        )
 
 
 @dataclass
@@ -186,9 +185,9 @@ class _SweepRows:
     _latency: dict[tuple[str, str], array[float]] = field(default_factory=dict)
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
 
-    def add(self, group: str, name: str, outcome: OperationOutcome) -> None:
-        """Add one operation of the detector `name`."""
-        swept = outcome.swept
+    def add(self, group: str, outcome: OperationOutcome) -> None:
+        """Add one operation of a detector."""
+        name, swept = outcome.detector, outcome.swept
         if swept is None:
             return
         if group == self.impact_free:

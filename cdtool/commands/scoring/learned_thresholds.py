@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -161,14 +161,6 @@ class ThresholdsByLog:
     setup: BenchmarkFile
     all_runs: Mapping[str, tuple[FittedThreshold, ...]]
     pairs: Mapping[str, Sequence[Pair]] = field(default_factory=dict)
-
-    def with_only(self, detectors: Collection[str]) -> ThresholdsByLog:
-        """Return the thresholds of some detectors."""
-        return replace(
-            self,
-            all_runs={name: items for name, items in self.all_runs.items() if name in detectors},
-            pairs={name: pairs for name, pairs in self.pairs.items() if name in detectors},
-        )
 
     @classmethod
     def of(cls, setup: BenchmarkFile, learned: LearnedThresholds) -> ThresholdsByLog:

@@ -15,14 +15,13 @@ from cdtool.formats.channels.run_reading import split_run
 from cdtool.results.results import Skipped
 from cdtool.results.traces.choice import TraceChoice
 
-# Returns the outcome of the log of a group, or of each of its runs; None as traces: no trace is wanted, as detectors:
-# all of them are.
-ScoreLog = Callable[[str, Path, Wanted | None, tuple[str, ...] | None], list[LogOutcome]]
+# Returns the outcome of the log of a group, or of each of its runs, with the wanted traces.
+ScoreLog = Callable[[str, Path, Wanted | None], list[LogOutcome]]
 
 
 @dataclass(frozen=True)
 class Piece:
-    """One log, by its number, to be scored with some `detectors` or, if it is None, with all.
+    """One log, by its number, to be scored.
 
     `choice` is the choice of traces as far as it is known; without it, those of `operations` are wanted. `sources` are
     the log's files with their content, by which a store knows them; None without a store.
@@ -32,7 +31,6 @@ class Piece:
     group: str
     path: Path
     choice: TraceChoice | None = None
-    detectors: tuple[str, ...] | None = None
     operations: tuple[int, ...] = ()
     sources: tuple[SourceFile, ...] | None = None
 
@@ -68,7 +66,7 @@ class PieceScoring:
         """Return the outcomes of the log."""
         files = source_files(self.setup, piece.path)
         before = state_of(files) if piece.sources is None else state_in(piece.sources)
-        outcomes = self.score(piece.group, piece.path, piece.wanted, piece.detectors)
+        outcomes = self.score(piece.group, piece.path, piece.wanted)
         after = state_of(files)
         if after != before:
             why = "changed while it was read" if after is not None else "was removed, or cannot be reached, meanwhile"

@@ -84,10 +84,7 @@ class ScoredLogs:
 
     def _offer(self, place: _Place, outcome: LogOutcome) -> _Place:
         """Choose from the operations of a log or run, the first of which is at `place`; return the place after them."""
-        if outcome.recording is None:
-            return place
-        for number in range(outcome.operations):
-            judged = tuple(outcome.of_operation(number))
+        for number, judged in enumerate(outcome.operations):
             group, _ = place.log
             chosen = self._choice.offer(place.number, group, len(judged), striking_of(judged), slowest_of(judged))
             if chosen is not None:

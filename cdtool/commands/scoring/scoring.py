@@ -28,13 +28,13 @@ from cdtool.commands.judging.runs import (
     reported,
     shown_path,
     unread,
+    without_contradicted,
 )
 from cdtool.commands.judging.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile
 from cdtool.commands.scoring.force_rows import force_rows
 from cdtool.formats.channels.run_reading import read_runs
 from cdtool.recordings.log_section import LogSection
-from cdtool.recordings.motion.applicable import GRACE
 from cdtool.recordings.operations import Operation, RunCut, operations_of
 from cdtool.recordings.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recordings.recording import Contact, Recording
@@ -58,11 +58,10 @@ def left_out_by(detectors: Mapping[str, Iterable[Skipped]]) -> list[Skipped]:
 
 @dataclass(frozen=True)
 class LogRows:
-    """The rows of a log that do not depend on the detectors.
+    """The rows of a log without those of its operations.
 
     `recording` is None if it was left out. `unchecked`: names of logs assumed to be free of impacts, with the ground
-    truth that is missing from them. `beside`: name and SHA-256 of each file beside the log with a channel. `strokes`:
-    of a log that is not cut.
+    truth that is missing from them. `beside`: name and SHA-256 of each file beside the log with a channel.
     """
 
     recording: RecordingResult | None
@@ -72,7 +71,6 @@ class LogRows:
     findings: tuple[RecordingFinding, ...] = ()
     unchecked: tuple[tuple[str, Finding], ...] = ()
     beside: tuple[tuple[str, str], ...] = ()
-    strokes: int = 0
 
 
 class Detections(NamedTuple):
@@ -87,9 +85,6 @@ class Detections(NamedTuple):
     untaught: Mapping[str, Sequence[RecordingFinding]]
 
 
-_NOTHING_DETECTED = Detections((), {}, {})
-
-
 @dataclass(frozen=True)
 class ScoredLog:
     """One log or run after detection and matching: its rows, and with its samples what the rows are made of.
@@ -101,14 +96,8 @@ class ScoredLog:
     rows: LogRows
     recording: Recording | None = None
     contacts: tuple[Contact, ...] = ()
-    detections: Detections = _NOTHING_DETECTED
     matched: MatchedLog | None = None
     lasts: bool = True
-
-    @property
-    def left_out(self) -> list[Skipped]:
-        """Return everything that was left out; what all detectors left out for the same reason is listed once."""
-        return [*self.rows.skipped, *left_out_by(self.detections.failed)]
 
 
 # Returns the detections in the operations of a log or run, given by its path.
@@ -127,7 +116,6 @@ def detect_with(
     `unusable` cannot be used, for the given reason; none of their samples is assessable. A class of motion is monitored
     for the longest matching window.
     """
-    grace = max(GRACE, *(group.window for group in setup.impacts.values()))
     machine = setup.machine_file.machine
 
     def detect(log: Path, operations: Sequence[Operation]) -> Detections:
@@ -143,7 +131,7 @@ def detect_with(
                 known = thresholds[detector.name]
                 try:
                     made = detect_operations(
-                        operations, machine, detector, known, setup.activation, setup.watched, grace
+                        operations, machine, detector, known, setup.activation, setup.watched, setup.grace
                     )
                 except CdtoolError as fault:
                     failed[detector.name] = tuple(Skipped(item.whole.name, str(fault)) for item in operations)
@@ -223,7 +211,9 @@ def _cut_log(setup: BenchmarkFile, group: str, log: Path, path: Path, load: Call
     """Read and cut a log or a run at `path`; `log` is its path in the benchmark file. Raises RecordingError."""
     rules = setup.rules_of(group)
     whole = load()
-    section = setup.sections.get(log, LogSection())
+    if setup.checks_channels:
+        whole = without_contradicted(whole, setup.machine_file.machine, setup.onset)
+    section = setup.sections.get(log, LogSection() if group else setup.section)
     recording = section.of(whole)
     operations = operations_of(recording, setup.operations)
     if setup.is_impact_free(group):
@@ -233,7 +223,7 @@ def _cut_log(setup: BenchmarkFile, group: str, log: Path, path: Path, load: Call
     contacts: Sequence[Contact] = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
     if section and contacts:
         contacts = section.contacts_of(whole, contacts)
-        if not contacts:
+        if not contacts and group:
             raise RecordingError(f"{path}: no contact {section}", "change from and to, or move it to [holdout]")
     return CutLog(recording, operations, setup.operations, contacts)
 
@@ -267,7 +257,7 @@ def _score(
     found = detect(path, operations)
     matched = match_log(replace(read, operations=operations), found.of_operations, group, rules, setup.activation.wait)
     skipped += matched.not_scored
-    findings += matched.about_log
+    findings += matched.findings
     forces, verdicts = list[ForceResult](), dict[int, ForceVerdict]()
     if group in setup.impacts and (profile := setup.impacts[group].force):
         curves = matched.curves
@@ -286,13 +276,12 @@ def _score(
         row,
         tuple(forces),
         tuple(verdicts.values()),
-        tuple(skipped),
-        tuple(findings),
+        (*skipped, *left_out_by(found.failed)),
+        (*findings, *(item for of_detector in found.untaught.values() for item in of_detector)),
         tuple(unchecked),
         beside=recording.beside,
-        strokes=matched.uncut.strokes,
     )
-    return ScoredLog(rows, recording, tuple(contacts), found, matched)
+    return ScoredLog(rows, recording, tuple(contacts), matched)
 
 
 def _force_not_seen(

@@ -15,13 +15,13 @@ from cdtool.base.plain_text import counted, digits
 from cdtool.commands.signature.drift import Axis
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.motion import MotionClass
+from cdtool.recordings.motion.speed_course import COVERAGE
 from cdtool.recordings.operations import Operation
 from cdtool.recordings.recording import Recording
 from cdtool.results.curves.sweep import critical_factor
 from cdtool.statistics.prediction import LEAST_VALUES, Prediction, prediction_of
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature import Signature
-from cdtool.thresholds.signature_curve import COVERAGE
 
 
 @dataclass(frozen=True)

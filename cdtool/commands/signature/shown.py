@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from cdtool.base.plain_text import counted, ordinal
+from cdtool.base.plain_text import LISTED, counted, ordinal
 from cdtool.commands.console.console import number, plain, print_line, say, table
 
 if TYPE_CHECKING:
@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from cdtool.commands.signature.summary import JointSummary, SignatureSummary
     from cdtool.commands.signature.upkeep import Checked, CheckedClass
     from cdtool.formats.signature_file import SignatureFile
-
-# Table rows, and sections, that are shown; --json has all.
-_SHOWN = 12
 
 
 def show_file(stored: SignatureFile) -> None:
@@ -133,10 +130,10 @@ def _show_coverage(found: SignatureCoverage) -> None:
     judged = f"{runs}: {counted(found.alarms, 'alarm')}{nearest}"
     print_line(f"coverage: {judged}")
     say(found.verdict, indent="  ")
-    for gap in found.gaps[:_SHOWN]:
+    for gap in found.gaps[:LISTED]:
         say(f"no limit for {gap.joint} {gap.described}", indent="  ")
-    if len(found.gaps) > _SHOWN:
-        print_line(f"  no limit: and {counted(len(found.gaps) - _SHOWN, 'more section')} (--json has all)")
+    if len(found.gaps) > LISTED:
+        print_line(f"  no limit: and {counted(len(found.gaps) - LISTED, 'more section')} (--json has all)")
 
 
 def _show_drift(found: DriftAudit, *, quiet: bool) -> None:
@@ -148,7 +145,7 @@ def _show_drift(found: DriftAudit, *, quiet: bool) -> None:
             say(verdict, indent="  ")
         if quiet:
             continue
-        step = max(1, math.ceil(len(joint.runs) / _SHOWN))
+        step = max(1, math.ceil(len(joint.runs) / LISTED))
         rows = [
             (
                 plain(run.name),

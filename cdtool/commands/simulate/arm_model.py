@@ -105,8 +105,8 @@ def integrate_arm(
     """
     log = np.zeros((len(arm_kernel.ROWS), *stroke.disturbance.shape))
     contact_force = np.zeros(stroke.disturbance.shape[1])
-    numbers = tuple(float(getattr(parameters, name)) for name in arm_kernel.PARAMETER_ORDER)
-    pairs = tuple(tuple(map(float, getattr(parameters, name))) for name in arm_kernel.JOINT_PARAMETER_ORDER)
+    numbers = arm_kernel.Numbers(*(float(getattr(parameters, name)) for name in arm_kernel.Numbers._fields))
+    pairs = arm_kernel.Pairs(*(tuple(map(float, getattr(parameters, name))) for name in arm_kernel.Pairs._fields))
     kind = arm_kernel.CONTACT_KINDS[stroke.impact]
     scratch = (*np.zeros((3, 6, 2)), np.zeros((arm_kernel.HELD, 2)))
     first_contact = arm_kernel.integrate_arm(

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.base.errors import UsageError
-from cdtool.commands.simulate import sensors
+from cdtool.recordings.units import STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
 Trial = Literal[1, 2]
@@ -107,7 +107,7 @@ class ArmParameters:
     imu_bias: float = 0.02  # the same in every run: one sensor, one bias [m/s2]
     imu_frequency: float = 78.0  # second-order low-pass [Hz]
     imu_damping: float = 0.8  # [-]
-    imu_resolution: float = sensors.STANDARD_GRAVITY / 4096.0  # [m/s2]
+    imu_resolution: float = STANDARD_GRAVITY / 4096.0  # [m/s2]
     load_cell_noise: float = 0.1  # [N rms]
 
     # Log, trial 1 and 2

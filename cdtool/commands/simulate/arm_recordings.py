@@ -21,7 +21,6 @@ from cdtool.commands.simulate.recording_folder import (
     without_references,
     write_folder,
 )
-from cdtool.recordings.recording import Recording, Series
 from cdtool.recordings.units import UNITS
 
 _JOINTS = ("arm", "forearm")
@@ -66,21 +65,6 @@ _BENCHMARK_RULES = (
     "back_to_n = 0.5",
     "hold_s = 0.003",
 )
-
-
-def as_recording(run: ArmRun, name: str) -> Recording:
-    """Return a run as logged, without a file in between: motor torque, speed and angle, accelerations, load cell."""
-    values = {
-        "torque": (run.motor_torque, "N m"),
-        "speed": (run.motor_speed, "rad/s"),
-        "position": (run.motor_position, "rad"),
-        "acceleration": (run.imu, "m/s2"),
-        "reference_speed": (run.reference_speed, "rad/s"),
-        "reference_position": (run.reference_position, "rad"),
-        "force": (run.load_cell, "N"),
-    }
-    channels = {channel: Series(run.time, array, unit) for channel, (array, unit) in values.items()}
-    return Recording(name, name, _JOINTS, channels)
 
 
 def simulate_arm(  # noqa: PLR0913  # the public function: a keyword for each setting

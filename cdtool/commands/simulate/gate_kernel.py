@@ -14,6 +14,7 @@ Control, disturbance and resolver are sampled once per log period and held over 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +43,7 @@ ROWS = (
 """The rows of the array that `integrate_gate` fills; the first seven are the states."""
 
 # fmt: off
-PARAMETER_ORDER = (
+Numbers = namedtuple("Numbers", (
     "motor_mass", "leaf_main_mass", "post_mass", "transmission_ratio", "take_up_stiffness",
     "take_up_damping", "take_up_travel", "drive_stiffness", "drive_damping", "backlash", "motor_friction",
     "coulomb_friction", "static_friction", "stribeck_speed", "viscous_friction", "friction_waviness",
@@ -51,17 +52,17 @@ PARAMETER_ORDER = (
     "bumper_buckled_stiffness", "bumper_bottom_travel", "bumper_bottom_stiffness", "bumper_damping",
     "speed_gain", "integral_gain", "anti_windup_rate", "force_slew_limit", "force_limit", "current_lag",
     "resolver_step", "speed_filter_frequency", "sample_period",
-)
+))
 # fmt: on
-"""The attributes of `GateParameters` that the kernel takes, in the order in which it unpacks them."""
+"""The attributes of `GateParameters` that the kernel takes."""
 
 
 @kernel(
-    "float64(UniTuple(float64, 38), float64[:, ::1], float64[::1], float64[::1], float64[::1], "
+    "float64(NamedUniTuple(float64, 38, Numbers), float64[:, ::1], float64[::1], float64[::1], float64[::1], "
     "UniTuple(float64, 3), int64, int64, float64[:, ::1])"
 )
 def integrate_gate(
-    parameters: tuple[float, ...],
+    p: Numbers,
     friction_waves: Array,
     initial_state: Array,
     reference_speed: Array,
@@ -77,52 +78,12 @@ def integrate_gate(
     `disturbance` [N] are held over each sample; `run` holds the run's friction factor [-], cogging phase
     [rad] and obstacle position [m].
     """
-    (
-        motor_mass,
-        leaf_main_mass,
-        post_mass,
-        transmission_ratio,
-        take_up_stiffness,
-        take_up_damping,
-        take_up_travel,
-        drive_stiffness,
-        drive_damping,
-        backlash,
-        motor_friction,
-        coulomb_friction,
-        static_friction,
-        stribeck_speed,
-        viscous_friction,
-        friction_waviness,
-        friction_smoothing_speed,
-        cogging_force,
-        cogging_periods,
-        post_stiffness,
-        post_damping,
-        load_cell_stiffness,
-        load_cell_damping,
-        bumper_stiffness,
-        bumper_buckling_travel,
-        bumper_buckled_stiffness,
-        bumper_bottom_travel,
-        bumper_bottom_stiffness,
-        bumper_damping,
-        speed_gain,
-        integral_gain,
-        anti_windup_rate,
-        force_slew_limit,
-        force_limit,
-        current_lag,
-        resolver_step,
-        speed_filter_frequency,
-        sample_period,
-    ) = parameters
     friction_factor, cogging_phase, obstacle = run
-    step = sample_period / substeps
-    keep = math.exp(-2.0 * math.pi * speed_filter_frequency * sample_period)
-    cogging_rate = cogging_periods / transmission_ratio
-    buckling_force = bumper_stiffness * bumper_buckling_travel
-    bottom_force = buckling_force + bumper_buckled_stiffness * (bumper_bottom_travel - bumper_buckling_travel)
+    step = p.sample_period / substeps
+    keep = math.exp(-2.0 * math.pi * p.speed_filter_frequency * p.sample_period)
+    cogging_rate = p.cogging_periods / p.transmission_ratio
+    buckling_force = p.bumper_stiffness * p.bumper_buckling_travel
+    bottom_force = buckling_force + p.bumper_buckled_stiffness * (p.bumper_bottom_travel - p.bumper_buckling_travel)
 
     state = initial_state.copy()
     trial = np.empty(7)
@@ -138,20 +99,20 @@ def integrate_gate(
     for sample in range(reference_speed.size):
         # Resolver, its speed, and the speed controller: sampled events.
         counted = state[0]
-        if resolver_step > 0.0:
-            counted = math.floor(state[0] / resolver_step) * resolver_step
+        if p.resolver_step > 0.0:
+            counted = math.floor(state[0] / p.resolver_step) * p.resolver_step
         if sample == 0:
             counted_before = counted
-        once_filtered = keep * once_filtered + (1.0 - keep) * (counted - counted_before) / sample_period
+        once_filtered = keep * once_filtered + (1.0 - keep) * (counted - counted_before) / p.sample_period
         measured_speed = keep * measured_speed + (1.0 - keep) * once_filtered
         counted_before = counted
         error = reference_speed[sample] - measured_speed
-        wanted = speed_gain * error + integrator
-        largest_change = force_slew_limit * sample_period
+        wanted = p.speed_gain * error + integrator
+        largest_change = p.force_slew_limit * p.sample_period
         reference_force += min(max(wanted - reference_force, -largest_change), largest_change)
-        reference_force = min(max(reference_force, -force_limit), force_limit)
+        reference_force = min(max(reference_force, -p.force_limit), p.force_limit)
         # Back-calculation: a comparison "is it limited?" would make the result jump with the step size.
-        integrator += (integral_gain * error + anti_windup_rate * (reference_force - wanted)) * sample_period
+        integrator += (p.integral_gain * error + p.anti_windup_rate * (reference_force - wanted)) * p.sample_period
 
         for substep in range(substeps):
             # Element by element: array assignments would triple the time to compile.
@@ -169,53 +130,53 @@ def integrate_gate(
                 wind_up = x_m - x
                 wind_up_speed = v_m - v
                 drive = 0.0
-                if wind_up >= take_up_travel:
-                    drive = take_up_stiffness * take_up_travel + drive_stiffness * (wind_up - take_up_travel)
-                    drive = max(drive + drive_damping * wind_up_speed, 0.0)
+                if wind_up >= p.take_up_travel:
+                    drive = p.take_up_stiffness * p.take_up_travel + p.drive_stiffness * (wind_up - p.take_up_travel)
+                    drive = max(drive + p.drive_damping * wind_up_speed, 0.0)
                 elif wind_up >= 0.0:
-                    drive = max(take_up_stiffness * wind_up + take_up_damping * wind_up_speed, 0.0)
-                elif wind_up < -backlash:
-                    drive = min(drive_stiffness * (wind_up + backlash) + drive_damping * wind_up_speed, 0.0)
+                    drive = max(p.take_up_stiffness * wind_up + p.take_up_damping * wind_up_speed, 0.0)
+                elif wind_up < -p.backlash:
+                    drive = min(p.drive_stiffness * (wind_up + p.backlash) + p.drive_damping * wind_up_speed, 0.0)
 
                 # Friction of the leaf: waves along the track, Stribeck rise, smoothed sign.
                 wave = 0.0
                 for row in range(friction_waves.shape[0]):
                     angle = 2.0 * math.pi * x / friction_waves[row, 0] + friction_waves[row, 1]
                     wave += friction_waves[row, 2] * math.sin(angle)
-                coulomb = coulomb_friction * friction_factor * (1.0 + friction_waviness * wave)
-                stribeck = (static_friction - coulomb) * math.exp(-((v / stribeck_speed) ** 2))
-                friction = (coulomb + stribeck) * math.tanh(v / friction_smoothing_speed) + viscous_friction * v
+                coulomb = p.coulomb_friction * friction_factor * (1.0 + p.friction_waviness * wave)
+                stribeck = (p.static_friction - coulomb) * math.exp(-((v / p.stribeck_speed) ** 2))
+                friction = (coulomb + stribeck) * math.tanh(v / p.friction_smoothing_speed) + p.viscous_friction * v
 
-                post = post_stiffness * (x - x_f) + post_damping * (v - v_f)
+                post = p.post_stiffness * (x - x_f) + p.post_damping * (v - v_f)
 
                 # Contact: the load cell alone, or the bumper's branch whose force equals the cell's.
                 contact = 0.0
                 compression = 0.0
                 penetration = x_f - obstacle
                 if contact_kind > 0 and penetration > 0.0:
-                    cell = load_cell_stiffness * max(1.0 + load_cell_damping * v_f, 0.0)
+                    cell = p.load_cell_stiffness * max(1.0 + p.load_cell_damping * v_f, 0.0)
                     if contact_kind == 1:
                         contact = cell * penetration
                     else:
-                        gain = max(1.0 + bumper_damping * v_f, 1e-9)
-                        compression = cell * penetration / (cell + gain * bumper_stiffness)
-                        if compression > bumper_buckling_travel:
-                            offset = gain * (buckling_force - bumper_buckled_stiffness * bumper_buckling_travel)
-                            compression = (cell * penetration - offset) / (cell + gain * bumper_buckled_stiffness)
-                        if compression > bumper_bottom_travel:
-                            offset = gain * (bottom_force - bumper_bottom_stiffness * bumper_bottom_travel)
-                            compression = (cell * penetration - offset) / (cell + gain * bumper_bottom_stiffness)
+                        gain = max(1.0 + p.bumper_damping * v_f, 1e-9)
+                        compression = cell * penetration / (cell + gain * p.bumper_stiffness)
+                        if compression > p.bumper_buckling_travel:
+                            offset = gain * (buckling_force - p.bumper_buckled_stiffness * p.bumper_buckling_travel)
+                            compression = (cell * penetration - offset) / (cell + gain * p.bumper_buckled_stiffness)
+                        if compression > p.bumper_bottom_travel:
+                            offset = gain * (bottom_force - p.bumper_bottom_stiffness * p.bumper_bottom_travel)
+                            compression = (cell * penetration - offset) / (cell + gain * p.bumper_bottom_stiffness)
                         contact = cell * (penetration - compression)
 
-                cogging = cogging_force * math.sin(cogging_rate * x_m + cogging_phase)
-                smooth_sign = math.tanh(v_m / friction_smoothing_speed)
+                cogging = p.cogging_force * math.sin(cogging_rate * x_m + cogging_phase)
+                smooth_sign = math.tanh(v_m / p.friction_smoothing_speed)
                 slope[0] = v_m
-                slope[1] = (f_m + cogging - drive - motor_friction * smooth_sign) / motor_mass
+                slope[1] = (f_m + cogging - drive - p.motor_friction * smooth_sign) / p.motor_mass
                 slope[2] = v
-                slope[3] = (drive - friction - post + disturbance[sample]) / leaf_main_mass
+                slope[3] = (drive - friction - post + disturbance[sample]) / p.leaf_main_mass
                 slope[4] = v_f
-                slope[5] = (post - contact) / post_mass
-                slope[6] = (reference_force - f_m) / current_lag
+                slope[5] = (post - contact) / p.post_mass
+                slope[6] = (reference_force - f_m) / p.current_lag
                 if stage == 0 and substep == 0:
                     for index in range(7):
                         log[index, sample] = state[index]
@@ -234,5 +195,5 @@ def integrate_gate(
                 state[index] += total[index]
             if contact_kind > 0 and math.isnan(first_contact) and state[4] > obstacle:
                 share = (obstacle - before) / (state[4] - before)
-                first_contact = sample * sample_period + (substep + share) * step
+                first_contact = sample * p.sample_period + (substep + share) * step
     return first_contact

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from cdtool.base.errors import UsageError
 from cdtool.commands.simulate import gate_kernel, sensors
+from cdtool.recordings.units import STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
 Impact = Literal["none", "stiff", "soft"]
@@ -99,7 +100,7 @@ class GateParameters:
     accelerometer_bias: float = 0.03  # the same in every run: one sensor, one bias [m/s2]
     accelerometer_frequency: float = 25.0  # second-order low-pass [Hz]
     accelerometer_damping: float = 0.8  # [-]
-    accelerometer_resolution: float = sensors.STANDARD_GRAVITY / 4096.0  # [m/s2]
+    accelerometer_resolution: float = STANDARD_GRAVITY / 4096.0  # [m/s2]
     load_cell_noise: float = 3.0  # [N rms]
 
     # Log
@@ -197,7 +198,7 @@ def integrate_gate(
     per sample; `run` holds the run's friction factor [-], cogging phase [rad] and obstacle position [m].
     """
     log = np.zeros((len(gate_kernel.ROWS), reference_speed.size))
-    numbers = tuple(float(getattr(parameters, name)) for name in gate_kernel.PARAMETER_ORDER)
+    numbers = gate_kernel.Numbers(*(float(getattr(parameters, name)) for name in gate_kernel.Numbers._fields))
     waves = np.array(parameters.friction_waves, dtype=np.float64).reshape(-1, 3)
     kind = gate_kernel.CONTACT_KINDS[impact]
     first_contact = gate_kernel.integrate_gate(

@@ -18,10 +18,9 @@ from cdtool.commands.simulate.recording_folder import (
     without_references,
     write_folder,
 )
-from cdtool.recordings.recording import Recording, Series
 from cdtool.recordings.units import UNITS
 
-__all__ = ["GROUPS", "as_recording", "gate_bench", "simulate_gate"]
+__all__ = ["GROUPS", "gate_bench", "simulate_gate"]
 
 # What the fictitious drive and sensors log: motor current, revolutions, an accelerometer mounted backward.
 _TORQUE_CONSTANT = 0.56  # N m/A
@@ -41,22 +40,6 @@ _BENCHMARK_SETTINGS = (
     'detectors = ["pi", "feekf", "gm", "igm", "pt"]',
 )
 _BENCHMARK_RULES = ("[onset]", "above_n = 20.0", "back_to_n = 8.0")
-
-
-def as_recording(run: GateRun, name: str, parameters: GateParameters) -> Recording:
-    """Return a run as it is after reading, without a file in between: every channel on the load side."""
-    ratio = parameters.transmission_ratio
-    values = {
-        "torque": (run.motor_torque / ratio, "N"),
-        "speed": (run.motor_speed * ratio, "m/s"),
-        "position": (run.motor_position * ratio, "m"),
-        "acceleration": (run.acceleration, "m/s2"),
-        "reference_speed": (run.reference_speed * ratio, "m/s"),
-        "reference_torque": (run.reference_torque / ratio, "N"),
-        "force": (run.load_cell, "N"),
-    }
-    channels = {channel: Series(run.time, array, unit) for channel, (array, unit) in values.items()}
-    return Recording(name, name, ("gate",), channels)
 
 
 def simulate_gate(  # noqa: PLR0913  # the public function: a keyword for each setting

@@ -13,6 +13,7 @@ from typing import Generic, Literal, Protocol, TypeVar
 
 from cdtool.base.errors import UsageError
 from cdtool.base.files.writing import replaced_folder
+from cdtool.thresholds.signature import ENOUGH_RUNS, LEAST_RUNS
 
 IMPACT_OF: Mapping[str, Literal["none", "stiff", "soft"]] = {
     "free": "none",
@@ -26,8 +27,6 @@ EPOCH_NS = 1_700_000_000_000_000_000
 
 # With the format "mixed" this many of each group are MCAP files.
 _MIXED_MCAP = 2
-# The numbers of runs with which something can be learned at all, and without being forced.
-_LEAST_RUNS, _ENOUGH_RUNS = 2, 10
 
 
 class Run(Protocol):
@@ -65,8 +64,8 @@ def without_references(machine_toml: str) -> str:
 
 def without_benchmark(counts: Mapping[str, int]) -> str:
     """Return why recordings of so many runs of each group make no benchmark; empty where they do."""
-    if counts.get("free", 0) < _LEAST_RUNS:
-        return f"a benchmark learns from {_LEAST_RUNS} runs or more: --set free=10"
+    if counts.get("free", 0) < LEAST_RUNS:
+        return f"a benchmark learns from {LEAST_RUNS} runs or more: --set free=10"
     if not any(counts.get(group, 0) for group in GROUPS if group != "free"):
         return "a benchmark needs logs to score: set holdout, stiff or soft"
     return ""
@@ -146,12 +145,12 @@ def _benchmark_toml(planned: list[_Planned], bench: Bench[AnyRun]) -> str:
     for group in GROUPS:
         if any(item.group == group for item in planned):
             lines += ["", titles.get(group, f"[impacts.{group}]"), f"logs = [{logs(group)}]"]
-    few = sum(item.group == "free" for item in planned) < _ENOUGH_RUNS
+    few = sum(item.group == "free" for item in planned) < ENOUGH_RUNS
     return "\n".join([*lines, "", *(_forced(bench.rules) if few else bench.rules), ""])
 
 
 def _forced(rules: Sequence[str]) -> list[str]:
     """Rules by which a signature is learned from few runs."""
-    force = f"force = true                    # fewer than {_ENOUGH_RUNS} runs to learn from"
+    force = f"force = true                    # fewer than {ENOUGH_RUNS} runs to learn from"
     at = next((i for i, line in enumerate(rules, 1) if line.startswith("[signature]")), 0)
     return [*rules[:at], force, *rules[at:]] if at else [*rules, "", "[signature]", force]

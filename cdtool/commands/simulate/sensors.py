@@ -16,9 +16,6 @@ from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, seco
 
 Array = npt.NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665
-"""[m/s2]"""
-
 
 def coloured_noise(white: Array, deviation: float, rate: float, period: float) -> Array:
     """Ornstein-Uhlenbeck noise x' = -rate x + w of std `deviation`, from x = 0; `rate` in rad/s.

@@ -28,10 +28,10 @@ from cdtool.impact.transmissions.transmission import ElasticTransmission
 from cdtool.machines.axis import Axis
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS, JointMachine
+from cdtool.recordings.units import STANDARD_GRAVITY
 
-_DRIVE_FREQUENCY = 10.0
-_LOOP_FREQUENCY = 2.0
-_GRAVITY = 9.80665
+# Defaults [Hz] where a study states none, of the size that gates and axes have; each is reported.
+_DRIVE_FREQUENCY, _LOOP_FREQUENCY = 10.0, 2.0
 
 
 # A number that has a default, which depends on the machine and is reported.
@@ -264,11 +264,11 @@ def _force_sensor(
 def _accelerometer(reader: StudyReader) -> Sensor:
     table, unit = "sensors.accelerometer", "m/s2"
     bandwidth = reader.number(table, "bandwidth", 100.0, "Hz")
-    density = reader.number(table, "noise_density", 300e-6 * _GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)")
+    density = reader.number(table, "noise_density", 300e-6 * STANDARD_GRAVITY, "m/s2/sqrt(Hz)", "300 ug/sqrt(Hz)")
     vibration = reader.number(table, "vibration", 0.1, unit, "of the moving structure, rms")
     # A first-order low-pass has a noise bandwidth of pi/2 times its corner frequency.
     noise = math.hypot(density * math.sqrt(0.5 * math.pi * bandwidth), vibration)
-    resolution = reader.number(table, "resolution", _GRAVITY / 4096, unit, "1/4096 g")
+    resolution = reader.number(table, "resolution", STANDARD_GRAVITY / 4096, unit, "1/4096 g")
     rate = reader.number(table, "sample_rate", 1000.0, "Hz")
     return Sensor("accelerometer", "on the load", "load_acceleration", unit, noise, resolution, bandwidth, rate)
 

@@ -23,6 +23,7 @@ from cdtool.recordings.recording import Contact
 from cdtool.results.curves.false_alarm_budget import Budget
 from cdtool.results.results import RecordingFinding, Skipped
 
+# A choice is checked on a fifth of the recordings, five times: four fifths still set a limit.
 FOLDS = 5
 # To check a limit on runs that did not set it, a fifth of them is set aside.
 _TO_CHECK = FOLDS / (FOLDS - 1)

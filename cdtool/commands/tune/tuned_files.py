@@ -11,14 +11,15 @@ from typing import Any
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.files.bounded_loading import read_text
+from cdtool.base.files.typed_json import plain
 from cdtool.base.plain_text import digits
 from cdtool.base.remote.remote_path import is_remote, joined, location, relative_name
 from cdtool.base.toml_text import opened_table
 from cdtool.base.version import __version__
 from cdtool.commands.judging.settings_table import names_in
 from cdtool.commands.learning.learning import LearnedSignature, Setting, learned_from_runs
-from cdtool.commands.tune.search.candidate import Candidate
-from cdtool.commands.tune.search.tuned import ChoiceResults, TunedDetector
+from cdtool.commands.tune.options import TuneTable
+from cdtool.commands.tune.search.tuned import TunedDetector
 from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.results.limits import ALL
 from cdtool.thresholds.base import Threshold
@@ -234,12 +235,8 @@ def tuning_summary(tuning: Tuning) -> dict[str, Any]:
         "benchmark": tuning.setup.path.name,
         "benchmark_sha256": tuning.setup.digest,
         "false_alarm_budget": str(options.budget),
-        "objective": options.objective.value,
-        "impacts": options.impacts,
-        "thresholds": list(options.thresholds) or "all",
+        "tune": plain({item.name: getattr(options, item.name) for item in fields(TuneTable)}),
         "injected_groups": [name for name, group in tuning.setup.impacts.items() if group.injected is not None],
-        "worse_at_most": options.worse_at_most,
-        "seed": options.seed,
         "split": tuning.setup.split.value,
         "contacts": dict(tuning.groups),
         "verdict": tuning.verdict[1],
@@ -251,69 +248,12 @@ def tuning_summary(tuning: Tuning) -> dict[str, Any]:
 
 
 def _tuned_values(tuned: TunedDetector) -> dict[str, Any]:
-    return {
-        "detector": tuned.detector,
-        "chosen": {
-            **_candidate(tuned.choice),
-            "debounce": tuned.debounce,
-            "safety_factor": tuned.factor,
-            "correction": tuned.correction,
-        },
-        "default": _candidate(tuned.default),
-        "nested": _results(tuned.nested),
-        "apparent": _results(tuned.apparent),
-        "default_nested": _results(tuned.default_nested),
-        "default_apparent": _results(tuned.default_apparent),
-        "default_reason": tuned.default_reason,
-        "sensitivity": [
-            {
-                "name": item.name,
-                "chosen": item.chosen,
-                "flat_from": item.flat_from,
-                "flat_to": item.flat_to,
-                "at_edge": item.is_at_edge,
-                "tried": [[one.value, one.cost_ratio] for one in item.tried],
-            }
-            for item in tuned.sensitivities
-        ],
-        "candidates": tuned.candidates,
-        "unusable": dict(tuned.unusable),
-        "chosen_in_folds": list(tuned.chosen_in_folds),
-        "why_not_nested": tuned.why_not_nested,
-        "rejected": [asdict(item) for item in tuned.rejected],
+    """Return a tuned detector by its names in Python, the rule of a threshold as a signature file has it."""
+    candidates = {
+        name: {"gains": dict(item.gains), "threshold": rule_to_dict(item.rule)}
+        for name, item in (("default", tuned.default), ("choice", tuned.choice))
     }
-
-
-def _candidate(candidate: Candidate) -> dict[str, Any]:
-    return {"gains": dict(candidate.gains), "threshold": rule_to_dict(candidate.rule)}
-
-
-def _results(figures: ChoiceResults | None) -> dict[str, Any] | None:
-    if figures is None:
-        return None
-    groups = {
-        name: {
-            "contacts": item.contacts,
-            "missed": item.missed,
-            "not_assessable": item.not_assessable,
-            "mean_ms": item.mean_ms,
-            "mean_low_ms": item.interval_ms.low,
-            "mean_high_ms": item.interval_ms.high,
-            "shortest_ms": item.range_ms[0],
-            "longest_ms": item.range_ms[1],
-            "p95_ms": item.p95_ms,
-            "force_at_alarm_n": item.force_n,
-        }
-        for name, item in figures.groups.items()
-    }
-    share = figures.alarm_share
-    return {
-        "groups": groups,
-        "alarming": figures.alarming,
-        "free_runs": figures.free,
-        "alarm_share_low": share.low,
-        "alarm_share_high": share.high,
-    }
+    return {**plain(tuned), **candidates}
 
 
 def files_of(tuning: Tuning) -> list[tuple[str, TunedDetector]]:

@@ -49,9 +49,6 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.settings import with_context
 
-# A statistic may be assessable for less time than its signal.
-_SPARE = 1.1
-
 
 def tune(  # the public function: a keyword for each setting
     file: str | Path | BenchmarkFile,
@@ -191,7 +188,7 @@ class _TuningOf:
         measure = _MeasuresAll(measuring, self.workers)
         channels = set.intersection(*(set(run.operation.recording.channels) for run in recordings.free))
         grid = [Candidate(default.gains, item) for item in self._rules(rule, channels)]
-        found = search(default, 0, grid, gains, objective, measure)
+        found = search(default, grid, gains, objective, measure)
         if not np.isfinite(found.best.score):
             reason = found.measured[default.key].reason or "no candidate is acceptable"
             raise UsageError(f"{self.name} cannot be tuned: {reason}", "check the logs with cdtool info")
@@ -243,7 +240,8 @@ class _TuningOf:
             return True
         seconds = np.array([signal.period * float(signal.valid.any(axis=1).sum()) for _, signal in pairs])
         fewest = min(float(seconds[recordings.free_in(fold + 1)].sum()) for fold in range(recordings.folds))
-        return fewest / 3600.0 >= _SPARE * budget.needed
+        # A statistic may be assessable for less time than its signal.
+        return fewest / 3600.0 >= 1.1 * budget.needed
 
     def _why_not_nested(self, recordings: TuningRecordings, chosen: Sequence[HeldOut]) -> str:
         """Return why there are no results on recordings not used for the choice."""
@@ -334,7 +332,7 @@ def _checked_choice(
         without = [item.rule for item in rejected]
         best = found.subsets[0].best_without(without)
         chosen = [subset.best_without(without) for subset in found.subsets[1:]]
-        is_default = best.candidate.key == found.default.key and best.debounce == found.default_debounce
+        is_default = best.candidate.key == found.default.key and best.debounce == 0
         nested = measure.pooled(chosen, corrects=not is_default)
         if default is None or nested is None or best.candidate.key == found.default.key:
             return best, chosen, nested, rejected

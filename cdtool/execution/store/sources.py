@@ -7,10 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cdtool.base.files.bounded_loading import MIB
 from cdtool.base.remote.remote_path import is_remote, relative_name, version_of
-
-# Read at a time [bytes].
-_PIECE = 1 << 20
 
 # Size [bytes] and time of the last change [ns] of each file; None: it could not be looked at.
 State = tuple[tuple[int, int], ...] | None
@@ -78,6 +76,6 @@ def file_sha256(path: Path) -> str:
     """Return the SHA-256 of a file's content."""
     digest = hashlib.sha256()
     with path.open("rb", buffering=0) as file:
-        while piece := file.read(_PIECE):
+        while piece := file.read(MIB):
             digest.update(piece)
     return digest.hexdigest()

@@ -27,12 +27,8 @@ from cdtool.base.files.writing import write_bytes, write_text
 from cdtool.base.remote.remote_path import is_remote
 
 Kind = Literal["logs", "traces", "learned"]
-_KIND, _SCHEMA = "cdtool store", 2
+_KIND, _SCHEMA = "cdtool store", 2  # a change of the layout counts on
 _MARK = "store.json"
-# The time of last use of a file is noted if it is older [s].
-_DAY = 86_400.0
-# Speed counts more than size: half the time of the default.
-_LEVEL = 3
 
 
 @dataclass(frozen=True)
@@ -83,13 +79,14 @@ class Store:
             return None
         if not is_remote(self.folder):
             with suppress(OSError):
-                if path.stat().st_mtime < time.time() - _DAY:
+                if path.stat().st_mtime < time.time() - 86_400.0:  # after a day it is noted that the file is in use
                     os.utime(path)
         return content
 
     def keep(self, kind: Kind, key: str, content: str) -> None:
         """Keep the content of a key; when it returns, it outlives this process. Raises OutputError."""
-        path, packed = self._path(kind, key), zlib.compress(content.encode("utf-8", "surrogatepass"), _LEVEL)
+        # Level 3: speed counts more than size, half the time of the default.
+        path, packed = self._path(kind, key), zlib.compress(content.encode("utf-8", "surrogatepass"), 3)
         if is_remote(self.folder):
             write_bytes(path, packed)
             return

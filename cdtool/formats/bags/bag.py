@@ -12,13 +12,12 @@ import numpy as np
 from cdtool.base.findings import Finding
 from cdtool.formats.bags.topic_log import IsWanted, Messages, TopicLog
 from cdtool.formats.containers.container_checks import check_size
+from cdtool.formats.mcap.messages import HEADER
 from cdtool.formats.messages.batch import Batch, Stream
 from cdtool.formats.source import TopicDetails
 
 # Blocks are yielded after this number of messages of one topic, or this number of bytes of all topics.
 _MESSAGES, _BYTES = 4096, 1 << 23
-# In a batch each payload follows the header of an MCAP message [bytes], whose last field is the publish time.
-_HEADER = 22
 
 
 class Bag(TopicLog):
@@ -79,8 +78,8 @@ def one_line(fault: BaseException) -> str:
 def _batch(rows: list[tuple[int, bytes]]) -> Batch:
     times = np.array([time for time, _ in rows], dtype=np.uint64)
     length = np.array([len(raw) for _, raw in rows], dtype=np.int64)
-    start = np.cumsum(length + _HEADER) - length
+    start = np.cumsum(length + HEADER) - length
     parts = (
-        bytes(_HEADER - 8) + stamp.tobytes() + raw for stamp, (_, raw) in zip(times.astype("<u8"), rows, strict=True)
+        bytes(HEADER - 8) + stamp.tobytes() + raw for stamp, (_, raw) in zip(times.astype("<u8"), rows, strict=True)
     )
     return Batch(np.frombuffer(b"".join(parts), dtype=np.uint8), start, length, times)

@@ -18,7 +18,6 @@ from cdtool.formats.mcap.exact_times import EXACT_TIME, METADATA, PACKAGE
 from cdtool.formats.mcap.write import merged
 
 _CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
-_SECOND = 10**9
 
 
 def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
@@ -56,14 +55,14 @@ def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provena
 def _start(groups: Sequence[Group], origin: float) -> int:
     """Return the log time [ns] of time 0; it is later than the origin if the earliest log time would be negative."""
     earliest = min((group.start for group in groups if group.rows), default=0.0)
-    start = round(origin * _SECOND)
-    return max(start, math.ceil(-earliest * _SECOND)) if earliest < 0.0 else start
+    start = round(origin * 10**9)
+    return max(start, math.ceil(-earliest * 10**9)) if earliest < 0.0 else start
 
 
 def _messages(ready: Sequence[Part | None], start: int) -> Iterator[tuple[int, int, bytes]]:
     """Yield (group, stamp, payload) in the order of the stamps; equal stamps in the order of the groups."""
     times = [np.empty(0) if part is None or part.time is None else part.time for part in ready]
-    stamps = [start + np.rint(time * _SECOND).astype(np.int64) for time in times]
+    stamps = [start + np.rint(time * 10**9).astype(np.int64) for time in times]
     rows = [
         np.column_stack([time, *(part.values if part is not None else ())]).astype("<f8")
         for time, part in zip(times, ready, strict=True)

@@ -30,13 +30,9 @@ from cdtool.formats.messages.batch import Stream
 from cdtool.formats.messages.schemas import DEFINITIONS
 
 _SQLITE, _ZSTD = b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
-_FIRST_PAGE = 2**16  # SQLite's largest page size [bytes]; the first page contains the names of the tables
 _JOURNALS = ("-wal", "-journal")
 # Largest message [bytes]: SQLite does not return a longer value.
 _LARGEST = 2**28
-# A row of a table needs at least so many bytes: more rows than the file has room for are a loop in damaged pages.
-_ROW_BYTES = 4
-_LAST_STAMP = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,8 @@ class _Ros2Bag(Bag):
                 self._count(base, kinds)
                 streams = self._streams(kinds, _definitions(base) if "message_definitions" in tables else {})
             unwanted, damaged = kinds.keys() - streams.keys(), 0
-            for topic, time, raw in self._rows(base, file.stat().st_size // _ROW_BYTES):
+            # A row of a table needs four bytes: more rows than the file has room for are a loop in damaged pages.
+            for topic, time, raw in self._rows(base, file.stat().st_size // 4):
                 if topic in unwanted:
                     continue
                 is_message = topic in streams and _is_stamp(time) and isinstance(raw, bytes)
@@ -186,7 +183,7 @@ def _standard_definition(kind: str) -> str:
 
 
 def _is_stamp(time: object) -> bool:
-    return isinstance(time, int) and 0 <= time <= _LAST_STAMP
+    return isinstance(time, int) and 0 <= time < 2**63
 
 
 def _is_filled(path: Path) -> bool:
@@ -209,4 +206,4 @@ def _decompressed(raw: bytes) -> bytes | None:
 
 def _head(path: Path) -> bytes:
     with path.open("rb") as file:
-        return file.read(_FIRST_PAGE)
+        return file.read(2**16)  # SQLite's largest page; the first one has the names of the tables

@@ -32,10 +32,6 @@ from cdtool.formats.source import Source, TopicDetails
 Numbers = npt.NDArray[np.uint32]
 Times = npt.NDArray[np.uint64]
 
-# Numbers are a count if at least this share of the steps is 1, and at most this share is backward. A log from which
-# messages were removed regularly has other steps.
-_ONES, _BACK = 0.5, 0.01
-
 
 class SequenceJumps:
     """The sequence numbers of a log's messages, added piece by piece in the file's order."""
@@ -102,7 +98,8 @@ class _SequenceCount:
     @property
     def is_count(self) -> bool:
         """Whether most steps are by one, and hardly any goes back."""
-        return self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
+        # A log from which messages were removed regularly has other steps.
+        return self._ones >= 0.5 * self._steps and self._back <= 0.01 * self._steps
 
     def findings(self) -> list[Finding]:
         fact = {

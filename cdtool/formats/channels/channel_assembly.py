@@ -29,9 +29,6 @@ from cdtool.recordings.clock.stamps import gaps_of, missing_findings
 from cdtool.recordings.plausible import IMPOSSIBLE, PlausibleRanges
 from cdtool.recordings.recording import MEASURED, RIG_UNITS, UNITLESS, Recording, Series, TableRows
 
-# A channel of a lower rate has empty cells in these first rows of a table.
-_FIRST_ROWS = 1 << 12
-
 
 @dataclass(frozen=True)
 class LoggedRecording:
@@ -203,7 +200,8 @@ def _series(
         raise RecordingError(f"channel '{item.channel}' has no sample with a time", channel=item.channel)
     values = _kept_rows(item, parts, clock.keep)
     times, gaps = clock.times, clock.gaps
-    if clock.of_table and item.channel not in UNITLESS and np.isnan(values[:_FIRST_ROWS]).any():
+    # A channel of a lower rate has empty cells in the first rows of a table.
+    if clock.of_table and item.channel not in UNITLESS and np.isnan(values[: 1 << 12]).any():
         rows = sampled_rows(values)
         if rows is not None:  # its rate is lower than that of the table
             values, times = values[rows], Series(times.time[rows], values[rows], item.unit)

@@ -13,26 +13,20 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.formats.columns import Column
+from cdtool.formats.epoch_clock import EXCEL_2000, EXCEL_2100, SHORTEST_STEP
 from cdtool.formats.source import Source
 from cdtool.recordings.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
 from cdtool.recordings.clock.stamps import EDGE_ROWS, ClockCleaner, count_leading_strays, gaps_in
 from cdtool.recordings.distribution import Distribution
-from cdtool.recordings.units import find_unit
+from cdtool.recordings.units import DAY_S, find_unit
 
 # The last part of a name counts: `log.t` of a struct, `Sheet1!time` of a workbook.
 _NAMES = re.compile(r"^([^\[]*[.!])?(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
 # Upper limit of the median step -> unit: it covers sample rates of 2 Hz to 2 MHz in each unit.
 _UNITS = ((0.5, "s"), (500.0, "ms"), (5e5, "us"), (np.inf, "ns"))
-# The years 2000 to 2100 in Excel's days since 1899-12-30, and the longest step of such a clock [days]; a clock in
-# seconds has longer steps.
-_EXCEL_FIRST, _EXCEL_LAST, _EXCEL_STEP = 36526.0, 73051.0, 5e-5
-_DAY = 86400.0
-# A column is a clock if at least this share of its steps is forward, and at least this share is near the median: within
-# the first limits, as multiples of it, or the second ones for a column with the name of a clock.
-_FORWARD, _REGULAR = 0.95, 0.8
+# Steps are near the median within the first limits, as multiples of it, or the second ones if the column has the name
+# of a clock.
 _NEAR, _NEAR_IF_NAMED = (0.5, 1.5), (0.1, 10.0)
-# Up to this many time stamps are kept in memory (32 MiB) instead of being read again.
-_MOST_KEPT = 1 << 22
 # Yields the pieces of a column's values; each call starts again from the first piece.
 ReadColumn = Callable[[str], Iterable[FloatArray]]
 
@@ -96,7 +90,7 @@ def find_clock(
     named = sorted((c for c in tables if _NAMES.match(c.name)), key=lambda c: statistics[c.name].by_one)
     for column in dict.fromkeys(column.name for column in (*named, *tables)):
         known = statistics[column]
-        if known.steps < 3 or known.forward < _FORWARD * known.steps:
+        if known.steps < 3 or known.forward < 0.95 * known.steps:
             continue
         stamps = _stamps(column, known.present, read_column)
         step = _usual_step(stamps(), _NEAR_IF_NAMED if is_clock_name(column) else _NEAR)
@@ -107,7 +101,7 @@ def find_clock(
 
 def _stamps(column: str, count: int, read_column: ReadColumn) -> Callable[[], Iterable[FloatArray]]:
     """Return a function that yields a column's pieces: from memory if they are few, otherwise read again each time."""
-    if count > _MOST_KEPT:
+    if count > 1 << 22:  # 32 MiB
         return lambda: read_column(column)
     kept = [piece.copy() for piece in read_column(column)]  # copies, as a view would keep all columns of the piece
     return lambda: kept
@@ -121,7 +115,8 @@ def _usual_step(stamps: Iterable[FloatArray], near: tuple[float, float]) -> floa
         steps.add(np.diff(known))
         last = known[-1:]
     median = steps.median
-    regular = median > 0.0 and steps.share(near[0] * median, near[1] * median) >= _REGULAR
+    # A column is a clock if 95 % of its steps are forward, and 80 % near the median.
+    regular = median > 0.0 and steps.share(near[0] * median, near[1] * median) >= 0.8
     return median if regular else None
 
 
@@ -140,13 +135,13 @@ def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], 
         unit, evidence = str(column.unit), "header"
     elif epoch:
         unit, evidence = epoch, "epoch"
-    elif _EXCEL_FIRST < start < _EXCEL_LAST and step < _EXCEL_STEP:
+    elif EXCEL_2000 < start < EXCEL_2100 and step < SHORTEST_STEP:
         unit, evidence = "days", "excel"
     else:
         unit, evidence = next(name for most, name in _UNITS if step < most), "steps"
-        if unit == "s" and start > _DAY and all(map(_may_be_digits_of_a_day, stamps())):
+        if unit == "s" and start > DAY_S and all(map(_may_be_digits_of_a_day, stamps())):
             evidence = "digits"
-    factor = _DAY if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
+    factor = DAY_S if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
     # An epoch is subtracted before scaling, so that no digit is lost.
     origin = start if epoch or unit == "days" else 0.0
     assumed = Finding("assumed_clock", column.name, {"unit": unit, "evidence": evidence, "start": start, "step": step})

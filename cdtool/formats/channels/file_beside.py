@@ -21,8 +21,8 @@ from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, OwnFi
 from cdtool.recordings.recording import SHOWS_CONTACTS, Recording, Series
 
 # A trigger rises where it comes to the upper share of its range after the lower one. It has two levels: at most this
-# share of its samples is between them, of noise most are.
-_LOWER, _UPPER, _BETWEEN = 0.3, 0.7, 0.1
+# tenth of its samples is between them, of noise most are.
+_LOWER, _UPPER = 0.3, 0.7
 
 # Returns a file beside the log as a recording of its own.
 ReadFile = Callable[[Path, ChannelMap], Recording]
@@ -176,7 +176,7 @@ def rises(trigger: Series) -> FloatArray:
         return np.empty(0)
     share = (level - level.min()) / np.ptp(level)
     decided = (share <= _LOWER) | (share >= _UPPER)
-    if np.count_nonzero(decided) < (1.0 - _BETWEEN) * len(share):
+    if np.count_nonzero(decided) < 0.9 * len(share):
         return np.empty(0)
     high = share[decided] >= _UPPER
     found: FloatArray = time[decided][1:][high[1:] & ~high[:-1]]

@@ -21,8 +21,6 @@ from cdtool.recordings.units import RAW_UNITS, Unit, find_unit
 
 # Units of plain numbers.
 _PLAIN = ("1", "count")
-# A scale that converts another unit is often rounded: 0.1047 for rpm. No two units of one kind are this close.
-_ROUNDED = 1e-3
 # Where the name of a force may state its unit: `F [kN] filtered`, `Kraft in daN`, `kN_Kraft`, `ForcekN`; not `F_N`, a
 # normal force. With a factor beside it the unit is unknown: `Kraft [N]*1000`, `Kraft x10`, `Kraft 10 N`.
 _IN_NAME = re.compile(
@@ -136,7 +134,8 @@ def _fits(header_unit: Unit, stated: Unit, item: ChannelSource, factor: float) -
         same_kind = header_unit.si not in RAW_UNITS
     if same_kind and math.isclose(header_unit.factor, stated.factor):
         return True
-    return header_unit.si == item.unit and math.isclose(header_unit.factor, factor, rel_tol=_ROUNDED)
+    # A scale that converts another unit is often rounded: 0.1047 for rpm. No two units of one kind are this close.
+    return header_unit.si == item.unit and math.isclose(header_unit.factor, factor, rel_tol=1e-3)
 
 
 def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> Finding:

@@ -16,11 +16,7 @@ from cdtool.recordings.clock.stamps import StrayStampMarker, wrapped_bits
 
 # The clock starts again if so many consecutive time stamps are below the highest one; fewer are single stray rows.
 _RESTART_ROWS = 3
-# A clock that starts again returns to the first half of the run before it; a smaller step back is rows out of order.
-_RETURN = 0.5
 _SLASHES = re.compile(r"[/\\]+")
-# Length of an id in names [characters].
-_LONGEST = 60
 
 Rows = npt.NDArray[np.intp]
 
@@ -66,7 +62,7 @@ def id_text(value: float, words: Mapping[float, str]) -> str:
     ('3', '0.1', 'run_A', 'push_hard')
     """
     if value in words:
-        return shorten(plain(_SLASHES.sub("_", words[value].strip())), _LONGEST)
+        return shorten(plain(_SLASHES.sub("_", words[value].strip())), 60)  # the length of a name
     short = f"{value:.15g}"
     return short if float(short) == value else f"{value:.17g}"
 
@@ -137,7 +133,9 @@ def _resets(stamps: FloatArray) -> list[int]:
         following = x[k : k + _RESTART_ROWS]
         if len(following) < _RESTART_ROWS or float(following.max()) >= highest:
             continue
-        if float(x[k]) > float(x[begin]) + _RETURN * (highest - float(x[begin])):
+        # A clock that starts again returns to the first half of the run before it; a smaller step back is rows out of
+        # order.
+        if float(x[k]) > float(x[begin]) + 0.5 * (highest - float(x[begin])):
             continue
         if whole and wrapped_bits(float(x[k - 1]), float(x[k]), usual, float(x[k - 1])):
             continue

@@ -14,7 +14,6 @@ from cdtool.base.findings import Finding, Severity
 
 # A file that unpacks to more than this many bytes and to more than this multiple of its own size is refused.
 _FREE, _RATIO = 256 * 2**20, 200
-_MOST_MESSAGES = 5
 # HDF5 filters that do not compress: shuffle, Fletcher32 checksum.
 _FILTERS_WITHOUT_COMPRESSION = (2, 3)
 
@@ -96,7 +95,4 @@ def left_out_finding(name: str, kind: str) -> Finding:
 def messages_of(library: str, printed: str, severity: Severity = "warning") -> list[Finding]:
     """Return the first lines that a library printed about a file, each once."""
     lines = dict.fromkeys(" ".join(line.split())[:200] for line in printed.splitlines() if line.strip())
-    return [
-        Finding("library_message", "", {"library": library, "text": line}, severity)
-        for line in list(lines)[:_MOST_MESSAGES]
-    ]
+    return [Finding("library_message", "", {"library": library, "text": line}, severity) for line in list(lines)[:5]]

@@ -25,7 +25,6 @@ _SINCE = " since "
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNIT_KEYS = ("unit", "units", "Unit", "Units")
 _CLOCK_NAMES = ("time", "t", "timestamp")
-_WIDEST = 64
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ def _unusable(dataset: Any) -> str:
         return "a single number"
     return (
         f"{dataset.shape[0]} x {dataset.shape[1]}, too wide"
-        if dataset.ndim == 2 and min(dataset.shape) > _WIDEST
+        if dataset.ndim == 2 and min(dataset.shape) > 64  # an image or a model
         else ""
     )
 

@@ -24,7 +24,6 @@ from cdtool.formats.source import Source
 
 _MAGIC = b"PAR1"
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
-_FEWEST_ROWS = 2**12
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ class _Table:
         """Yield the rows of these columns, one group of rows at a time."""
         metadata = self._file.metadata
         check_size(self.path, sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)) * len(keys))
-        for batch in self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)):
+        for batch in self._file.iter_batches(max(2**12, VALUES_PER_PIECE // len(keys)), columns=list(keys)):
             self.rows += batch.num_rows
             check_size(self.path, self.rows * len(keys))
             columns = {key: self._numbers(key, batch.column(batch.schema.get_field_index(key))) for key in keys}

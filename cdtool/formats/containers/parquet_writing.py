@@ -13,9 +13,7 @@ from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.columns import Column
 from cdtool.formats.containers.container_checks import library
 from cdtool.formats.groups import Group, Parts, WrittenNames, prefix_keys, single_group
-
-# One row group contains this many numbers (8 MiB), but at least this many rows.
-_VALUES, _FEWEST_ROWS = 2**20, 2**14
+from cdtool.formats.pieces import VALUES_PER_PIECE
 
 
 def write_parquet(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
@@ -29,7 +27,7 @@ def write_parquet(path: Path, groups: Sequence[Group], parts: Parts, provenance:
         for column in columns
     ]
     schema = arrow.schema(fields, metadata=prefix_keys(provenance))
-    group_rows = max(_FEWEST_ROWS, _VALUES // len(columns))
+    group_rows = max(2**14, VALUES_PER_PIECE // len(columns))
     buffered: list[Any] = []
     with library("pyarrow.parquet", "parquet").ParquetWriter(path, schema, compression="zstd") as writer:
 

@@ -20,6 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
 from cdtool.base.errors import RecordingError, naming
+from cdtool.base.files.bounded_loading import MIB
 from cdtool.base.findings import Finding
 from cdtool.formats.channels.channel_map import ChannelMap
 from cdtool.formats.containers.container_checks import check_size, library, one_line_errors
@@ -32,16 +33,11 @@ _MOST_ROWS, _MOST_COLUMNS = 1_048_576, 4096
 # A cell with a formula but without a value, and its place in its attributes.
 _FORMULA = re.compile(rb"<c(\s[^>]*)?>\s*<f(?:[^>]*/>|[^>]*>[^<]*</f>)\s*(?:<v\s*/>|<v>\s*</v>)?\s*</c>")
 _PLACE = re.compile(rb'\br="([A-Z]+)([0-9]+)"')
-_PIECE = 1 << 20
 _TEXT_NUMBER = re.compile(r"\s*[+-]?[0-9][0-9., ]*([eE][+-]?[0-9]+)?\s*")
 # Stands for the decimal mark until all cells are known; no XML contains it.
 _MARK = "\x01"
 # Begins a number.
 _NUMBER = "\x02"
-_DAY_US = 86_400_000_000
-# Days in the first year of Excel's calendar are times of day, which may have passed midnight.
-_FIRST_DATE = 366.0
-_THOUSAND = 1000.0
 
 
 @dataclass(frozen=True)
@@ -170,7 +166,7 @@ class _Sheet:
             return "true" if value else "false"
         if not isinstance(value, int | float):
             return _NUMBER + _moment(value)
-        if abs(value) >= _THOUSAND and value == int(value):
+        if abs(value) >= 1000.0 and value == int(value):
             self.integers[column] = self.integers.get(column, 0) + 1
         kind = _kind(cell.number_format) if cell.has_style else ""
         shown = self._date(float(value), kind) if kind else value
@@ -179,10 +175,11 @@ class _Sheet:
     def _date(self, days: float, kind: str) -> str | float:
         """Return days since the epoch as a date, a time of day or elapsed seconds."""
         try:
-            moment = timedelta(microseconds=round(days * _DAY_US))
+            moment = timedelta(microseconds=round(days * 86_400_000_000))
             if kind == "elapsed":
                 return moment.total_seconds()
-            if 0.0 <= days < _FIRST_DATE:
+            # The first year of Excel's calendar are times of day, which may have passed midnight.
+            if 0.0 <= days < 366.0:
                 return (datetime.min + moment).time().isoformat("microseconds")
             return (self.epoch + moment).isoformat(timespec="microseconds")
         except (OverflowError, ValueError):  # not a day that a calendar has
@@ -233,7 +230,7 @@ def _read_sheets(path: Path, openpyxl: Any, folder: Path) -> list[_Sheet]:
 def _find_formulas(part: Any, number_of: Callable[[str], int], found: dict[int, tuple[Any, ...]]) -> None:
     """Count the formulas without a value in the XML of a sheet, which the library reads as empty cells."""
     rest = b""
-    while piece := part.read(_PIECE):
+    while piece := part.read(MIB):
         cells, end, rest = (rest + piece).rpartition(b"</c>")
         for cell in _FORMULA.finditer(cells + end):
             place = _PLACE.search(cell[1] or b"")

@@ -18,11 +18,8 @@ from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 from cdtool.formats.csv_dialect.dialect import Dialect
 from cdtool.formats.csv_dialect.marks import Marks
 
-# Samples with fewer rows, or with more lines above the rows, are not shortened.
-_FEWEST_ROWS, _MOST_ABOVE = 100, 40
-# The shortened sample has at least this many rows, and twice as many as lines above: its lower two thirds, from which
-# the separator is found, then contain rows only, as in the whole sample.
-_FIRST_ROWS = 6
+# Samples with more lines above the rows are not shortened: they need most of it.
+_MOST_ABOVE = 40
 # The bytes of numbers; a sign is at the start of a number or of its exponent.
 _PLAIN = b"0123456789.+-eEnaNA\r\n"
 # A number whose mark cannot separate thousands.
@@ -98,9 +95,11 @@ def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample 
     others = {*stream.translate(None, _PLAIN + separator + b",")}
     begin = stream.find(b"\n", max(map(stream.rfind, others), default=-1)) + 1 if others else 0
     above, rows = stream.count(b"\n", 0, begin), stream[begin:]
-    count, width = _FIRST_ROWS + 2 * above, rows.partition(b"\n")[0].count(separator) + 1
+    # Six rows, and twice as many as lines above: the lower two thirds, from which the separator is found, then contain
+    # rows only, as in the whole sample. With fewer than 100 rows nothing is gained.
+    count, width = 6 + 2 * above, rows.partition(b"\n")[0].count(separator) + 1
     lines = _alike(rows, separator, width)
-    if lines < max(_FEWEST_ROWS, count) or above > _MOST_ABOVE:
+    if lines < max(100, count) or above > _MOST_ABOVE:
         return None
     *first, _ = stream.split(b"\n", above + count)
     if not _is_clear(b"\n".join(first[above:]), rows, separator):

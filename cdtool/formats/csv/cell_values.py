@@ -17,8 +17,6 @@ from cdtool.formats.csv.cells import NULLS, STAMP_LIKE, number
 from cdtool.formats.csv.stamps import MISSING_STAMP, Integers
 from cdtool.formats.csv_dialect.dialect import Dialect, quoted
 
-# A survey reads a column of numbers with up to this many unreadable cells, or up to this share of the rows.
-_FEW, _SHARE = 3, 0.05
 _DECIMAL = re.compile(r"(?P<whole>[0-9]*)(?:[.,](?P<decimals>[0-9]*))?")
 
 
@@ -97,7 +95,8 @@ class CellValues:
             unread = self._unread.setdefault(column, [])
             unread.append((line, cell))
             so_far = max(self.dialect.sampled, line - self.dialect.first_line)
-            if len(unread) > max(_FEW, _SHARE * so_far) and column not in self.left_out:
+            # With more unreadable cells it is not a column of numbers.
+            if len(unread) > max(3, 0.05 * so_far) and column not in self.left_out:
                 self.left_out[column] = self._not_numeric(*unread[0], column)
                 self.numeric = [other for other in self.numeric if other != column]
 

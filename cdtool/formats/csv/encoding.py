@@ -21,8 +21,6 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
 _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]")
-# A text may contain this many control characters by mistake, or this share of its bytes: the error names their line.
-_FEW, _SHARE = 3, 0.02
 # The first bytes of a file, by which text is distinguished from other contents.
 HEAD_BYTES = 4096
 _ALLOWED = bytes(byte for byte in range(256) if not _CONTROL.match(bytes((byte,))))
@@ -54,7 +52,8 @@ def looks_like_text(sample: bytes) -> bool:
     if not text or b"\0" in first_line or is_other or begin.startswith((b"<", b"{")):
         return False
     controls = len(text.translate(None, _ALLOWED))
-    return not controls or (b"\0" not in text and controls <= max(_FEW, _SHARE * len(text)))
+    # A few may be there by mistake: the error names their line.
+    return not controls or (b"\0" not in text and controls <= max(3, 0.02 * len(text)))
 
 
 def open_table(path: Path, encoding: str, most: int = SAMPLE_BYTES) -> tuple[Text, bytes]:

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from cdtool.base.errors import RecordingError
+from cdtool.base.files.bounded_loading import MIB
 from cdtool.formats.containers.container_checks import check_size
 
 MAGIC = b"\x1f\x8b"
-_PIECE = 1 << 20
 
 
 @contextmanager
@@ -63,7 +63,7 @@ def measure(path: Path) -> tuple[int, int]:
     """
     total = end = 0
     with open_text(path) as file:
-        while piece := file.read(_PIECE):
+        while piece := file.read(MIB):
             content = len(piece.rstrip(b"\0"))
             end = total + content if content else end
             total += len(piece)

@@ -15,7 +15,6 @@ _RULER, _DRAWN = re.compile(r"[-=+|\s:]*"), re.compile(r"[-=]{2}")
 # Excel's error values of formulas, which are not comments although they start with #.
 _ERROR_VALUE = re.compile(r'#(?:(?:N/A|N/D|NV|DIV/0!)(?=[\s,;|"]|$)|[^\s,;|"#]{2,12}[!?](?=[\t,;|"]|$)|#+(?=[\t,;|"]))')
 _EXCEL = re.compile(r'"?sep=(?P<separator>.|\\t)?"?[,;\t ]*', re.IGNORECASE)
-_HEAD_LINES, _MOST_JOINED = 100, 6
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ def sample_lines(text: Text, stream: bytes) -> list[Line]:
     lines: list[Line] = []
     number, start = 1, 0
     while number <= len(raw):
-        joined = _joined(raw, number - 1) if number <= _HEAD_LINES else 1
+        joined = _joined(raw, number - 1) if number <= 100 else 1  # of a head
         piece = text.line_end.join(raw[number - 1 : number - 1 + joined])
         content = text.decode(piece).rstrip("\r\n")
         lines.append(Line(number, " ".join(content.split()) if joined > 1 else content, start))
@@ -117,7 +116,7 @@ def _joined(raw: list[bytes], first: int) -> int:
     """Return the number of lines that a quoted name joins; 1 if the quote is closed in its line, or never closed."""
     if raw[first].count(b'"') % 2 == 0:
         return 1
-    for more in range(1, min(_MOST_JOINED, len(raw) - first)):
+    for more in range(1, min(6, len(raw) - first)):  # more are not one name in quotes
         if raw[first + more].count(b'"') % 2:
             return more + 1 if not raw[first].lstrip()[:1].isdigit() else 1
     return 1

@@ -29,9 +29,8 @@ from cdtool.formats.csv.stamps import Integers
 from cdtool.formats.csv.table_lines import TableLines
 from cdtool.formats.csv_dialect.dialect import MOST_CELLS, Dialect
 
+# Rows above an unfinished last one that show what its last cell is like.
 RECENT = 20
-# A block of so many bytes is read line by line: pandas would take as long to start.
-_BY_LINES = 1 << 14
 # pandas reads the nearest float64 by itself since 3.1; before that it must be asked.
 _VERSION = tuple(map(int, pd.__version__.split(".")[:2]))
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _VERSION < (3, 1) else {}
@@ -87,7 +86,8 @@ class RowReader:
         plain = self._plain(block, ended)
         if plain is not None:
             yield plain
-        elif len(block) > _BY_LINES and half:
+        # A smaller block is read line by line: pandas would take as long to start.
+        elif len(block) > (1 << 14) and half:
             yield from self._rows(block[:half], ended=True)
             yield from self._rows(block[half:], ended)
         else:

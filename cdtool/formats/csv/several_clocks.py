@@ -29,9 +29,6 @@ _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-
 _FACTORS = tuple(10.0**power for power in (-9, -6, -3, 0, 3, 6, 9)) + tuple(
     factor**sign for factor in (60.0, 3600.0, 86400.0) for sign in (-1, 1)
 )
-_SAME_FACTOR = 0.01
-# At least this share of a clock's steps is forward.
-_FORWARD = 0.95
 OWN = 'time = { column = "time", unit = "s" }'
 HINT = f"write {OWN}: each channel then has the clock beside it, in the unit of its header ('time2 [ms]')"
 
@@ -194,7 +191,7 @@ def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, 
     if len(a) < 3:
         return None
     # A column that does not run forward is not a clock, whatever its name.
-    if min(np.mean(np.diff(a) > 0.0), np.mean(np.diff(b) > 0.0)) < _FORWARD:
+    if min(np.mean(np.diff(a) > 0.0), np.mean(np.diff(b) > 0.0)) < 0.95:
         return None
     step, other_step = float(np.median(np.diff(a))), float(np.median(np.diff(b)))
     ratio = other_step / step
@@ -202,7 +199,7 @@ def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, 
     same_name = re.sub(r"\W*[0-9]+$", "", first) == re.sub(r"\W*[0-9]+$", "", other)
     factors = (stated,) if np.isfinite(stated) else (1.0,) if same_name else _FACTORS
     scale = min(factors, key=lambda factor: abs(np.log(ratio / factor)))
-    if abs(ratio / scale - 1.0) > _SAME_FACTOR:
+    if abs(ratio / scale - 1.0) > 0.01:  # no two factors of units are so close, and no clock is so wrong
         return {"what": "steps", "first": step, "other": other_step}
     b = b / scale
     offset, length = float(b[0] - a[0]), float(a[-1] - a[0])

@@ -48,8 +48,7 @@ _DATES = (
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M:%S;%f", "%H:%M", "%I:%M:%S.%f %p", "%I:%M %p")
 _MINUTES = "%M:%S.%f"
 _FRACTION = re.compile(r"(?P<before>.*[0-9]:[0-9]{2}:[0-9]{2}[.,:;])(?P<digits>[0-9]+)(?P<after>.*)")
-_LOOKED = 200
-NS = 1_000_000_000
+NS = 1_000_000_000  # per second
 _MINUTE, _HOUR, _HALF_DAY, _DAY = 60 * NS, 3600 * NS, 43200 * NS, 86400 * NS
 # Nanoseconds in 64 bits reach from 1677 to 2262.
 _YEARS = (1680, 2260)
@@ -190,7 +189,8 @@ def find_layout(cells: Sequence[str], pinned: str = "") -> StampLayouts:
     possible = [StampLayout(pinned)] if pinned else [x for x in _known() if (x.read_all(likely) != MISSING_STAMP).any()]
     # All days are needed to decide between two orders of day and month; for times of day some cells are sufficient.
     first_of_day = {text.split()[0]: text for text in texts} if len(possible) > 1 else {}
-    checked = list(dict.fromkeys((*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values())))
+    # 200 cells show the layout.
+    checked = list(dict.fromkeys((*texts[:: max(1, len(texts) // 200)], texts[-1], *first_of_day.values())))
     stamps = {layout: layout.read_all(checked) for layout in possible}
     counts = {layout: int(np.count_nonzero(read != MISSING_STAMP)) for layout, read in stamps.items()}
     most = max(counts.values(), default=0)

@@ -29,16 +29,15 @@ from cdtool.formats.csv.rows import RowReader, Rows, plain_rows
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, StampLayout, seconds_since, unwrap
 from cdtool.formats.csv.text import BLOCK_BYTES
 from cdtool.formats.csv_dialect.dialect import Dialect, unit_from_header
+from cdtool.formats.epoch_clock import EXCEL_2000, EXCEL_2100, SHORTEST_STEP
 from cdtool.formats.large_integers import rounded_integers, rounding_finding
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.recordings.clock.stamps import THREE_YEARS, count_leading_strays
+from cdtool.recordings.units import DAY_S
 
-# Days since 1899-12-30, as counted by Excel, of 1970-01-01, and of the start of the years 2000 and 2100.
-_DAY_1970, _FIRST_DAY, _LAST_DAY = 25569.0, 36526.0, 73051.0
-DAY_S = 86400.0
-# A clock in days steps by less than 10 s [days]; a clock that steps by less than this in seconds samples above 20 kHz.
-_DAYS_STEP, _SECONDS_STEP = 10.0 / DAY_S, 5e-5
+# Days since 1899-12-30, as counted by Excel, of 1970-01-01.
+_DAY_1970 = 25569.0
 # A unit's factor to s -> its decimals down to 1 ns.
 _DECIMALS = {1.0: 9, 1e-3: 6, 1e-6: 3, 1e-9: 0}
 # Above _FIRST [s] float64 cannot represent nanoseconds; up to _LAST [s] 64-bit integers can.
@@ -53,11 +52,11 @@ def two_readings(stamps: FloatArray, factor: float) -> str:
     are in the range of the days from 2000 to 2100 cannot be distinguished from a clock in days.
     """
     known = stamps[np.isfinite(stamps)]
-    if len(known) < 2 or known.max() <= _FIRST_DAY or not _FIRST_DAY < np.median(known) < _LAST_DAY:
+    if len(known) < 2 or known.max() <= EXCEL_2000 or not EXCEL_2000 < np.median(known) < EXCEL_2100:
         return ""
     quarter = len(known) // 4
     step = float(known[-1 - quarter] - known[quarter]) / (len(known) - 1 - 2 * quarter)
-    if not 0.0 < step < min(_DAYS_STEP, _SECONDS_STEP / factor):
+    if not 0.0 < step < min(10.0 / DAY_S, SHORTEST_STEP / factor):  # a clock in days steps by less than 10 s
         return ""
     start = np.datetime64(round(since_1970(float(known[0]))), "s")
     return (

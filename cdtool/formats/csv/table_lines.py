@@ -14,8 +14,6 @@ from cdtool.formats.csv_dialect.dialect import Dialect
 
 # Blank lines, comments and repeated headers, of which there may be more only beside as many rows.
 _MOST_SKIPPED = 20_000
-# A footer has at most so many lines that start with a label and have other cells.
-_MOST = 12
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
 _MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
@@ -96,7 +94,8 @@ class TableLines:
         fits = len(cells) == width or (self._apart(line) and 1 < len(cells) < width)
         known = {each.cells[0].lower() for each in self._footer if len(each.cells) > 1 or width == 1}
         is_label = _LABEL.fullmatch(cells[0]) is not None and label not in known and label not in self._missing
-        return self.rows > 0 and fits and is_label and len(known) < _MOST and not self._words_above
+        # A footer has at most twelve lines that start with a label and have other cells.
+        return self.rows > 0 and fits and is_label and len(known) < 12 and not self._words_above
 
     @property
     def _footer(self) -> list[SplitLine]:

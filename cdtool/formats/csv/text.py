@@ -19,11 +19,10 @@ from cdtool.base.errors import RecordingError
 from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
 
+# The beginning of a file that shows its dialect: hundreds of rows, also below a long head.
 SAMPLE_BYTES = 1 << 17
+# A file is read in blocks: the memory for it does not grow with the file.
 BLOCK_BYTES = 1 << 20
-# So many of them are read at once: pandas takes as long to start as to read some ten kilobytes.
-_BLOCKS = 4
-TAIL_BYTES = 1 << 16
 UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 
 
@@ -56,13 +55,14 @@ class Text:
         left = self.size - self.mark - offset
         with open_text(self.path) if self.content is None else BytesIO(self.content) as file:
             file.seek(self.mark + offset)
-            while left > 0 and (piece := file.read(min(_BLOCKS * BLOCK_BYTES, left))):
+            # Four at once: pandas takes as long to start as to read some ten kilobytes.
+            while left > 0 and (piece := file.read(min(4 * BLOCK_BYTES, left))):
                 left -= len(piece)
                 yield piece
 
     def tail(self) -> list[bytes]:
         """Return the last lines of the stream, including an unfinished last line; the first may be part of a line."""
-        start = max(self.mark, self.size - TAIL_BYTES)
+        start = max(self.mark, self.size - (1 << 16))  # hundreds of lines
         return b"".join(self.chunks(start - self.mark)).split(self.line_end)
 
     def blocks(self, offset: int) -> Iterator[bytes]:

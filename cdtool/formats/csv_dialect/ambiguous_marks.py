@@ -21,8 +21,6 @@ from cdtool.formats.csv_dialect.marks import Marks, find_marks
 _FIRST_GROUP, _GROUP = re.compile(r"[+-]?[1-9][0-9]{0,2}"), re.compile(r"[0-9]{3}(?:\.[0-9]*)?")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
 _MARKED = re.compile(r"[.,'][0-9]")
-# After this many numbers such as `1.234` without any other, the search ends.
-_ENOUGH = 1000
 
 
 def refuse_commas_that_may_be_decimal(data: Sequence[SplitLine], kinds: str) -> None:
@@ -66,7 +64,8 @@ def resolve_marks(dialect: Dialect) -> Marks:
     Raises RecordingError if the rows can be read in two ways.
     """
     numbers: list[tuple[str, int, int]] = []
-    for cell in islice(_marked_cells(dialect), _ENOUGH):
+    # After 1000 numbers such as `1.234` without any other, the search ends.
+    for cell in islice(_marked_cells(dialect), 1000):
         numbers.append(cell)
         if _GROUPED.fullmatch(cell[0]) is None:
             break  # this number decides

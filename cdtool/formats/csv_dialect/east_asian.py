@@ -12,14 +12,11 @@ import re
 from collections import Counter
 from collections.abc import Callable
 
-# A text has at least this many characters of its language in words of two or more, of which so many differ.
-_LETTERS, _DIFFERENT = {"cp932": 3, "gb18030": 4}, 3
-# Minimum share of characters that are in common use, and of those in words of two or more.
-_COMMON, _IN_WORDS = 0.75, 0.5
+# A text has at least this many characters of its language in words of two or more.
+_LETTERS = {"cp932": 3, "gb18030": 4}
 # A word directly behind a small letter is part of a Latin one.
 _WORD = re.compile(r"([a-z]?)([^\x00-\x7f]+)")
 _HIGH = re.compile(rb"[\x80-\xff]")
-_DECIDING_BYTES = 1 << 14
 _SYMBOLS_OF_JAPAN = range(0x81, 0x84)
 _SYMBOLS_OF_CHINA = (0xA1, 0xA2, 0xA3, 0xA6, 0xA9)
 
@@ -43,7 +40,7 @@ def east_asian(sample: bytes) -> str | None:
     """
     first = _HIGH.search(sample)
     begin = sample.rfind(b"\n", 0, first.start()) + 1 if first else 0
-    lines = sample[begin : begin + _DECIDING_BYTES]
+    lines = sample[begin : begin + (1 << 14)]  # enough to decide
     for encoding, kind in (("cp932", _japanese), ("gb18030", _chinese)):
         try:
             text = codecs.getincrementaldecoder(encoding)().decode(lines)
@@ -68,8 +65,9 @@ def _is_plausible(words: Counter[tuple[str, str]], encoding: str, kind: Callable
             sure += kinds.count("sure")
             all_letters += count * (kinds.count("letter") + kinds.count("sure"))
             letters.update(letter for letter, of in zip(word, kinds, strict=True) if of in ("letter", "sure"))
-    enough = sure > 0 and all_letters >= _LETTERS[encoding] and len(letters) >= _DIFFERENT
-    return enough and common >= _COMMON * known and in_words >= _IN_WORDS * known
+    enough = sure > 0 and all_letters >= _LETTERS[encoding] and len(letters) >= 3
+    # Most are in common use, and at least half in words of two or more.
+    return enough and common >= 0.75 * known and in_words >= 0.5 * known
 
 
 def _japanese(character: bytes) -> str:

@@ -31,9 +31,8 @@ from cdtool.formats.csv_dialect.marks import Marks, SampleCell, find_marks
 from cdtool.formats.groups import PREFIX
 from cdtool.formats.source import stated_origin
 
+# Lines at the beginning and at the end of a sample in which separators are counted.
 _SCORED = 150
-# A strong separator that occurs equally often in this share of the lines is preferred, even with fewer numbers.
-_CONSISTENT = 0.9
 _STRONG = "\t;|"
 _SHOWN_ENCODINGS = {
     "cp1252": "Windows-1252",
@@ -41,9 +40,8 @@ _SHOWN_ENCODINGS = {
     "cp932": "Shift-JIS",
     "gb18030": "GB18030",
 }
+# Rows whose numbers are looked at for the decimal mark; marks that decide are looked for in all.
 _LOOKED = 200
-# Rows end early if so many lines, with the names and the first row, show it.
-_ENDING_EARLY = 6
 _WRITTEN = f"# {PREFIX}"
 _ORIGIN = f"{_WRITTEN}origin_s: "
 _TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
@@ -90,7 +88,8 @@ def find_separator(lines: Sequence[Line], pinned: str = "", decimal: str = "") -
         for split in possible
         if split.separator in _STRONG
         and best.separator not in _STRONG
-        and split.consistent >= _CONSISTENT
+        # A strong separator that occurs equally often in most lines is preferred, even with fewer numbers.
+        and split.consistent >= 0.9
         and split.numeric > best.numeric / 3.0
     ]
     return stronger[0] if stronger else best
@@ -218,7 +217,8 @@ def _full_width(rows: Sequence[SplitLine], width: int) -> int:
 
     Then all other rows end early: their last columns, statistics for example, have a value in the first row only.
     """
-    if len(rows) < _ENDING_EARLY or {len(row.cells) for row in rows[2:]} != {width}:
+    # Rows end early if six lines, with the names and the first row, show it.
+    if len(rows) < 6 or {len(row.cells) for row in rows[2:]} != {width}:
         return width
     names, first = rows[0], rows[1]
     wider = len(names.cells)

@@ -12,17 +12,12 @@ MEASUREMENT = b"LabVIEW Measurement"
 MEASUREMENT_END = b"***End_of_Header***"
 MEASUREMENT_HINT = "write TDMS, or one segment with all channels at one rate and one X column"
 _ALIKE = ("Samples", "Date", "Time", "X_Dimension", "X0", "Delta_X")
-# Later stamps [s] are absolute.
-_ABSOLUTE = 1e9
 # TwinCAT Scope: the key of the first line, and the keys that identify its exports.
 NAME = "Name"
 SCOPE_TITLE = "TwinCAT Scope"
 SCOPE_STARTS = ("Starttime of export", "StartRecord")
 SCOPE_KEYS = ("SymbolName", "SampleTime[ms]", "Data-Type", "SymbolBased", "IndexGroup", "NetID", "NetId", "Port")
 _SCOPE_SEPARATORS = "\t;,|: "
-_FIRST_LINES = 20
-# An export with fewer keys of channels is another table with a column Name.
-_FEWEST_KEYS = 2
 
 
 def measurement_head(lines: Sequence[str]) -> tuple[int, str, dict[str, list[str]]]:
@@ -43,7 +38,8 @@ def measurement_head(lines: Sequence[str]) -> tuple[int, str, dict[str, list[str
             reason = "it has no column of times (X_Columns No)"
         if key == "X_Dimension" and stated[:1] not in ([], ["Time"]):
             reason = f"its x axis is '{stated[0][:30]}', not Time"
-        if key == "X0" and stated and (number(stated[0].replace(",", "."), ".") or 0.0) > _ABSOLUTE:
+        # Later stamps are absolute: 1e9 s are 32 years.
+        if key == "X0" and stated and (number(stated[0].replace(",", "."), ".") or 0.0) > 1e9:
             reason = "its times count from 1904 (Time_Pref Absolute)"
         if reason:
             raise RecordingError(f"LabVIEW: {reason}", MEASUREMENT_HINT)
@@ -57,13 +53,14 @@ def is_scope_export(head: bytes) -> bool:
     text = head.replace(b"\0", b"").removeprefix(_MARK).lstrip(b"\xff\xfe").decode("utf-8", errors="replace")
     if not text.startswith((NAME, SCOPE_TITLE)):
         return False
-    first = text.splitlines()[:_FIRST_LINES]
+    first = text.splitlines()[:20]  # the keys are there
     separator = scope_separator(first)
     if separator is None:
         return False
     keys = {line.partition(separator)[0] if line[:1] != '"' else line.split('"')[1] for line in first}
     repeated = any(line.split(separator).count(NAME) > 1 for line in first if line.startswith(NAME))
-    return repeated or bool(keys & {*SCOPE_STARTS}) or len(keys & {*SCOPE_KEYS}) >= _FEWEST_KEYS
+    # A table with one key of channels is another one with a column Name.
+    return repeated or bool(keys & {*SCOPE_STARTS}) or len(keys & {*SCOPE_KEYS}) >= 2
 
 
 def scope_separator(lines: Sequence[str]) -> str | None:

@@ -14,12 +14,8 @@ from cdtool.formats.csv.lines import Line, SplitLine, is_ruler
 from cdtool.formats.csv_dialect.head_words import are_numbered, are_types, is_unit
 from cdtool.recordings.units import find_unit
 
-_LOOKED_BELOW = 4
-_SINGLE_CELL = 1
 # R's write.table writes the number of each row in quotes.
 _ROW_OF_R = re.compile(r'"1"[^"]+')
-# A single line of numbers above the names may be a setting; this many lines are rows of another table.
-_ROWS_OF_A_TABLE = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +57,7 @@ class HeadFinder:
             raise self._no_rows(rows)
         start = next(i for i, row in enumerate(rows) if row.number == first)
         pinned = sum(row.number <= int(self.pins.header or 0) for row in rows)
-        cut = rows[: max(start + _LOOKED_BELOW, pinned) + 1]
+        cut = rows[: max(start + 4, pinned) + 1]  # as far below as a head reaches
         head = self._search(cut, start, comments) if self.pins.header is None else self._find_by_pins(cut, start)
         numbers = [row.number for row in cut if row.number in head.preamble and has_numbers(row.text)]
         return replace(head, preamble=tuple(sorted((*head.preamble, *empty))), numbers=tuple(numbers))
@@ -121,7 +117,7 @@ class HeadFinder:
         for row in above:
             if row is not header and self._are_units(row) and all(map(is_unit, row.cells)):
                 return row
-            found = stated.fullmatch(row.text) if self.width == _SINGLE_CELL + 1 else None
+            found = stated.fullmatch(row.text) if self.width == 2 else None
             if found and (unit := find_unit(found[1])) and unit.si != "s":
                 return SplitLine(row.number, row.text, row.start, ["", found[1]])
         return None
@@ -243,7 +239,7 @@ class HeadFinder:
 
     def _refuse_other_width(self, above: Sequence[SplitLine], first: SplitLine) -> None:
         last = above[-1]
-        if len(last.cells) <= _SINGLE_CELL or last.number + 1 != first.number:
+        if len(last.cells) <= 1 or last.number + 1 != first.number:
             return
         hint = "pin header = false if it is not a header, or skip_lines, in [csv]"
         if self.separator == " ":
@@ -277,7 +273,8 @@ class HeadFinder:
 
 def refuse_table_above(head: Head, width: int) -> None:
     """Raise RecordingError if rows of another table are above this one: they would be lost."""
-    if len(head.numbers) < _ROWS_OF_A_TABLE:
+    # A single line of numbers above the names may be a setting; two lines are rows of another table.
+    if len(head.numbers) < 2:
         return
     below = f"the header in line {head.header_line}" if head.header else f"line {head.first_line}"
     raise RecordingError(

@@ -10,6 +10,7 @@ from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.columns import Column
 from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys, single_group
 
+# Rows that are in memory as text at once.
 _ROWS = 2**14
 
 

@@ -45,7 +45,7 @@ _CHANNEL_KEYS = (
 )
 # The head of a file may have this many bytes, and its first lines (those about the file) this many lines.
 _MOST_HEAD, _MOST_FILE_LINES = 1 << 22, 20
-_SAMPLE_ROWS = 50
+# Ticks of 100 ns, which count from 1601.
 _TICKS_PER_S, _TICKS_1970 = 1e7, 116_444_736_000_000_000
 # Ticks since 1917 have 18 digits: fewer are damaged. No export is long enough for as many milliseconds.
 _FEWEST_TICKS = 10**17
@@ -161,7 +161,8 @@ def _read_head(text: Text, raw: Sequence[bytes]) -> _ScopeHead:
     for i, line in enumerate(raw):
         cells = _cells(text.decode(line), separator)
         if of_channels and _is_row(cells):
-            rows = [_cells(text.decode(each), separator) for each in raw[i : i + _SAMPLE_ROWS]]
+            # A sample.
+            rows = [_cells(text.decode(each), separator) for each in raw[i : i + 50]]
             wide = [row for row in rows[: max(1, len(raw) - i - 1)] if len(row) > 1]
             return _ScopeHead(separator, of_file, of_channels, i + 1, start, wide)
         if cells[0] in _FILE_KEYS and i < _MOST_FILE_LINES:

@@ -27,7 +27,6 @@ _OPTIONAL = ("kind", "uncertainty_s")
 # Units of numbers, per second.
 _UNITS = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 _FORMS = (*_UNITS, "time", "row")
-_LONGEST_ROW = 15  # digits, which a float64 represents
 _FRACTION = re.compile(r"[.,](\d+)")
 _ZONE = re.compile(r"(?P<sign>[+-])(?P<hours>\d\d):?(?P<minutes>\d\d)|[Zz]")
 _DATED = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d")
@@ -202,7 +201,7 @@ def _moment(row: NamedRow, column: str, form: str, offset: timezone | None, zone
     if form == "time":
         return _date(row, column, text, offset, zoned)
     if form == "row":
-        if not text.isascii() or not text.isdigit() or len(text) > _LONGEST_ROW:
+        if not text.isascii() or not text.isdigit() or len(text) > 15:  # digits, which a float64 represents
             raise row.fault(f"{column} is '{text[:40]}'", "give the number of a row, the first being 0")
         return float(text)
     try:  # whole numbers, such as nanoseconds since 1970, are divided without rounding them first

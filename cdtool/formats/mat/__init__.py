@@ -19,13 +19,11 @@ from cdtool.formats.containers.container_checks import library, open_hdf5
 from cdtool.formats.epoch_clock import EpochClock
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.clock_beside import assumed_clock, is_clock_name
-from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
+from cdtool.formats.mat.datenum import DAY_1970, is_datenum, since_first
 from cdtool.formats.mat.layout import MatLayout, arrange_columns
 from cdtool.formats.mat.variables import MatColumn, Variables
 from cdtool.formats.slices import Container, SlicedColumn, SlicedFormat, rows_of
-
-# So many single numbers and texts of a file are shown.
-_MOST_DETAILS = 60
+from cdtool.recordings.units import DAY_S
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,7 @@ def _clock(container: Container, layout: MatLayout, name: str) -> EpochClock:
 
 def _details(layout: MatLayout) -> dict[str, str]:
     """Return the first single numbers and texts of a file, and how many more there are."""
-    shown = list(islice((*layout.numbers, *layout.texts), _MOST_DETAILS))
+    shown = list(islice((*layout.numbers, *layout.texts), 60))
     numbers = {name: f"{layout.numbers[name].read().ravel()[0]:g}" for name in shown if name in layout.numbers}
     texts = {name: layout.texts[name] for name in shown if name in layout.texts}
     more = len(layout.numbers) + len(layout.texts) - len(shown)

@@ -9,12 +9,11 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.columns import as_float64
+from cdtool.formats.epoch_clock import SHORTEST_STEP
+from cdtool.recordings.units import DAY_S
 
-DAY_S = 86400.0
 # The datenum of 1970-01-01, and of the start of the years 2000 and 2100.
 DAY_1970, _FIRST, _LAST = 719_529, 730_486.0, 767_011.0
-# A clock in days steps by less than 4 s; a clock in seconds that steps by less samples above 20 kHz.
-_STEP = 5e-5
 
 
 def is_datenum(stamps: npt.NDArray[Any]) -> bool:
@@ -28,7 +27,7 @@ def is_datenum(stamps: npt.NDArray[Any]) -> bool:
         return False
     steps = np.diff(known)
     steps = steps[steps > 0.0]
-    return bool(len(steps) and np.median(steps) < _STEP)
+    return bool(len(steps) and np.median(steps) < SHORTEST_STEP)
 
 
 def since_first(stamps: npt.NDArray[Any]) -> tuple[FloatArray, float]:

@@ -12,10 +12,6 @@ from cdtool.base.findings import Finding
 from cdtool.formats.mat.clock_beside import is_clock_name
 from cdtool.formats.mat.variables import MatColumn, Numbers, Value, Variables, left_out
 
-_DETAIL = 80
-# A matrix in a struct with more columns than this is an image or a model.
-_WIDEST = 64
-
 
 @dataclass(frozen=True)
 class Leaf:
@@ -74,7 +70,7 @@ class MatLayout:
             self._array(value, name, last, structs)
         elif isinstance(value, str):
             if text := " ".join(value.split()):
-                self.texts[name] = text[:_DETAIL]
+                self.texts[name] = text[:80]
         elif isinstance(value, list):
             self._structs(value, name, structs)
         elif isinstance(value, tuple):
@@ -88,7 +84,8 @@ class MatLayout:
             self.findings.append(left_out(name, f"{' x '.join(map(str, shape))} array"))
         elif shape == (1, 1):
             self.numbers[name] = value
-        elif structs and min(shape) > _WIDEST:
+        # A larger matrix in a struct is an image or a model.
+        elif structs and min(shape) > 64:
             self.findings.append(left_out(name, f"{shape[0]} x {shape[1]} matrix, too wide for a log"))
         else:
             leaf = Leaf(name, last, structs, value)

@@ -25,19 +25,16 @@ from cdtool.formats.containers.container_checks import check_size
 from cdtool.formats.mat.variables import Numbers, Opaque, Value, ValueCount, Variables
 
 MAGIC = b"MATLAB 5.0 MAT-file"
-_HEADER = 128
-_MATRIX, _COMPRESSED = 14, 15
+# Of the format of MathWorks (MAT-File Format, 1999): bytes of the header, types of elements.
+_HEADER, _MATRIX, _COMPRESSED = 128, 14, 15
 _NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _ENCODINGS = {1: "latin-1", 2: "latin-1", 4: "utf-16-{}", 16: "utf-8", 17: "utf-16-{}", 18: "utf-32-{}"}
-_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16, 17
+_CELL, _STRUCT, _CHAR = 1, 2, 4  # classes of arrays
 _NUMERIC_CLASSES = range(6, 16)
-_COMPLEX = 1 << 11
-# MATLAB has at most 32 dimensions, of four bytes each.
-_MOST_DIMENSION_BYTES = 128
 # Up to the two dimensions of a matrix.
 _HEAD = 40
 # Texts are shown, not evaluated: of a longer one the beginning is kept.
-_LONGEST_TEXT = 4096
+LONGEST_TEXT = 4096
 
 
 def read_variables(path: Path) -> Variables:
@@ -117,15 +114,15 @@ class _Version5Reader:
         if len(flags) != 2:
             raise ValueError("an array without its flags")
         matlab_class = flags[0] & 0xFF
-        if matlab_class == _OPAQUE:
+        if matlab_class == 17:  # opaque
             name, _, what = (parts.name() for _ in range(3))
             return name, Opaque(what or "object")
-        shape = tuple(parts.integers((5, 6), _MOST_DIMENSION_BYTES))
+        shape = tuple(parts.integers((5, 6), 128))  # MATLAB has at most 32 dimensions, of four bytes each
         if len(shape) < 2 or min(shape) < 0:
             raise ValueError("an array without its dimensions")
         name = parts.name()
         if matlab_class in _NUMERIC_CLASSES:
-            is_complex = bool(flags[0] & _COMPLEX)
+            is_complex = bool(flags[0] & (1 << 11))  # the flag of complex numbers
             read = [self._numbers(parts, shape) for _ in range(1 + is_complex)]
             return name, Numbers(shape, read[0], is_complex)
         if matlab_class == _CHAR:
@@ -134,9 +131,9 @@ class _Version5Reader:
             return name, tuple(self._inner(parts, math.prod(shape), level))
         if matlab_class == _STRUCT:
             return name, self._structs(parts, math.prod(shape), level)
-        if matlab_class == _OBJECT:
+        if matlab_class == 3:
             return name, Opaque(f"{parts.name()} object")
-        what = {_SPARSE: "sparse matrix", _FUNCTION: "function handle"}.get(matlab_class, f"class {matlab_class}")
+        what = {5: "sparse matrix", 16: "function handle"}.get(matlab_class, f"class {matlab_class}")
         return name, Opaque(what)
 
     def _numbers(self, parts: _Parts, shape: tuple[int, ...]) -> partial[npt.NDArray[Any]]:
@@ -157,7 +154,7 @@ class _Version5Reader:
         text = bytes(part).decode(encoding, "replace")
         if len(shape) == 2 and shape[0] > 1 and len(text) == math.prod(shape):
             text = " ".join(text[row :: shape[0]].strip() for row in range(shape[0]))
-        return text[:_LONGEST_TEXT]
+        return text[:LONGEST_TEXT]
 
     def _structs(self, parts: _Parts, count: int, level: int) -> list[dict[str, Value]]:
         length, (_, stored) = (parts.integers((5, 6), 4) or [0])[0], parts.next()
@@ -203,7 +200,7 @@ class _Parts:
 
     def name(self) -> str:
         """Return a name."""
-        return bytes(self.expect(_ENCODINGS)[:_LONGEST_TEXT]).decode("utf-8", "replace")
+        return bytes(self.expect(_ENCODINGS)[:LONGEST_TEXT]).decode("utf-8", "replace")
 
 
 def _unique(name: str, taken: dict[str, Any]) -> str:

@@ -18,16 +18,16 @@ import numpy.typing as npt
 
 from cdtool.formats.containers.container_checks import check_chunks, check_size
 from cdtool.formats.mat.variables import Numbers, Opaque, Value, ValueCount, Variables
+from cdtool.formats.mat.version_5 import LONGEST_TEXT
 
-_USER_BLOCK, _MAGIC, _HDF5 = 512, b"MATLAB 7.", b"\x89HDF\r\n\x1a\n"
+_MAGIC, _HDF5 = b"MATLAB 7.", b"\x89HDF\r\n\x1a\n"
 _COMPLEX = ("real", "imag")
-_MOST_DIMENSIONS, _LONGEST_TEXT = 32, 4096
 
 
 def is_version_73(path: Path) -> bool:
     """Return whether the file starts like MATLAB version 7.3: a MATLAB header, followed by HDF5."""
     with path.open("rb") as file:
-        head = file.read(_USER_BLOCK + len(_HDF5))
+        head = file.read(512 + len(_HDF5))  # the user block, then HDF5
     return head.startswith(_MAGIC) and head.endswith(_HDF5)
 
 
@@ -59,7 +59,7 @@ class _Version73Reader:
         if "MATLAB_object_decode" in node.attrs:
             return Opaque(matlab_class or "object")
         shape = _shape(node)
-        if "MATLAB_empty" in node.attrs and 0 < node.size <= _MOST_DIMENSIONS:  # its values are the dimensions
+        if "MATLAB_empty" in node.attrs and 0 < node.size <= 32:  # its values are the dimensions, of MATLAB's 32
             check_chunks(self._path, node.name, node)
             shape = tuple(int(size) for size in node[()].ravel().tolist())
             empty: dict[str, Value] = {"cell": (), "struct": [], "char": ""}
@@ -107,7 +107,7 @@ class _Version73Reader:
             yield self._value(self._file[reference], level + 1) if reference else Opaque("damaged reference")
 
     def _text(self, dataset: Any) -> str:
-        if dataset.dtype.kind not in "iu" or not 0 < dataset.size <= _LONGEST_TEXT:
+        if dataset.dtype.kind not in "iu" or not 0 < dataset.size <= LONGEST_TEXT:
             return "" if not dataset.size else "..."
         check_chunks(self._path, dataset.name, dataset)
         codes = np.asarray(dataset[()]).astype("<u2").reshape(dataset.shape[0], -1).T

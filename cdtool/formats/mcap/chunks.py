@@ -15,11 +15,10 @@ import numpy.typing as npt
 
 from cdtool.formats.mcap.records import LARGEST, PREFIX, DamageError, RefusedError, crc32
 
-# The largest compression ratio: sensor data has ratios of 2 to 50, but small chunks may be all zeros.
-LARGEST_SHARE, _SMALL = 250, 16 << 20
+# The largest compression ratio: sensor data has ratios of 2 to 50.
+LARGEST_SHARE = 250
 # Long logs contain motion, so that their ratio is smaller. lz4 cannot reach the larger ratio.
 _LONG, _LONG_SHARE = 1 << 30, 100
-_LZ4_FRAMES = 1000  # the largest number in a chunk; writers make one
 _LZ4_OUT = 8 << 20  # lz4's decompressor needs memory for the most that it may return [bytes]
 
 _FIXED = struct.Struct("<BQQQQII")  # opcode, content length, three sizes, CRC, length of the compression's name
@@ -58,7 +57,7 @@ class ChunkHeader(NamedTuple):
             raise DamageError(
                 f"a chunk declares {max(self.size, self.uncompressed_size)} bytes, more than {LARGEST >> 20} MiB"
             )
-        if self.uncompressed_size > max(_SMALL, LARGEST_SHARE * self.size):
+        if self.uncompressed_size > max(16 << 20, LARGEST_SHARE * self.size):  # small chunks may be all zeros
             raise RefusedError(f"{self.size} bytes declare {self.uncompressed_size} uncompressed: not decompressed")
 
 
@@ -131,7 +130,7 @@ def _lz4(packed: Bytes, target: Bytes) -> int:
 
     size, filled, left = len(target), 0, packed.data
     try:
-        for _ in range(_LZ4_FRAMES):  # consecutive frames, as in a file
+        for _ in range(1000):  # consecutive frames, as in a file; writers make one
             frame = lz4.frame.LZ4FrameDecompressor()
             while not frame.eof and (len(left) or not frame.needs_input):
                 data, left = left, left[:0]

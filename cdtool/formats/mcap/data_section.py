@@ -17,6 +17,7 @@ from collections.abc import Generator, Iterator
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.base.files.bounded_loading import MIB
 from cdtool.formats.bags.topic_log import Messages
 from cdtool.formats.mcap import messages
 from cdtool.formats.mcap.chunks import (
@@ -35,12 +36,10 @@ from cdtool.formats.mcap.messages import Positions, Walk
 from cdtool.formats.mcap.records import LARGEST, MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
 from cdtool.formats.mcap.summary import McapSummary, matches_header
 
-_LONGEST_TEXT = 1 << 16
-
 
 def check_attachment(file: FileBytes, at: int, length: int, *, with_crc: bool = True) -> None:
     """Check the attachment record of `length` bytes at byte `at`, its content `with_crc`; raises DamageError."""
-    head = file.read(at + PREFIX, min(length - PREFIX, 2 * _LONGEST_TEXT))
+    head = file.read(at + PREFIX, min(length - PREFIX, 1 << 17))  # two texts
     try:
         offset = 16  # after two times
         for _ in range(2):
@@ -61,8 +60,6 @@ def check_attachment(file: FileBytes, at: int, length: int, *, with_crc: bool = 
 # Chunks are joined up to this size [bytes]: messages of many small ones are then decoded together.
 JOINED = 1 << 23
 _SPARE = 8  # bytes after the last message in memory, so that all messages can be gathered in whole words
-_WINDOW = 1 << 20  # bytes of records outside of chunks that are read at once
-_SEARCHED = 1 << 20  # bytes that are searched at once for the next chunk
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 Block = list[Messages]
 _INDEX_HEAD = PREFIX + 6  # before the entries of a message index: prefix, channel id, length of the entries
@@ -242,7 +239,7 @@ class DataSection:
         """Yield the records outside of chunks that fit into a window, and return the byte after them."""
         if length > LARGEST:
             raise DamageError(f"a record declares {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
-        size = min(max(_WINDOW, length), self._file.size - at)
+        size = min(max(MIB, length), self._file.size - at)
         yield from self._make_room(size, covered=False)
         window = self._memory[self._size : self._size + size]
         self._file.read_into(at, window)
@@ -381,7 +378,7 @@ class Resync:
 def next_chunk(file: FileBytes, at: int) -> int | None:
     """Return the first byte from `at` where a chunk may start: its sizes and its compression are consistent."""
     while at < file.size - HEADER_LENGTH:
-        window = file.array(at, _SEARCHED + HEADER_LENGTH)
+        window = file.array(at, MIB + HEADER_LENGTH)
         last = len(window) - HEADER_LENGTH
         candidates = window[:last] == int(Opcode.CHUNK)
         for i in range(PREFIX - 4, PREFIX):  # a length below 4 GiB
@@ -390,5 +387,5 @@ def next_chunk(file: FileBytes, at: int) -> int | None:
             header = chunk_header(at + offset, window[offset : offset + HEADER_LENGTH].data)
             if header is not None and header.consistent and header.size <= LARGEST:
                 return header.at
-        at += _SEARCHED
+        at += MIB
     return None

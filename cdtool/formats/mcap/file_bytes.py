@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.base.files.bounded_loading import MIB
 from cdtool.formats.mcap.chunks import Bytes
 from cdtool.formats.mcap.records import DamageError, crc32
 
-_PIECE = 1 << 20
 _MOST_AT_ONCE = 1 << 30  # macOS refuses to read 2 GiB and more in one call
 
 
@@ -63,9 +63,9 @@ class FileBytes:
 
     def crc(self, at: int, end: int) -> int:
         """Return the CRC-32 of the bytes from `at` to before `end`."""
-        crc, target = 0, np.empty(_PIECE, np.uint8)
+        crc, target = 0, np.empty(MIB, np.uint8)
         while at < end:
-            piece = target[: min(_PIECE, end - at)]
+            piece = target[: min(MIB, end - at)]
             self.read_into(at, piece)
             crc = crc32(piece, crc)
             at += len(piece)

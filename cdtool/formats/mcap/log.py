@@ -20,8 +20,6 @@ from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, pars
 from cdtool.formats.mcap.summary import between_chunks, matches_header, read_summary, unwanted_chunks
 from cdtool.formats.source import TopicDetails
 
-_LONGEST_HEADER = 1 << 12
-
 
 class Log(TopicLog):
     """An MCAP file; `counts` are the messages by channel.
@@ -177,7 +175,7 @@ def header_of(file: FileBytes) -> tuple[str, int]:
     """Return the profile that the file's header states, such as `ros2`, and the byte after the header."""
     head = file.read(len(MAGIC), PREFIX)
     length, at = int.from_bytes(head[1:], "little"), len(MAGIC) + PREFIX
-    if len(head) < PREFIX or head[0] != Opcode.HEADER or length > _LONGEST_HEADER:
+    if len(head) < PREFIX or head[0] != Opcode.HEADER or length > 1 << 12:  # two short texts
         return "", len(MAGIC)
     try:
         return str(parse(Opcode.HEADER, file.read(at, length)).profile), at + length

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cdtool.base.findings import Finding
+from cdtool.base.plain_text import LISTED
 from cdtool.formats.mcap.chunks import ChunkHeader
 from cdtool.formats.mcap.summary import McapSummary
-
-_LISTED = 10
 
 
 @dataclass
@@ -63,8 +62,8 @@ class Losses:
     def findings(self, count: int, origin: int) -> list[Finding]:
         """Return one finding per loss (the first ones, then the number of others), and one per reason for messages."""
         last = self.entries[-1] if self.stopped and self.entries else None
-        findings = [self._finding(loss, loss is last, count, origin) for loss in self.entries[:_LISTED]]
-        rest = self.entries[_LISTED:]
+        findings = [self._finding(loss, loss is last, count, origin) for loss in self.entries[:LISTED]]
+        rest = self.entries[LISTED:]
         if rest:
             more = {
                 "places": len(rest),

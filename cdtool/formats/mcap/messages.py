@@ -24,7 +24,7 @@ NO_KIND = "a record of kind 0, which does not exist"
 TOO_LONG = "a record declares more bytes than are left in its chunk"
 SHORT_MESSAGE = "a message shorter than its header"
 OTHER_KIND = "a record that is not one of a chunk"
-_HEADER = 22  # bytes of a message before its payload: channel id, sequence, two times
+HEADER = 22  # bytes of a message before its payload: channel id, sequence, two times
 _PREFIX = struct.Struct("<BQ")
 _MESSAGE, _DEFINITIONS = int(Opcode.MESSAGE), (int(Opcode.SCHEMA), int(Opcode.CHANNEL))
 Positions = npt.NDArray[np.int64]
@@ -52,7 +52,7 @@ def walk(content: Bytes, at: int = 0, top_level: bool = False) -> Walk:
             if PREFIX + length > size - at:
                 reason = TOO_LONG
                 break
-            if length < _HEADER:
+            if length < HEADER:
                 reason = SHORT_MESSAGE
                 break
             records.append(at)
@@ -72,10 +72,10 @@ def walk_by_indexes(content: Bytes, records: Positions) -> Walk:
     """Return the same for a chunk, whose message indexes name these bytes as those of its messages."""
     size = len(content)
     records = np.sort(records)
-    if not len(records) or records[0] < 0 or records[-1] > size - PREFIX - _HEADER:
+    if not len(records) or records[0] < 0 or records[-1] > size - PREFIX - HEADER:
         return walk(content)
     lengths = numbers_at(content, records + 1, "<u8")
-    if (content[records] != _MESSAGE).any() or (lengths < _HEADER).any() or (lengths > size).any():
+    if (content[records] != _MESSAGE).any() or (lengths < HEADER).any() or (lengths > size).any():
         return walk(content)
     ends = records + PREFIX + lengths.astype(np.int64)
     following = np.append(records[1:], size)
@@ -98,8 +98,8 @@ def by_channel(data: Bytes, records: Positions) -> Iterator[tuple[int, Batch]]:
     order = np.argsort(channels, kind="stable")
     records, channels = records[order], channels[order]
     times = log_times(data, records)
-    lengths = numbers_at(data, records + 1, "<u8").astype(np.int64) - _HEADER
-    starts = records + PREFIX + _HEADER
+    lengths = numbers_at(data, records + 1, "<u8").astype(np.int64) - HEADER
+    starts = records + PREFIX + HEADER
     borders = np.flatnonzero(np.append(len(channels) > 0, channels[1:] != channels[:-1]))
     for begin, end in zip(borders, np.append(borders[1:], len(channels)), strict=True):
         rows = slice(begin, end)

@@ -25,8 +25,6 @@ from cdtool.formats.mcap.records import (
 )
 
 _FOOTER = PREFIX + 20  # a footer is never extended
-# The message indexes of a chunk that are read as a whole [bytes].
-_SHORT = 1 << 12
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ def between_chunks(summary: McapSummary) -> Iterator[tuple[int, int]]:
     for at, index in summary.chunks.items():
         yield at, at + HEADER_LENGTH
         end, length = at + index.chunk_length, index.message_index_length
-        if length <= _SHORT:
+        if length <= 1 << 12:  # read as a whole
             yield end, end + length + HEADER_LENGTH
             continue
         for start in index.message_index_offsets.values():

@@ -19,7 +19,6 @@ import numpy.typing as npt
 from cdtool.base.arrays import FloatArray
 from cdtool.formats.messages.schemas import DEFINITIONS
 
-_SECOND = 10**9
 # What no recording contains: the number from which the marks of a layout are made, and the stamp of a layout.
 _MARK, _STAMP = 1.2345678987654321e287, b"\x5a\xa5\x3c\x12\x69\x96\xc3\x0f"
 
@@ -43,7 +42,7 @@ def write_mcap(path: Path, streams: Sequence[Stream], start_ns: int = 0) -> None
     """Write the streams in the order of their times; `start_ns` is the log time of time 0."""
     from mcap.writer import Writer
 
-    stamps = [start_ns + np.rint(stream.time * _SECOND).astype(np.int64) for stream in streams]
+    stamps = [start_ns + np.rint(stream.time * 10**9).astype(np.int64) for stream in streams]
     messages = [_messages(stream, own) for stream, own in zip(streams, stamps, strict=True)]
     with path.open("wb") as file:
         writer: Any = Writer(file)
@@ -86,7 +85,7 @@ def _messages(stream: Stream, stamps: npt.NDArray[np.int64]) -> npt.NDArray[np.u
         message.name = list(stream.names) or [f"joint_{i}" for i in range(width)]
     if hasattr(message, "header"):
         message.header.stamp.sec, message.header.stamp.nanosec = struct.unpack("<iI", _STAMP)
-        columns.append((_STAMP, np.column_stack(np.divmod(stamps, _SECOND)).astype("<i4")))
+        columns.append((_STAMP, np.column_stack(np.divmod(stamps, 10**9)).astype("<i4")))
     template = bytes(store.serialize_cdr(message, stream.schema))
     rows = np.tile(np.frombuffer(template, np.uint8), (len(stamps), 1))
     for mark, column in columns:

@@ -8,10 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-# MCAP Message record (op=0x05): channel id (uint16), sequence (uint32), log time, publish time (uint64 each), payload.
-# Distances [bytes] of two of these from the start of the payload:
-_SEQUENCE, _PUBLISH_TIME = 20, 8
-
 
 @dataclass(frozen=True)
 class Stream:
@@ -46,12 +42,12 @@ class Batch:
     @property
     def publish_time(self) -> npt.NDArray[np.uint64]:
         """Publish times (n,) in ns, read from the message records."""
-        return numbers_at(self.data, self.start - _PUBLISH_TIME, "<u8")
+        return numbers_at(self.data, self.start - 8, "<u8")  # the last field before the payload
 
     @property
     def sequence(self) -> npt.NDArray[np.uint32]:
         """Sequence numbers (n,), read from the message records."""
-        return numbers_at(self.data, self.start - _SEQUENCE, "<u4")
+        return numbers_at(self.data, self.start - 20, "<u4")  # before the log time and the publish time
 
     def payload(self, row: int) -> bytes:
         """Return the bytes of one message."""

@@ -24,7 +24,6 @@ DECODED, DAMAGED = 0, 1
 PRESENT, OTHER_JOINTS, ABSENT = 0, 1, 2
 # The most fields of a topic in a survey: no recorder writes as many, but each is a column.
 MOST_FIELDS = 4096
-_LATEST = 9_223_372_035  # s: the largest time stamp in ns that fits an int64
 
 
 # What the field language finds in a message: a number, an array, or why it finds none.
@@ -193,7 +192,8 @@ def _header_times(n: int, groups: Sequence[MessageGroup]) -> tuple[IntArray, npt
             pair = group.read([float(part) for part in parts]) if parts is not None else np.empty((0, 2))
         except (TypeError, ValueError, OverflowError):  # seconds or nanoseconds are not numbers
             continue
-        usable = (np.abs(pair[:, 0]) <= _LATEST) & (np.abs(pair[:, 1]) <= 2**53)
+        # The largest stamp in ns that fits an int64.
+        usable = (np.abs(pair[:, 0]) <= 9_223_372_035) & (np.abs(pair[:, 1]) <= 2**53)
         rows, whole = group.rows[: len(pair)][usable], pair[usable].astype(np.int64)
         times[rows], has_stamp[rows] = whole[:, 0] * 10**9 + whole[:, 1], True
     return times, has_stamp

@@ -27,7 +27,6 @@ _TYPES = (
 _FIXED = {"double": "<f8", "fixed64": "<u8", "sfixed64": "<i8", "float": "<f4", "fixed32": "<u4", "sfixed32": "<i4"}
 # Wire types.
 _VARINT, _EIGHT, _BLOCK, _FOUR = 0, 1, 2, 5
-_DEEPEST, _LONGEST_VARINT = 100, 10  # as in the package
 
 
 def protobuf_decoder(name: str, data: bytes) -> SchemaDecoder:
@@ -104,7 +103,7 @@ class _FieldWalk:
 
     def message(self, layout: Layout, content: dict[str, Any], end: int, depth: int) -> None:
         """Read fields up to byte `end` into `content`."""
-        if depth > _DEEPEST:
+        if depth > 100:  # as in the package
             raise self._not_protobuf()
         while self._at < end:
             key = self._varint(end)
@@ -175,7 +174,7 @@ class _FieldWalk:
 
     def _varint(self, end: int, shared_bits: int = 0xFF) -> int:
         value, begin = 0, self._at
-        for k, byte in enumerate(self._payload[begin : min(begin + _LONGEST_VARINT, end)]):
+        for k, byte in enumerate(self._payload[begin : min(begin + 10, end)]):  # bytes of 64 bits
             value |= (byte & 0x7F) << (7 * k)
             if byte < 0x80:
                 self._at = begin + k + 1

@@ -15,17 +15,14 @@ from cdtool.formats.messages.alike import DamagedMessageError, Example
 from cdtool.formats.messages.decoded_batch import UndecodableError
 from cdtool.formats.messages.layout import TEXT, Layout, Member
 
-_HEADER = 4
 PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a multiple of 4
-# Members that a message may have beyond one per byte: a schema of a hundred lines can nest any number of empty ones.
-_MOST_MEMBERS = 20_000
 
 
 def walk_cdr(layout: Layout, payload: bytes) -> Example:
     """Return the layout of a message; raises DamagedMessageError."""
-    if len(payload) < _HEADER or payload[0] or payload[1] > 1:
+    if len(payload) < 4 or payload[0] or payload[1] > 1:
         raise DamagedMessageError(f"not plain CDR (starts with {payload[:4].hex() or 'nothing'})")
-    walk = _Walk(layout, payload, _HEADER, is_big=not payload[1])
+    walk = _Walk(layout, payload, 4, is_big=not payload[1])
     walk.example.share(0, 2)
     return walk.finished()
 
@@ -43,7 +40,8 @@ class _Walk:
         self.at = header
         self._layout, self._payload, self._header = layout, payload, header
         self._order, self._code = ("big", ">") if is_big else ("little", "<")
-        self._left = _MOST_MEMBERS + len(payload)
+        # One member per byte, and others: a schema of a hundred lines can nest any number of empty ones.
+        self._left = 20_000 + len(payload)
 
     def finished(self) -> Example:
         """Walk the whole message; raises DamagedMessageError, or UndecodableError for a schema that is too large."""

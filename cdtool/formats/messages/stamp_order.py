@@ -14,9 +14,6 @@ from cdtool.base.findings import Finding
 
 Stamps = npt.NDArray[np.uint64] | npt.NDArray[np.int64]
 
-# Recorders with several threads write messages a few periods late; a larger step back means that the clock was reset.
-_PERIODS = 10
-
 
 @dataclass
 class _Order:
@@ -57,7 +54,8 @@ class StampOrders:
         findings = []
         for order in self._orders.values():
             if order.late:
-                is_set_back = order.back > _PERIODS * (order.highest - order.lowest) / max(1, order.count - 1)
+                # Recorders with several threads write messages a few periods late; after ten, the clock was reset.
+                is_set_back = order.back > 10 * (order.highest - order.lowest) / max(1, order.count - 1)
                 fact = {
                     "count": order.late,
                     "messages": order.count,

@@ -24,9 +24,6 @@ from cdtool.formats.messages.fields import FieldMissingError, element_names, mis
 from cdtool.formats.messages.stamp_order import StampOrders, Stamps
 from cdtool.recordings.recording import GROUND_TRUTH
 
-# The messages in which the names of other joints are looked for.
-_FIRST = 10
-
 
 class FieldRows(NamedTuple):
     """One field in a batch's messages that name its joints: time stamps [ns], exact times [s] if the log has them."""
@@ -113,7 +110,8 @@ class Topic:
         for text, each in self.fields.items():
             each.add(fields[text], whole, stamps, exact)
             if each.elsewhere and not each.names:
-                contents = self.decoders.contents(stream, batch.rows(slice(_FIRST)))
+                # The names of other joints are looked for in ten messages.
+                contents = self.decoders.contents(stream, batch.rows(slice(10)))
                 each.names = sorted({name for content in contents for name in element_names(content)})
 
     def _check(self, decoded: DecodedBatch, whole: BoolArray) -> None:

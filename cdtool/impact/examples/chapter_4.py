@@ -14,8 +14,8 @@ from cdtool.impact.transmissions.transmission_simulation import SimulatedMotion,
 TRANSMISSION = RigidTransmission(inertia=2.35e-4, friction=0.03, ratio=0.015)
 TORQUE = ConstantTorque(0.5)
 CONTACT = HuntCrossley(stiffness=9.8261e8, damping=2.9478e8, exponent=1.5)
+#: Not stated in the thesis [m]: the gap with which the touch is at its 408 ms.
 GAP = 0.1
-"""Not stated in the thesis [m]: the gap with which the touch is at its 408 ms."""
 
 ELASTIC = ElasticTransmission(motor_inertia=1e-4, load_mass=0.6, ratio=0.015, stiffness=100.0)
 """J_m + M_l r^2 = J_t of Table 4.1; the thesis has no numbers for its figure 4.7."""
@@ -32,7 +32,7 @@ RANKED = ImpactCase(
 )
 """Figure 4.10: the same drive with some damping against a linear obstacle at a tenth of the limit 4.36."""
 
-_RATED = 0.5 / 0.015
+_RATED = 0.5 / 0.015  # N, from the torque and the pulley of Table 4.1
 _COUNT = 2.0 * math.pi * 0.015 / 4096
 SENSORS = (
     Sensor("load_cell", "at the contact", "contact_force", "N", 0.001 * _RATED, 0.0, 500.0, 1000.0),

@@ -15,7 +15,9 @@ from cdtool.impact.drives import Drive
 from cdtool.impact.effort import bounded
 from cdtool.impact.transmissions.transmission import Transmission
 
+# More is a load that chatters: its contacts become ever shorter, without an end.
 _MOST_CONTACTS = 200
+# A contact may be far shorter than the time between two samples of the whole.
 _SAMPLES_PER_CONTACT = 1000
 _SETTINGS: dict[str, Any] = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-13, "dense_output": True}
 

@@ -14,10 +14,6 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.recordings.recording import Recording, Series
 
-# A step longer than this many usual steps of a channel is a gap: nothing is interpolated across it.
-_GAP_STEPS = 3.5
-# A time closer to a sample than this share of a step is that sample's.
-_SAME_TIME = 1e-3
 # Fewer samples than this [-] are no run.
 _FEWEST_SAMPLES = 50
 
@@ -108,10 +104,11 @@ def _interpolated(series: Series, joint: int, clock: FloatArray) -> FloatArray:
     if len(time) < 2:
         return np.full(len(clock), np.nan)
     usual = float(np.median(np.diff(time)))
-    near = _SAME_TIME * usual
+    near = 1e-3 * usual  # a time closer to a sample is that sample's
     found: FloatArray = np.interp(clock, time, values)
     after = np.clip(np.searchsorted(time, clock, side="left"), 1, len(time) - 1)
-    in_gap = (time[after] - time[after - 1] > _GAP_STEPS * usual) & (clock > time[after - 1] + near)
+    # A step longer than 3.5 usual steps of a channel is a gap: nothing is interpolated across it.
+    in_gap = (time[after] - time[after - 1] > 3.5 * usual) & (clock > time[after - 1] + near)
     found[in_gap & (clock < time[after] - near)] = np.nan
     found[(clock < time[0] - near) | (clock > time[-1] + near)] = np.nan
     return found

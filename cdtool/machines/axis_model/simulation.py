@@ -14,10 +14,9 @@ from cdtool.machines.axis_model.obstacle import Obstacle
 from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive
 
 # The classical Runge-Kutta method is stable up to 2.78 and accurate well below [-].
-_LARGEST_STEP = 0.5
-_FEWEST_SUBSTEPS, _MOST_SUBSTEPS = 4, 400
-# Where nothing is said, this drive runs as if it had one stiffness.
-_NEVER = 1e12
+LARGEST_STEP = 0.5
+# Where nothing is said, a drive runs as if it had one stiffness.
+NEVER = 1e12
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,13 +116,18 @@ def substeps(model: AxisModel, period: float, obstacle: Obstacle | None = None) 
         rates.append(math.sqrt((obstacle.steepest + _finite(drive.front_stiffness)) / struck))
     if model.controller is not None and model.controller.force_lag > 0.0:
         rates.append(1.0 / model.controller.force_lag)
-    needed = math.ceil(max(rates) * period / _LARGEST_STEP)
-    if needed > _MOST_SUBSTEPS:
+    return integration_steps(max(rates), period)
+
+
+def integration_steps(fastest: float, period: float) -> int:
+    """Return the steps per period [s] for the fastest rate [1/s] of a model; raises ConfigurationError."""
+    needed = math.ceil(fastest * period / LARGEST_STEP)
+    if needed > 400:  # at 1 ms a rate of 2e5 1/s: no drive oscillates at 30 kHz
         raise ConfigurationError(
             f"the model needs {needed} integration steps per {period:g} s",
             "a stiffness is too large for its mass, or friction.smoothing_speed too small: leave the stiffness out",
         )
-    return max(needed, _FEWEST_SUBSTEPS)
+    return max(needed, 4)  # fewer would not save time that matters
 
 
 def wind_up_at(drive: ElasticDrive, force: float) -> float:
@@ -161,7 +165,7 @@ def _numbers(model: AxisModel, period: float) -> tuple[float, ...]:
     values["rigid"] = float(drive.is_rigid)
     if drive.is_rigid:
         values["stiffness"] = 0.0
-    values["take_up_travel"] = min(drive.take_up_travel, _NEVER)
+    values["take_up_travel"] = min(drive.take_up_travel, NEVER)
     if drive.front_mass > 0.0 and not math.isfinite(drive.front_stiffness):
         values["front_mass"], values["load_mass"] = 0.0, drive.load_mass
     return tuple(float(values[name]) for name in axis_loop_kernel.PARAMETER_ORDER)

@@ -13,18 +13,15 @@ from cdtool.base.findings import Finding
 from cdtool.machines.plausibility.check import ChannelCheck
 from cdtool.machines.plausibility.windows import windows_of
 from cdtool.recordings.recording import Recording
+from cdtool.recordings.units import STANDARD_GRAVITY
 
 # Compared are changes of both channels above this share of the usual largest, and this multiple of their noise.
 _LARGE, _ABOVE_NOISE = 0.2, 3.0
 # At least so many changes. All but this share of them have the same sign if the channels are related; of unrelated ones
 # more than the second share have either. The size is sure if half of them lie within this share of it.
-_FEWEST, _ODD, _EITHER, _SPREAD = 12, 0.1, 0.25, 0.3
-# A change below this share of what the speed says is none.
-_STILL = 0.1
+_FEWEST, _ODD = 12, 0.1
 # A size that is right: filters, jitter and an elastic drive change it by less; and the next unit is further away.
 _LEAST, _MOST = 0.7, 1.4
-# A factor between two units is named if it is within this share: noise and filters change that of an accelerometer.
-_NEAR = 0.15
 _FACTORS = (
     (180.0 / np.pi, "deg and rad"),
     (1000.0, "mm and m, or ms and s"),
@@ -34,7 +31,7 @@ _FACTORS = (
     (2.0 * np.pi, "turns and rad"),
 )
 _OF_SPEED = ((60.0 / (2.0 * np.pi), "rpm and rad/s"), (6.0, "rpm and deg/s"))
-_OF_ACCELERATION = ((9.80665, "g and m/s2"),)
+_OF_ACCELERATION = ((STANDARD_GRAVITY, "g and m/s2"),)
 
 
 def derivative_checks(recordings: Sequence[Recording], channel: str, other: str) -> Iterator[Finding]:
@@ -63,7 +60,8 @@ def derivative_checks(recordings: Sequence[Recording], channel: str, other: str)
             if check.answer == "agrees" and channel == "speed":
                 expected = np.abs(path[:, j]) / check.value
                 seen = expected > max(_LARGE * float(np.nanquantile(expected, 0.95)), _ABOVE_NOISE * of_change[j])
-                still = float(np.mean(np.abs(change[seen, j]) < _STILL * expected[seen]))
+                # A change below a tenth of what the speed says is none.
+                still = float(np.mean(np.abs(change[seen, j]) < 0.1 * expected[seen]))
                 if still > _ODD:  # no ratio shows it: at rest there is no ratio
                     check = replace(check, answer="contradicts", found="still", share=still)
         yield check.finding()
@@ -84,7 +82,8 @@ def _is_size(ratios: FloatArray) -> bool:
     if len(ratios) < _FEWEST:
         return False
     low, middle, high = np.quantile(ratios, (0.25, 0.5, 0.75))
-    return bool(np.mean(ratios < 0.0) < _ODD and high - low < 2.0 * _SPREAD * middle)
+    # The size is sure if half of them lie within 30 % of it.
+    return bool(np.mean(ratios < 0.0) < _ODD and high - low < 0.6 * middle)
 
 
 def _checked(check: ChannelCheck, ratios: FloatArray, others: Sequence[str]) -> ChannelCheck:
@@ -100,7 +99,8 @@ def _checked(check: ChannelCheck, ratios: FloatArray, others: Sequence[str]) -> 
         return replace(check, answer="contradicts", found="sign", value=size)
     if others:
         return replace(check, answer="contradicts", found="joints", between=others[0])
-    if not _EITHER < backward < 1.0 - _EITHER:
+    # Of unrelated channels a quarter of the changes or more have either sign.
+    if not 0.25 < backward < 0.75:
         return replace(check, found="apart", value=backward)
     return replace(check, answer="contradicts", found="course", share=backward)
 
@@ -114,4 +114,5 @@ def units_apart(ratio: float, channel: str = "speed") -> str:
     ratio = max(ratio, 1.0 / max(ratio, 1e-300))
     factors = (*_FACTORS, *(_OF_ACCELERATION if channel == "acceleration" else _OF_SPEED))
     factor, units = min(factors, key=lambda item: abs(math.log(ratio / item[0])))
-    return units if abs(ratio / factor - 1.0) < _NEAR else ""
+    # A factor between two units is named within 15 %: noise and filters change that of an accelerometer.
+    return units if abs(ratio / factor - 1.0) < 0.15 else ""

@@ -20,27 +20,10 @@ from cdtool.machines.plausibility.check import Answer, ChannelCheck
 from cdtool.machines.plausibility.windows import Windows, windows_of
 from cdtool.recordings.recording import Recording
 
-# In motion: above this share of the usual largest speed. A joint below the second share of the fastest hardly moves.
-_MOVING, _HARDLY = 0.1, 0.02
-# At least so many windows in motion, and so many for each coefficient.
-_FEWEST, _PER_COEFFICIENT = 30, 3
-# Motion in both directions: each has this share of the windows.
-_BOTH = 0.1
-# Windows that fit worst are left out: impacts and stiction obey other laws.
-_KEPT = 0.9
-# A coefficient is sure above so many standard errors, if it is this share of the torque's spread, and if the other
-# columns leave this share of its own column unexplained. Blocks of so many windows are independent.
-_ERRORS, _SHARE, _OWN, _BLOCK = 6.0, 0.1, 0.1, 10
-# Larger shares for what is weaker evidence: the sign of an inertia, its size (smaller by a filtered torque or a coarse
-# speed), and friction that follows the motion of another joint.
-_INERTIA, _OF_SIZE, _OF_OTHER = 0.3, 0.5, 0.5
-# Above the first share a torque is a function of positions alone, above the second one of positions and speed, seen in
-# this number of windows for each term. Of weight and friction in one direction they explain 0.9995 in simulated arms.
-_PLACE, _EXACT, _TO_EXPLAIN = 0.99999, 0.999999, 10
-# Above this share an acceleration is a function of the place.
-_SINE = 0.95
-# Friction of which more than this share grows with the speed, without inertia, may be a set value of the speed.
-_LIKE_SPEED = 0.9
+# A joint below this share of the fastest hardly moves.
+_HARDLY = 0.02
+# A coefficient is sure if it is this share of the torque's spread: a smaller one may be that of another term.
+_SHARE = 0.1
 # The inertia of the machine file may be wrong by this factor.
 _FACTOR = 3.0
 
@@ -93,39 +76,44 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
     if not usual[j] > _HARDLY * usual.max():
         yield replace(check, found="rest")
         return
-    moving = known & (np.abs(speed[:, j]) > _MOVING * usual[j])
+    moving = known & (np.abs(speed[:, j]) > 0.1 * usual[j])  # above 10 % of the usual largest speed
     forward = float(np.mean(speed[moving, j] > 0.0)) if moving.any() else 0.0
-    both = _BOTH < forward < 1.0 - _BOTH
+    both = 0.1 < forward < 0.9  # of the windows in motion
     place = _place(position, known, j, (3, 4, 5))
     mean = float(np.mean(np.abs(speed[moving, j])))
     columns = _motion_columns(windows, j, usual, both, mean)
     # Where strokes begin and end at the same places, higher powers would take the part of the inertia.
     table = np.column_stack([*columns.values(), place if both and len(usual) > 1 else _place(position, known, j)])
     used = moving & np.isfinite(table).all(axis=1)
-    if np.count_nonzero(used) < max(_FEWEST, _PER_COEFFICIENT * table.shape[1]) or not np.ptp(torque[used]):
+    # At least 30 windows in motion, and three for each coefficient.
+    if np.count_nonzero(used) < max(30, 3 * table.shape[1]) or not np.ptp(torque[used]):
         yield check
         return
     fit = _fit(table[used], torque[used], list(columns))
-    friction, inertia = _sure(fit, "friction"), _sure(fit, f"inertia {j}", _INERTIA)
+    # The sign of an inertia, and below its size (smaller by a filtered torque or a coarse speed), are weaker evidence.
+    friction, inertia = _sure(fit, "friction"), _sure(fit, f"inertia {j}", 0.3)
     check = replace(check, found="unclear", value=abs(fit.value["friction"]), unit=machine.force_unit)
     share = explained(np.column_stack([place, speed[:, j]])[known], torque[known])
     # In a sine the inertia's force is a function of the place, too.
     rate = windows.rate("speed")[:, j]
     swings = known & np.isfinite(rate)
-    is_sine = explained(place[swings], rate[swings]) > _SINE
-    if not is_sine and (share > _EXACT or explained(place[known], torque[known]) > _PLACE):
+    # Above 95 % an acceleration is a function of the place. Weight and friction in one direction explain 99.95 % of a
+    # torque in simulated arms.
+    is_sine = explained(place[swings], rate[swings]) > 0.95
+    if not is_sine and (share > 0.999999 or explained(place[known], torque[known]) > 0.99999):
         yield replace(check, answer="contradicts", found="place", share=share)
     elif not both and (machine.coupled or friction != inertia):
         yield replace(check, found="one direction")
     elif follows := [k for k in range(len(usual)) if _follows(fit, k)]:
         yield replace(check, answer="contradicts", found="other joint", other=machine.joints[follows[0]])
-    elif not inertia and fit.value["viscous"] * mean > _LIKE_SPEED * fit.value["friction"] > 0.0:
+    # Friction that grows with the speed by 90 %, without inertia, may be a set value of the speed.
+    elif not inertia and fit.value["viscous"] * mean > 0.9 * fit.value["friction"] > 0.0:
         yield replace(check, found="viscous")
     else:
         answer, found = _VERDICTS.get((friction, inertia or _sure(fit, "viscous")), ("not checked", "unclear"))
         yield replace(check, answer=answer, found=found, share=fit.errors["friction"])
     expected = float(machine.nominal_inertia[j])
-    if not machine.coupled and min(friction, _sure(fit, f"inertia {j}", _OF_SIZE), expected) > 0:
+    if not machine.coupled and min(friction, _sure(fit, f"inertia {j}", 0.5), expected) > 0:
         seen = fit.value[f"inertia {j}"]
         answer = "agrees" if 1.0 / _FACTOR < seen / expected < _FACTOR else "contradicts"
         unit = {"N": "kg", "N m": "kg m2"}.get(machine.force_unit, "")
@@ -134,7 +122,8 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
 
 def _sure(fit: _Terms, name: str, share: float = _SHARE) -> int:
     """Return the sign of a coefficient, 0 if it is not sure, not there, or too small a part of the torque."""
-    if abs(fit.errors.get(name, 0.0)) < _ERRORS or abs(fit.share[name]) < share:
+    # Below six standard errors it may be chance.
+    if abs(fit.errors.get(name, 0.0)) < 6.0 or abs(fit.share[name]) < share:
         return 0
     return 1 if fit.value[name] > 0.0 else -1
 
@@ -142,13 +131,13 @@ def _sure(fit: _Terms, name: str, share: float = _SHARE) -> int:
 def _follows(fit: _Terms, k: int) -> bool:
     """Whether a torque shows the friction of joint k, and at most a fifth as much of its own: a payload shows less."""
     other = fit.share.get(f"friction {k}", 0.0)
-    return _sure(fit, f"friction {k}", _OF_OTHER) > 0 and abs(fit.share["friction"]) < 0.2 * other
+    return _sure(fit, f"friction {k}", 0.5) > 0 and abs(fit.share["friction"]) < 0.2 * other
 
 
 def explained(motion: FloatArray, torque: FloatArray) -> float:
     """Return the share of a torque (w,) that positions and a speed (w, p) explain; 0 with few windows."""
     used = np.isfinite(motion).all(axis=1)
-    if np.count_nonzero(used) < _TO_EXPLAIN * motion.shape[1]:
+    if np.count_nonzero(used) < 10 * motion.shape[1]:  # fewer are explained by chance
         return 0.0
     table = np.column_stack([np.ones(len(motion)), motion])[used]
     rest = torque[used] - table @ np.linalg.lstsq(table, torque[used], rcond=None)[0]
@@ -185,13 +174,16 @@ def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Terms:
         inverse = np.linalg.pinv(scaled[kept].T @ scaled[kept])
         value = inverse @ (scaled[kept].T @ torque[kept])
         rest = np.abs(torque - scaled @ value)
-        kept = rest <= np.quantile(rest, _KEPT)
+        # The tenth of the windows that fits worst is left out: impacts and stiction obey other laws.
+        kept = rest <= np.quantile(rest, 0.9)
     scores = scaled[kept] * (torque - scaled @ value)[kept, np.newaxis]
-    blocks = np.add.reduceat(scores, np.arange(0, len(scores), _BLOCK), axis=0)
+    # Blocks of ten windows are independent.
+    blocks = np.add.reduceat(scores, np.arange(0, len(scores), 10), axis=0)
     error = np.sqrt(np.maximum(np.diag(inverse @ (blocks.T @ blocks) @ inverse), 0.0))  # rounding may be below 0
     # What the other columns leave of a column is 1 / (X'X)^-1_kk of its own sum of squares.
     alone = 1.0 / np.maximum(np.diag(inverse) * np.sum(scaled[kept] ** 2, axis=0), 1.0)
-    sure = np.where(alone > _OWN, value / np.maximum(error, 1e-12 * np.abs(value) + np.finfo(float).tiny), 0.0)
+    # The other columns leave a tenth of its own unexplained.
+    sure = np.where(alone > 0.1, value / np.maximum(error, 1e-12 * np.abs(value) + np.finfo(float).tiny), 0.0)
     spread = np.std(torque[kept]) or np.inf
     shares = value * np.std(scaled[kept], axis=0) / spread
     shares[0] = value[0] / spread  # its own column may be constant

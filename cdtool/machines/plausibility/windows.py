@@ -10,9 +10,6 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.recordings.recording import Recording, Series
 
-# A window has the first number of samples of the slowest channel and lasts 0.05 s, or the next share of a log that is
-# short, or whose clock has the wrong unit; a log has at most the last number of windows.
-_SAMPLES, _SHORTEST, _PART, _MOST = 5.0, 0.05, 1.0 / 40.0, 2000
 # Changes are taken over this number of windows.
 _SPAN = 4
 
@@ -68,8 +65,10 @@ def _windows(series: list[Series]) -> tuple[float, list[FloatArray]] | None:
     if min(map(len, series)) < 2:
         return None
     start, end = max(float(item.time[0]) for item in series), min(float(item.time[-1]) for item in series)
-    shortest = min(_SHORTEST, _PART * (end - start))
-    step = max(shortest, _SAMPLES * max(item.period for item in series), (end - start) / _MOST)
+    # 0.05 s, or less in a log that is short, or whose clock has the wrong unit; five samples of the slowest channel; at
+    # most 2000 windows.
+    shortest = min(0.05, (end - start) / 40.0)
+    step = max(shortest, 5.0 * max(item.period for item in series), (end - start) / 2000)
     if not step > 0.0:
         return None
     edges = np.arange(start, end, step)

@@ -43,12 +43,11 @@ ROWS = (
 INPUTS = ("reference_speed", "reference_position", "command")
 """The first index of the inputs; `command` replaces the controllers where the mode is `REPLAYED`."""
 
+#: How the commands are made: by the joints' controllers, from the inputs, or by controllers that know the inertia. The
+#: last are as stiff in every pose: u = h + M (gains), with gains in 1/s and 1/s2; an elastic joint has its motor's.
 CONTROLLED, REPLAYED, INERTIAL = 0, 1, 2
-"""How the commands are made: by the joints' controllers, from the inputs, or by controllers that know the inertia.
 
-The last are as stiff in every pose: u = h + M (gains), with gains in 1/s and 1/s2; an elastic joint has its motor's.
-"""
-
+#: The first of `ROWS`, to the bristle.
 STATES = 6
 
 # fmt: off

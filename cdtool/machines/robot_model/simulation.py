@@ -11,18 +11,9 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import ConfigurationError
 from cdtool.machines.axis_model.obstacle import Obstacle
 from cdtool.machines.axis_model.parameters import ElasticDrive
+from cdtool.machines.axis_model.simulation import LARGEST_STEP, NEVER, integration_steps
 from cdtool.machines.robot_model import robot_loop_kernel
 from cdtool.machines.robot_model.parameters import RobotModel, Vector, largest_rate
-
-# The classical Runge-Kutta method is stable up to 2.78 and accurate well below [-].
-_LARGEST_STEP = 0.5
-_FEWEST_SUBSTEPS, _MOST_SUBSTEPS = 4, 400
-# A smooth sign of the friction that nothing states is made so wide that it needs at most this many steps.
-_FRICTION_SUBSTEPS = 16
-# Where nothing is said, a drive runs as if it had one stiffness.
-_NEVER = 1e12
-# Poses at which the fastest motion of the robot is looked for.
-_POSES = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +87,8 @@ def simulate_robot(model: RobotModel, inputs: RobotInputs, contact: PointContact
         plane = (*contact.normal, obstacle.position, obstacle.damping, float(contact.first_sample))
         against = (1.0, float(contact.joint), *contact.point, *plane)
         curve = obstacle.penetration_curve
-    poses = inputs.reference_position[:: max(count // _POSES, 1)]
+    # Seven poses, at which the fastest motion of the robot is looked for.
+    poses = inputs.reference_position[:: max(count // 7, 1)]
     model = with_smooth_friction(model, poses, period)
     first_contact = robot_loop_kernel.integrate_robot(
         model.bodies,
@@ -134,20 +126,14 @@ def substeps(model: RobotModel, poses: FloatArray, period: float, contact: Point
     fastest = max(_rate_at(model, pose, motors, rigid, contact) for pose in poses)
     lags = [axis.controller.force_lag for axis in model.axes if axis.controller is not None]
     fastest = max(fastest, *(1.0 / lag for lag in lags if lag > 0.0), 0.0)
-    needed = math.ceil(fastest * period / _LARGEST_STEP)
-    if needed > _MOST_SUBSTEPS:
-        raise ConfigurationError(
-            f"machine '{model.name}': the model needs {needed} integration steps per {period:g} s",
-            "a stiffness is too large for its inertia, or friction.smoothing_speed too small",
-        )
-    return max(needed, _FEWEST_SUBSTEPS)
+    return integration_steps(fastest, period)
 
 
 def with_smooth_friction(model: RobotModel, poses: FloatArray, period: float) -> RobotModel:
     """Return the model with a smooth sign of its friction that 16 integration steps per period can follow."""
     if model.smoothing_stated:
         return model
-    most = _FRICTION_SUBSTEPS * _LARGEST_STEP / period
+    most = 16 * LARGEST_STEP / period
     axes = []
     for joint, axis in enumerate(model.axes):
         friction = axis.friction
@@ -210,7 +196,7 @@ def wind_up_at(drive: ElasticDrive, torque: float) -> float:
     if drive.is_rigid:
         return 0.0
     size = abs(torque)
-    taken_up = drive.stiffness * min(drive.take_up_travel, _NEVER)
+    taken_up = drive.stiffness * min(drive.take_up_travel, NEVER)
     found = size / drive.stiffness if size <= taken_up else drive.take_up_travel
     if size > taken_up:
         found += (size - taken_up) / drive.end_stiffness
@@ -226,7 +212,7 @@ def _numbers(model: RobotModel, period: float) -> FloatArray:
             "rigid": float(drive.is_rigid),
             "stated_inertia": -model.motor_in_links[joint],
             "stiffness": 0.0 if drive.is_rigid else drive.stiffness,
-            "take_up_travel": min(drive.take_up_travel, _NEVER),
+            "take_up_travel": min(drive.take_up_travel, NEVER),
             "end_stiffness": drive.end_stiffness if math.isfinite(drive.end_stiffness) else 0.0,
             "end_damping": max(drive.end_damping, drive.damping),
             "bristle_stiffness": bristle.stiffness,

@@ -12,12 +12,6 @@ from cdtool.recordings.clock.recent_steps import recent_medians
 
 # A stamp step longer than this many usual ones contains a pause.
 _PAUSE = 1.5
-# Time constant of the fit in stamp changes: the fit must follow the drift between sample clock and stamp clock.
-_MEMORY = 100.0
-# The clock is stuck if, by the line, the stamp should have changed more than this many stamp steps ago.
-_STUCK = 1.0
-# If the line steps back, times advance by this share of a period until the line has caught up.
-_CREEP = 0.5
 
 
 def fit_line(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -84,7 +78,7 @@ def _follow(stamps: FloatArray, counts: FloatArray, step: FloatArray, period: fl
                     period = width / taken
                     c = 12.0 / taken**2
             else:
-                keep = 1.0 - 1.0 / _MEMORY
+                keep = 0.99  # the fit forgets within 100 changes of the stamp: it must follow the drift of both clocks
                 a, b, c = (a + taken * (2.0 * b + taken * c)) / keep, (b + taken * c) / keep, c / keep
                 weight, slope_weight = a / (1.0 + a), b / (1.0 + a)
                 value += weight * off
@@ -93,8 +87,10 @@ def _follow(stamps: FloatArray, counts: FloatArray, step: FloatArray, period: fl
                 if period <= 0.0:
                     period = width / taken
         for j in range(int(counts[i])):
-            now = max(value + j * period, last + _CREEP * period)
-            if now - stamps[i] <= (1.0 + _STUCK) * step[i] and now > last:
+            # If the line steps back, times advance by half a period until the line has caught up.
+            now = max(value + j * period, last + 0.5 * period)
+            # The clock is stuck if, by the line, the stamp should have changed more than one stamp step ago.
+            if now - stamps[i] <= 2.0 * step[i] and now > last:
                 time[k] = now
                 last = now
             k += 1

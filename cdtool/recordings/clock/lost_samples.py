@@ -12,12 +12,8 @@ from cdtool.recordings.clock.held_samples import is_on_clock
 from cdtool.recordings.clock.recent_steps import RECENT_STEPS, usual_steps
 from cdtool.recordings.recording import Recording, Series
 
-# A channel is late if its newest sample is older than this many times its longest usual step.
-_LATE = 1.5
-# A step longer than this many times the median is not a usual one: samples are missing within it.
-_USUAL = 2.0
-# A channel shares a clock if it has samples at this number of the clock's last 20 samples.
-_SHARED_WINDOW, _SHARED_SAMPLES = 20, 15
+# A channel shares a clock if it has samples at 15 of the clock's last 20 samples.
+_SHARED_WINDOW = 20
 
 
 def lost_samples(recording: Recording, channels: Iterable[str], clock: FloatArray) -> BoolArray | None:
@@ -59,9 +55,11 @@ def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray:
     age = clock - time[np.maximum(at, 0)]
     # How many of the last 20 times before each one have a sample.
     shared = np.concatenate((np.zeros(_SHARED_WINDOW + 1), np.cumsum(age == 0.0)))
-    due = (shared[_SHARED_WINDOW:-1] - shared[: -_SHARED_WINDOW - 1] >= _SHARED_SAMPLES) & (age > 0.0)
+    due = (shared[_SHARED_WINDOW:-1] - shared[: -_SHARED_WINDOW - 1] >= 15) & (age > 0.0)
     longest = _longest_recent_steps(time)
-    late = due | ((at > 0) & (age > _LATE * np.minimum(longest, _USUAL * usual)[at]))
+    # A channel is late if its newest sample is older than 1.5 times its longest usual step. A step longer than twice
+    # the median is not a usual one: samples are missing within it.
+    late = due | ((at > 0) & (age > 1.5 * np.minimum(longest, 2.0 * usual)[at]))
     return np.asarray((at >= 0)[:, np.newaxis] & (late[:, np.newaxis] | missing[at]))
 
 

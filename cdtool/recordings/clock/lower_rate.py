@@ -10,9 +10,6 @@ import numpy as np
 
 from cdtool.base.arrays import BoolArray, FloatArray
 
-# Below this number of values a rate is not evident.
-_FEWEST = 3
-
 
 def sampled_rows(values: FloatArray) -> BoolArray | None:
     """Return the rows of a table in which a channel of a lower rate has a sample; None if its rate is that of the rows.
@@ -37,6 +34,6 @@ def sampled_rows(values: FloatArray) -> BoolArray | None:
     missing = np.isnan(values)
     rows: BoolArray = np.logical_not(missing if missing.ndim == 1 else missing.all(axis=1))
     steps = np.diff(np.flatnonzero(rows))
-    if len(steps) + 1 < _FEWEST or np.median(steps) < 2.0:
+    if len(steps) + 1 < 3 or np.median(steps) < 2.0:  # with two values a rate is not evident
         return None
     return rows

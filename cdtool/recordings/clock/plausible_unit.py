@@ -16,15 +16,8 @@ from cdtool.base.arrays import FloatArray
 # A clock that counts from 1970 in one of these units lies between the years 2001 and 2100.
 EPOCHS = ((1e9, 4.1e9, "s"), (1e12, 4.1e12, "ms"), (1e15, 4.1e15, "us"), (1e18, 4.1e18, "ns"))
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-# No clock counts more than this many seconds, whatever its zero: the year 0 was 6.4e10 s ago.
-_LONGEST = 1e11
 # No log of a machine has longer or shorter steps [s]: a minute, half a microsecond.
 _LONGEST_STEP, _SHORTEST_STEP = 60.0, 5e-7
-# Plausible sample rates [Hz] of a log in the likely unit.
-_SLOWEST, _FASTEST = 0.5, 500e3
-# Number of time stamps that the median step is computed from.
-_ENOUGH = 100_000
-_YEAR = 365.2425 * 86400.0
 
 
 def unit_since_1970(stamp: float) -> str:
@@ -44,13 +37,15 @@ def contradicted_by_epoch(stamp: float, factor: float) -> str:
     >>> contradicted_by_epoch(1.6e12, 1.0), contradicted_by_epoch(1.6e12, 1e-3), contradicted_by_epoch(1.6e9, 1e-3)
     ('ms', '', '')
     """
-    return unit_since_1970(stamp) if stamp * factor > _LONGEST else ""
+    # No clock counts more seconds, whatever its zero: the year 0 was 6.4e10 s ago.
+    return unit_since_1970(stamp) if stamp * factor > 1e11 else ""
 
 
 def both_readings(stamp: float, factor: float, stated: str, meant: str) -> dict[str, Any]:
     """Return a first time stamp as read in the stated unit (`factor` s), and in the unit `meant` since 1970."""
     day = datetime.fromtimestamp(stamp * SECONDS[meant], tz=UTC).date().isoformat()
-    return {"stamp": stamp, "stated": stated, "years": stamp * factor / _YEAR, "meant": meant, "day": day}
+    years = stamp * factor / (365.2425 * 86400.0)
+    return {"stamp": stamp, "stated": stated, "years": years, "meant": meant, "day": day}
 
 
 def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float]:
@@ -60,7 +55,7 @@ def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float
     that yields a plausible sample rate nearest to 1 kHz. It is empty if the stated unit may be right, or no unit yields
     a plausible rate.
     """
-    some = stamps[:_ENOUGH]
+    some = stamps[:100_000]  # enough for a median
     steps = np.diff(some)
     # With all steps plausible, so is their median. A step that is NaN is not plausible.
     if len(steps) and steps.min() * factor >= _SHORTEST_STEP and steps.max() * factor <= _LONGEST_STEP:
@@ -72,5 +67,6 @@ def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float
     step = float(np.median(steps))
     if _SHORTEST_STEP <= step * factor <= _LONGEST_STEP:
         return "", 0.0
-    fitting = [name for name, one in SECONDS.items() if _SLOWEST * (step * one) <= 1.0 <= _FASTEST * (step * one)]
+    # Plausible sample rates of a log in the likely unit: 0.5 Hz to 500 kHz.
+    fitting = [name for name, one in SECONDS.items() if 0.5 * (step * one) <= 1.0 <= 500e3 * (step * one)]
     return min(fitting, key=lambda name: abs(np.log(step * SECONDS[name] / 1e-3)), default=""), step * factor

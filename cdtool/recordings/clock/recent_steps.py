@@ -8,10 +8,9 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 
+#: Enough that their median is the period of a jittering clock, few enough to follow a change of rate.
 RECENT_STEPS = 9
 _BEFORE = RECENT_STEPS - 1
-# Up to this many samples the usual steps are kept with the array of times; beyond, memory is worth more than time.
-_MOST_KEPT = 1 << 20
 
 _kept: dict[int, tuple[weakref.ref[FloatArray], FloatArray]] = {}
 
@@ -50,7 +49,8 @@ def usual_steps(time: FloatArray) -> FloatArray:
         padded[:_BEFORE] = padded[_BEFORE]
         _take_medians(padded, usual[1:])
     usual.flags.writeable = False
-    if not time.flags.writeable and len(time) <= _MOST_KEPT:
+    # Up to a million samples the usual steps are kept with the array of times; beyond, memory is worth more than time.
+    if not time.flags.writeable and len(time) <= 1 << 20:
         key = id(time)
         _kept[key] = weakref.ref(time, lambda _: _kept.pop(key, None)), usual
     return usual

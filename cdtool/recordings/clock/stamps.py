@@ -17,28 +17,21 @@ import numpy.typing as npt
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
+from cdtool.base.plain_text import NAMED
 from cdtool.recordings.clock.coarse_clock import fit_line
 from cdtool.recordings.distribution import Distribution
 
-# A standard deviation of the steps above this share of the period is jitter.
-_JITTER = 0.1
 # A step longer than this many periods is a gap.
 GAP_PERIODS = 2.5
 # Above this share of repeated time stamps, the clock is coarse and not faulty.
 COARSE_SHARE = 0.2
-# Dropped rows are a loss if they exceed this share, or if this many consecutive ones run backward: the clock restarted.
-_LOSS_SHARE, _RESTART_ROWS = 0.01, 3
 # Widths [bits] of counters that may wrap within a log.
 _COUNTER_BITS = (16, 32)
-# The first rows or gaps, up to this many, are listed; the others are only counted.
-_LISTED = 3
 # A jump ahead spans at most this many rows; fewer at the edges of a log, where one side is unknown.
 STRAY_ROWS, EDGE_ROWS = 50, 3
 # A step of about 3 years [s] at an edge of a log is not a pause: the time stamps beyond it are from another clock. A
 # clock that begins later than this counts from an epoch.
 THREE_YEARS = 1e8
-# A jump is longer than this many times the shortest step between this many rows before it.
-_JUMP, _STEPS_BEFORE = 2.5, 9
 # The start of a log can be stray if this many time stamps in order follow it; logs below 8 rows are not checked.
 _IN_ORDER, _SHORTEST = 3, 8
 # Rows after which a mark is known, and rows that are kept for it.
@@ -214,7 +207,7 @@ class GapStatistics:
         steps = np.diff(time)
         gaps = np.flatnonzero(steps > GAP_PERIODS * self._period)
         self._count += len(gaps)
-        self._first += [{"time": float(time[i]), "length": float(steps[i])} for i in gaps[: _LISTED - len(self._first)]]
+        self._first += [{"time": float(time[i]), "length": float(steps[i])} for i in gaps[: NAMED - len(self._first)]]
         regular = steps[steps <= GAP_PERIODS * self._period]
         if len(regular):
             share = len(regular) / (self._regular + len(regular))
@@ -231,7 +224,7 @@ class GapStatistics:
         if self._count:
             findings.append(Finding("sample_gaps", self._channel, {"count": self._count, "first": tuple(self._first)}))
         jitter = float(np.sqrt(self._squares / self._regular)) / self._period if self._regular else 0.0
-        if jitter > _JITTER:
+        if jitter > 0.1:  # of a period
             findings.append(Finding("jitter", self._channel, {"share": jitter, "period": self._period}))
         return findings
 
@@ -255,7 +248,7 @@ def _is_regular(times: FloatArray, period: float) -> bool:
         return False
     steps = np.diff(times)
     least, most = float(steps.min()), float(steps.max())
-    return most <= GAP_PERIODS * period and most - least <= _JITTER * period
+    return most <= GAP_PERIODS * period and most - least <= 0.1 * period
 
 
 class _RowCount:
@@ -268,7 +261,7 @@ class _RowCount:
     def add(self, rows: npt.NDArray[np.intp], before: int) -> None:
         """Add rows of a piece; `before` is the number of rows before the piece."""
         self.count += len(rows)
-        self._first += (rows[: _LISTED - len(self._first)] + before).tolist()
+        self._first += (rows[: NAMED - len(self._first)] + before).tolist()
 
     def findings(self, rows: int, first_row: int, restart: dict[str, Any] | None = None) -> list[Finding]:
         """Return the finding, given the total of `rows`: a loss if there is a cause, or if many rows are dropped."""
@@ -278,7 +271,8 @@ class _RowCount:
         numbers = {"count": self.count, "rows": rows, "first": first, "row_name": "line" if first_row else "sample"}
         if self.kind == "backward_stamps":
             numbers["restart"] = restart
-        is_loss = restart or self.kind == "stuck_stamps" or self.count / rows > _LOSS_SHARE
+        # Single rows in a log are no loss.
+        is_loss = restart or self.kind == "stuck_stamps" or self.count / rows > 0.01
         return [Finding(self.kind, "time", numbers, "loss" if is_loss else "warning")]
 
 
@@ -315,7 +309,8 @@ class _RestartDetector:
         if self._step_back is None:
             return None
         bits = wrapped_bits(*self._step_back, usual_step, self._largest) if self._whole else 0
-        return {"wrapped_bits": bits} if bits or self._longest >= _RESTART_ROWS else None
+        # Three consecutive rows that run backward: the clock restarted.
+        return {"wrapped_bits": bits} if bits or self._longest >= 3 else None
 
 
 def wrapped_bits(before: float, after: float, usual_step: float, largest: float) -> int:
@@ -388,7 +383,7 @@ class StrayStampMarker:
         if i < 0 or not 0 < rows <= STRAY_ROWS:
             return
         shortest = _shortest_step([x for x, off in zip(before[: i + 1], stray[: i + 1], strict=True) if not off])
-        if lowest - before[i] <= _JUMP * max(back - before[i], shortest):
+        if lowest - before[i] <= GAP_PERIODS * max(back - before[i], shortest):
             return
         after = self._stamps[step_back : step_back + rows]
         if len(after) == rows and bool(np.all(after < lowest)):
@@ -422,5 +417,5 @@ def _count_trailing_strays(stamps: FloatArray) -> int:
 
 def _shortest_step(stamps: list[float]) -> float:
     """Return the shortest forward step among the last time stamps; 0 if there is no forward step."""
-    last = stamps[-_STEPS_BEFORE - 1 :]
+    last = stamps[-10:]  # the nine steps before a jump
     return min((b - a for a, b in pairwise(last) if b > a), default=0.0)

@@ -23,8 +23,6 @@ from cdtool.recordings.recording import Recording, Series
 Motion = MotionClass | SpeedRange
 # How long a class still applies after a departure that began while it fitted [s]: the matching window.
 GRACE = 1.0
-# A class that has fitted this long [s] before its stroke came to rest or turned round, or later, has completed it.
-_COMPLETED = 0.05
 
 
 @dataclass(frozen=True)
@@ -82,7 +80,8 @@ def _applicable(
             begun[first:last, j] = started[-(last - first) :]
             fits[first:last, j] = agrees[-(last - first) :]
         fresh[first] = True
-        completed_by[first] = item.rests - _COMPLETED
+        # A class that has fitted 50 ms before its stroke came to rest or turned round, or later, has completed it.
+        completed_by[first] = item.rests - 0.05
     known = _known(speed, [motion.joint for motion in classes])
     now = np.zeros((n, count), dtype=np.bool_)
     before = np.zeros((n, count), dtype=np.bool_)

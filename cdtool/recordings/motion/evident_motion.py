@@ -8,14 +8,8 @@ import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.kernels import READ_ONLY, kernel
+from cdtool.recordings.motion.motion_class import AVERAGED_SAMPLES, AVERAGED_SECONDS
 from cdtool.recordings.recording import Series
-
-# The speed is averaged over this long [s] back, and over this many samples at least.
-_SECONDS, _SAMPLES = 0.1, 5
-# With fewer samples, noise cannot be told from motion.
-_FEWEST = 3
-# A mean that is this many of its standard errors from zero is motion.
-_ERRORS = 5.0
 
 
 def evident_speed(speed: Series) -> FloatArray:
@@ -58,18 +52,18 @@ def _evident(time: FloatArray, speed: FloatArray, found: FloatArray) -> None:
         found[k] = 0.0
         count, total, first = 0, 0.0, k
         for i in range(k, -1, -1):
-            if time[k] - time[i] > _SECONDS and k - i >= _SAMPLES:
+            if time[k] - time[i] > AVERAGED_SECONDS and k - i >= AVERAGED_SAMPLES:
                 break
             first = i
             if math.isfinite(speed[i]):
                 count += 1
                 total += speed[i]
-        if count < _FEWEST:
+        if count < 3:  # with fewer samples, noise cannot be told from motion
             continue
         mean, squares = total / count, 0.0
         for i in range(first, k + 1):
             if math.isfinite(speed[i]):
                 squares += (speed[i] - mean) ** 2
         error = math.sqrt(squares / (count - 1) / count)
-        if abs(mean) > _ERRORS * error:
+        if abs(mean) > 5.0 * error:  # standard errors from zero: hardly noise
             found[k] = mean

@@ -13,14 +13,12 @@ from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.recordings.motion.speed_course import SpeedCourse, fitting_samples
 from cdtool.recordings.recording import Recording, Series
 
-# The speed is averaged over this long [s], and over this many samples at least, before the usual one is looked for.
-_AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5
+# A speed is averaged over this long [s], and over this many samples at least: noise is no motion, and no rest.
+AVERAGED_SECONDS, AVERAGED_SAMPLES = 0.1, 5
 # ... but over no more than this share of the time in motion.
 _AVERAGED_SHARE = 0.2
-# Shares of the highest averaged speed above which the axis moves, and of the usual one above which it runs.
-_MOVING, _FAST = 0.1, 0.8
-# A motion goes one way where this share of its travel at speed is left when there and back cancel.
-_ONE_WAY = 0.2
+# Share of the highest averaged speed above which the axis moves.
+_MOVING = 0.1
 
 
 @dataclass(frozen=True)
@@ -148,7 +146,7 @@ def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
 
 
 def _class_of(time: FloatArray, speed: FloatArray, joint: int, period: float) -> MotionClass:
-    seconds = max(_AVERAGED_SECONDS, _AVERAGED_SAMPLES * period)
+    seconds = max(AVERAGED_SECONDS, AVERAGED_SAMPLES * period)
     smooth = averaged(time, speed, seconds)
     size = np.abs(smooth)
     in_motion = period * float(np.count_nonzero(size > _MOVING * size.max()))
@@ -162,11 +160,12 @@ def _class_of(time: FloatArray, speed: FloatArray, joint: int, period: float) ->
         return MotionClass(0, 0.0, joint)
     usual, level = _middle(moving), 0.0
     for _ in range(2):
-        level = _FAST * usual
+        level = 0.8 * usual  # runs, and does not accelerate
         usual = _middle(ordered[int(np.searchsorted(ordered, level, side="left")) :])
     fast = smooth[size >= level]
     # Equal motion in both directions has the direction of the first: noise must not decide.
-    lead = float(np.sum(fast)) if abs(float(np.sum(fast))) > _ONE_WAY * float(np.sum(np.abs(fast))) else float(fast[0])
+    # A motion goes one way where a fifth of its travel at speed is left when there and back cancel.
+    lead = float(np.sum(fast)) if abs(float(np.sum(fast))) > 0.2 * float(np.sum(np.abs(fast))) else float(fast[0])
     direction = 1 if lead > 0.0 else -1
     return MotionClass(direction, usual, joint)
 

@@ -14,10 +14,12 @@ from cdtool.recordings.recording import Recording
 
 Alignment = Literal["time_then_position", "time", "position"]
 ALIGNMENTS: tuple[Alignment, ...] = get_args(Alignment)
-# Shares of the nominal speed at which the stroke has begun, and at which it runs.
+#: The stroke has begun at this share of the nominal speed: noise and settling are below it.
 START_SHARE = 0.1
+#: It runs from this share of the nominal speed on.
 RUNNING_SHARE = 0.95
-# The motion has started once this many consecutive speed samples exceed the start speed.
+# The motion has started once this many consecutive speed samples exceed the start speed, or turned round: a single
+# wrong sample does not decide.
 CONFIRM = 3
 
 

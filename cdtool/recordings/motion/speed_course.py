@@ -24,12 +24,12 @@ SPREADS = 5.5
 SLOW = 0.5
 
 
-# Grid points along the stroke, and how many neighbours to either side are pooled.
-_POINTS, _REACH = 400, 4
-# The time curve reaches this much beyond the slowest run's acceleration.
-_TIME_RESERVE = 1.5
-# A grid point is known where this share of the runs has been.
-_COVERAGE = 0.8
+# Grid points along the stroke: a quarter of a percent of it, as fine as a speed is known.
+_POINTS = 400
+# A grid point, or a level, is known where this share of the runs has been.
+COVERAGE = 0.8
+# A time curve reaches this much beyond the slowest run's acceleration: later ones may be slower.
+TIME_RESERVE = 1.5
 # A speed fits within this share of the nominal speed in any case.
 TOLERANCE = 0.05
 
@@ -117,7 +117,7 @@ def learn_course(
         courses.append((at, direction * series.values[:, joint], use))
     whole = alignment == "time"
     lasting = [float(np.max(at.elapsed[use & (whole | ~at.running)], initial=0.0)) for at, _, use in courses]
-    longest = max(lasting, default=0.0) * (1.0 if whole else _TIME_RESERVE)
+    longest = max(lasting, default=0.0) * (1.0 if whole else TIME_RESERVE)
     furthest = max((float(np.nanmax(at.travel[use], initial=0.0)) for at, _, use in courses), default=0.0)
     return SpeedCourse(
         alignment,
@@ -171,12 +171,13 @@ def _learned(runs: Sequence[tuple[FloatArray, FloatArray]], end: float) -> Speed
         row[there] = speed[at[there]]
     present = np.isfinite(samples)
     count = present.sum(axis=0)
-    known = count >= max(1.0, _COVERAGE * len(runs))
+    known = count >= max(1.0, COVERAGE * len(runs))
     mean = np.where(present, samples, 0.0).sum(axis=0) / np.maximum(count, 1)
     squares = np.where(present, (samples - mean) ** 2, 0.0).sum(axis=0)
     variance = squares / np.maximum(count - 1, 1)
-    smooth = moving_mean(mean[:, np.newaxis], known[:, np.newaxis], _REACH)[:, 0]
-    spread = np.sqrt(moving_mean((variance + (mean - smooth) ** 2)[:, np.newaxis], known[:, np.newaxis], _REACH)[:, 0])
+    # 1 % of the stroke to either side is pooled.
+    smooth = moving_mean(mean[:, np.newaxis], known[:, np.newaxis], 4)[:, 0]
+    spread = np.sqrt(moving_mean((variance + (mean - smooth) ** 2)[:, np.newaxis], known[:, np.newaxis], 4)[:, 0])
     last = int(np.flatnonzero(known)[-1]) + 1 if known.any() else 1
     points = np.arange(last)
     inside = known[:last] if known.any() else np.ones(1, dtype=bool)

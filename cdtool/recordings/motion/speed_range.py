@@ -31,21 +31,12 @@ from cdtool.recordings.recording import Recording
 
 # Age of a sample that is learned from, and time for which nothing is learned after a departure [s].
 GUARD = 0.3
-# Time constant of the mean that is the speed, and time of samples after which it is known [s].
+# A speed, or a level, is the mean over about this time; a speed is known after this much of it [s].
 MEMORY, KNOWN = 2.0, 0.1
-# `_DOUBT`: the speed is known once its standard deviation is below this share of fastest - slowest nominal speed.
-# `_CLOSE`: that difference counts as at least this share of the slowest speed. Errors of samples less than `KNOWN`
-# seconds apart are taken to be equal.
-_DOUBT, _CLOSE = 0.2, 0.2
-# A spread below this part of the nominal speed counts as this much: without noise every sample is as precise.
-_LEAST_SPREAD = 1e-3
 # A departure that lasts longer is another speed, which is learned again [s].
 FORGET = 1.0
-# Where classes run alike, by their shares c_i / n_i. `_ALIKE`: the shares differ by no more than this. `_ALIKE_PART`:
-# nor by more than this times the smallest difference of nominal speeds over the largest one. `_MOVING`: no share is
-# below this. `_RUNNING`: only from the first to the last location at which each share reaches this: before, all
-# accelerate, and classes that do so alike cannot be distinguished.
-_ALIKE, _ALIKE_PART, _MOVING, _RUNNING = 0.1, 0.3, 0.5, 0.9
+# Where one of two classes is below this share of its nominal speed, they do not run.
+_MOVING = 0.5
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 
@@ -140,10 +131,13 @@ class SpeedRange(SendsFields):
         )
         nominal = np.array([item.nominal_speed for item in self.classes])
         shares = mean / nominal
-        most = min(_ALIKE, _ALIKE_PART * float(np.diff(nominal).min() / nominal[-1]))
+        # Classes run alike where their shares of the nominal speed differ by at most 0.1, and 0.3 of how far nominal
+        # speeds are apart, between the first and the last location where each of them has reached 0.9. Before that,
+        # all accelerate, and those that do so alike cannot be told apart.
+        most = min(0.1, 0.3 * float(np.diff(nominal).min() / nominal[-1]))
         alike = (np.ptp(shares, axis=1) <= most) & (shares.min(axis=1) >= _MOVING)
         for share in shares.T:
-            runs = np.flatnonzero(share >= _RUNNING)
+            runs = np.flatnonzero(share >= 0.9)
             first, last = (runs[0], runs[-1]) if len(runs) else (len(share), -1)
             alike[:first] = alike[last + 1 :] = False
         return (
@@ -184,7 +178,9 @@ def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     nominal, count, last = courses.nominal, len(courses.nominal), len(courses.alike) - 1
     own = np.empty(len(time))
     slowest, fastest = nominal[0], nominal[count - 1]
-    most_doubt = _DOUBT * max(_CLOSE * slowest, fastest - slowest)
+    # The speed is known once its standard deviation is below a fifth of how far the fastest and the slowest class are
+    # apart, or, of close classes, of a fifth of the slowest speed. Errors of less than `KNOWN` seconds go together.
+    most_doubt = 0.2 * max(0.2 * slowest, fastest - slowest)
     precision = np.empty(len(time))
     level = learned = weights = weighed = 0.0
     old = first = backward = 0
@@ -239,7 +235,8 @@ def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
                     share = (forward - before_mean) / (here - before_mean)
                     own[k] = nominal[i - 1] + share * gap
                     noise = before_wide + min(max(share, 0.0), 1.0) * (around - before_wide)
-                    noise = max(noise, _LEAST_SPREAD * nominal[i])
+                    # A smaller spread counts as this much: without noise every sample is as precise.
+                    noise = max(noise, 1e-3 * nominal[i])
                     precision[k] = ((here - before_mean) / (gap * noise)) ** 2
                 if known and not is_found and speed[k] <= nominal[i]:
                     weight = (speed[k] - nominal[i - 1]) / gap

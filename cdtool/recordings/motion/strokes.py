@@ -10,18 +10,12 @@ import numpy.typing as npt
 
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.base.kernels import READ_ONLY, kernel
-from cdtool.recordings.motion.motion_class import MotionClass
-from cdtool.recordings.motion.progress import START_SHARE
+from cdtool.recordings.motion.motion_class import AVERAGED_SAMPLES, AVERAGED_SECONDS, MotionClass
+from cdtool.recordings.motion.progress import CONFIRM, START_SHARE
 from cdtool.recordings.recording import Recording, Series
 
 # A rest this long [s] ends a stroke; a shorter one is a pause in it.
 SHORTEST_REST = 0.2
-# The speed is averaged over this long [s] back, and over this many samples at least: noise is no motion, and no rest.
-_AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5
-# Fewer samples than this have no average.
-_FEWEST = 3
-# Consecutive averages backward that end a stroke without a rest.
-_CONFIRM = 3
 
 
 @dataclass(frozen=True)
@@ -78,7 +72,7 @@ def _strokes(recording: Recording, how: str, classes: Sequence[MotionClass]) -> 
     for first, last, turns in zip(start[:count], applies[:count], turned[:count], strict=True):
         # A motion that turned round began before its average shows it; after a rest it did not, and the rest of
         # the average belongs to the stroke before.
-        since = float(time[first]) - (_AVERAGED_SECONDS if turns else 0.0)
+        since = float(time[first]) - (AVERAGED_SECONDS if turns else 0.0)
         found.append(Stroke(since, float(time[last]), float(time[first])))
     return found
 
@@ -91,12 +85,11 @@ def averaged_so_far(series: Series) -> FloatArray:
     total = np.vstack((nothing, np.cumsum(np.where(present, values, 0.0), axis=0)))
     number = np.vstack((nothing, np.cumsum(present, axis=0)))
     last = np.arange(1, len(time) + 1)
-    first = np.minimum(np.searchsorted(time, time - _AVERAGED_SECONDS, side="right"), last - _AVERAGED_SAMPLES)
+    first = np.minimum(np.searchsorted(time, time - AVERAGED_SECONDS, side="right"), last - AVERAGED_SAMPLES)
     first = np.maximum(first, 0)
-    count = np.where((time >= time[0] + _AVERAGED_SECONDS)[:, np.newaxis], number[last] - number[first], 0.0)
-    mean: FloatArray = np.divide(
-        total[last] - total[first], count, out=np.full(values.shape, np.nan), where=count >= _FEWEST
-    )
+    count = np.where((time >= time[0] + AVERAGED_SECONDS)[:, np.newaxis], number[last] - number[first], 0.0)
+    # Fewer than three samples have no average.
+    mean: FloatArray = np.divide(total[last] - total[first], count, out=np.full(values.shape, np.nan), where=count >= 3)
     return mean
 
 
@@ -143,7 +136,7 @@ def _cut(
             if backward == 0:
                 turned_at = still_since if still_since >= 0 else k
             backward += 1
-            if backward >= _CONFIRM:
+            if backward >= CONFIRM:
                 start[count] = turned_at
                 applies[count] = k
                 turned[count] = True

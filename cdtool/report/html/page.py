@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cdtool.base.plain_text import counted
+from cdtool.base.plain_text import LISTED, counted
 from cdtool.report.html.page_tables import PageTable, classes
 from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json
@@ -18,8 +18,6 @@ from cdtool.report.table import Log
 from cdtool.report.tables.attention import failed_traces
 from cdtool.report.writers.base import Report
 
-# Lines under the headline.
-_REASONS = 10
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
     *(
@@ -72,7 +70,7 @@ def to_html(report: Report) -> str:
         tables=tables,
         provenance=[PageTable(table, {}) for table in model.provenance],
         plots=plots,
-        reasons=model.first_reasons(_REASONS),
+        reasons=model.first_reasons(LISTED),
         classes=classes,
     )
 

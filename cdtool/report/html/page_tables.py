@@ -11,11 +11,6 @@ from typing import Any
 from cdtool.base.plain_text import plain
 from cdtool.report.table import Cell, Heading, Log, Table
 
-# A browser needs long to lay out more rows than this.
-_MOST_ROWS_AT_ONCE = 150
-# A usual name of a log or detector is shorter.
-_LONGEST_WORD = 28
-
 
 @dataclass(frozen=True)
 class PageTable:
@@ -37,7 +32,8 @@ class PageTable:
     @property
     def paged(self) -> bool:
         """Whether the script pages through it; without script all rows are shown."""
-        return bool(self.table.logs) or len(self.table.rows) > _MOST_ROWS_AT_ONCE
+        # A browser needs long to lay out more rows.
+        return bool(self.table.logs) or len(self.table.rows) > 150
 
     @property
     def opens(self) -> dict[int, list[int]]:
@@ -61,7 +57,8 @@ class PageTable:
 
 def classes(cell: Cell, column: Heading) -> str:
     """Return the classes of the style sheet; long texts may be broken anywhere."""
-    number, long = "number" if column.numeric else "", "long" if len(cell.text) > _LONGEST_WORD else ""
+    # A usual name of a log or detector is shorter.
+    number, long = "number" if column.numeric else "", "long" if len(cell.text) > 28 else ""
     return " ".join(name for name in (number, cell.tone, long) if name)
 
 

@@ -17,6 +17,7 @@ from cdtool.report.html.traces import HEIGHTS
 from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.model import AXES
 from cdtool.report.number_text import number, spoken, with_interval
+from cdtool.report.plots.latency_axis import FLOOR_MS
 from cdtool.report.plots.style import look_of
 from cdtool.report.table import Log
 from cdtool.report.table import shown as named
@@ -30,14 +31,11 @@ from cdtool.results.traces.trace import Trace
 from cdtool.statistics.rates import poisson_at_most
 from cdtool.statistics.small_sample import FEWEST
 
-# Heights [px] of a detector's lane in the latency plot and of the other plots.
-LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT = 66, 44, 300
-HISTOGRAM_HEIGHT = 96
+# Heights [px], chosen by eye, of a detector's lane in the latency plot, its axis, other plots and a histogram.
+LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT, HISTOGRAM_HEIGHT = 66, 44, 300, 96
 
-# Classes of a histogram, and the most points of a curve.
+# Classes of a histogram, and the most points of a curve: as many as a panel has pixels for.
 CLASSES, MOST_STEPS = 60, 400
-# A plot of latencies has no mark below this [ms].
-_FLOOR_MS = 1.0
 
 Contacts = Mapping[tuple[str, str], Sequence[ContactResult]]
 
@@ -137,8 +135,8 @@ def _histograms(results: Results, summaries: Sequence[Summary], contacts: Contac
 
 def _edges(latency: FloatArray) -> FloatArray:
     """Return the edges of the classes of all latencies [ms]: of equal width, or of equal ratio over a wide range."""
-    highest = float(latency.max(initial=_FLOOR_MS))
-    lowest = max(float(latency.min(initial=highest)), _FLOOR_MS)
+    highest = float(latency.max(initial=FLOOR_MS))
+    lowest = max(float(latency.min(initial=highest)), FLOOR_MS)
     if highest > 10.0 * lowest:
         return np.geomspace(lowest, highest * 1.0001, CLASSES + 1)
     return np.linspace(0.0, highest * 1.0001, CLASSES + 1)

@@ -20,9 +20,6 @@ from cdtool.results.results import RecordingFinding, Skipped
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# A figure of 120 dots per inch is shown with so many CSS pixels per inch.
-_PIXELS = 96.0
-
 
 @dataclass(frozen=True)
 class PageImage:
@@ -74,7 +71,8 @@ def images_of(figures: Sequence[tuple[Callable[[], Figure], str]]) -> tuple[Page
             continue
         picture = encoded(figure, ".png")
         source = f"data:image/png;base64,{base64.b64encode(picture).decode()}"
-        images.append(PageImage(source, caption, round(figure.get_figwidth() * _PIXELS)))
+        # A figure of 120 dots per inch is shown with 96 CSS pixels per inch.
+        images.append(PageImage(source, caption, round(figure.get_figwidth() * 96.0)))
     return tuple(images)
 
 

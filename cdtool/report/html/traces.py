@@ -17,14 +17,12 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.files.strict_json import finite
 from cdtool.base.files.typed_json import plain as values_of
 from cdtool.base.plain_text import plain
-from cdtool.results.traces.trace import Panel, Trace
+from cdtool.results.traces.trace import LEVELS, TIME_DECIMALS, Panel, Trace
 
 ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
 MISSING, ABOVE_ALL, BELOW_ALL = "!", "^", "_"
 
 _BYTES = np.frombuffer(ALPHABET.encode(), dtype=np.uint8)
-# Steps over the range of a panel, the step of a time [s] and the most of them.
-_LEVELS, _TIME_STEP, _TIMES = 8000, 1e-5, 1e9
 # Heights [px] of the parts of a trigger plot: load cell, a detector's row, and the time axis.
 HEIGHTS = {"force": 138, "row": 120, "axis": 44}
 
@@ -32,7 +30,7 @@ HEIGHTS = {"force": 138, "row": 120, "axis": 44}
 def trace_data(trace: Trace, detectors: Mapping[str, int]) -> dict[str, Any]:
     """One trace as JSON values; `detectors` are numbered."""
     # Neighbouring times are at most so many steps apart that the page's 32-bit numbers hold them.
-    time_step = max(_TIME_STEP, (trace.end - trace.start) / _TIMES)
+    time_step = max(10.0**-TIME_DECIMALS, (trace.end - trace.start) / 1e9)
     made: dict[str, Any] = {
         **{key: plain(getattr(trace, key)) for key in ("recording", "group", "chosen")},
         **{key: getattr(trace, key) for key in ("start", "end", "contact", "view", "joints")},
@@ -99,7 +97,7 @@ def _scale(*curves: FloatArray) -> tuple[float, float]:
     """Return the least value of curves, and the step in which they are written."""
     present = np.concatenate(curves)
     present = present[np.isfinite(present)]
-    step = float(f"{np.ptp(present) / _LEVELS:.6g}") if len(present) else 0.0
+    step = float(f"{np.ptp(present) / LEVELS:.6g}") if len(present) else 0.0
     return (float(present.min()) if len(present) else 0.0), step or 1.0
 
 

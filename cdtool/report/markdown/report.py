@@ -14,10 +14,10 @@ from cdtool.report.writers.base import Image, Report
 
 # Room for the verdict and how to read the results, whatever the names.
 _LEAST = 4_000
+#: A comment in a pull request is short.
 _LIMITS_NAMED = 5
-_REASONS_NAMED = 4
+#: Two names and an outcome fit in one line of a comment.
 _LONGEST_NAME = 40
-_LONGEST_OUTCOME = 160
 # The model's tables with all other results, collapsed because they are wider than a comment.
 _DETAILS = ("kinds", "conditions", "injected", "points")
 # The model's tables below the results, collapsed; its tables of the provenance follow.
@@ -70,7 +70,7 @@ def _head(model: Model) -> str:
     if failing := _failing(model):
         parts.append(f"**{model.tables['not_met'].title}:** {'; '.join(failing)}.")
     if model.reasons:
-        reasons = "; ".join(map(escape, model.first_reasons(_REASONS_NAMED)))
+        reasons = "; ".join(map(escape, model.first_reasons(4)))  # one line of a comment
         parts.append(f"**Reasons:** {reasons}.")
     if "attention" in model.tables:
         parts.append(_worst(model))
@@ -82,7 +82,7 @@ def _worst(model: Model) -> str:
     table = model.tables["attention"]
     name, group, *cells = table.rows[0]
     told = [
-        f"{column.heading}: {escape(cell.line, _LONGEST_OUTCOME)}"
+        f"{column.heading}: {escape(cell.line, 160)}"
         for column, cell in zip(table.columns[2:], cells, strict=True)
         if cell.tone
     ]

@@ -19,8 +19,6 @@ _ADDRESS = re.compile(r"(www)\.", re.IGNORECASE)
 # A usual name of a log is shorter; results.json has all of it.
 _LONGEST_CELL = 200
 _BLANK = "\n\n"
-# Lines of a table before its rows.
-_HEAD = 2
 
 
 def escape(text: object, longest: int | None = _LONGEST_CELL) -> str:
@@ -62,7 +60,7 @@ class Section:
         """Return as many of its rows as `room` characters hold, with a line that counts them; empty without any row."""
         if len(self.whole) <= room:
             return self.whole
-        head, rows = self.lines[:_HEAD], self.lines[_HEAD:]
+        head, rows = self.lines[:2], self.lines[2:]  # names and rule of the table
         frame = len(self._with(head, self._cut_note(len(rows))))
         ends = accumulate(len(line) + 1 for line in rows)
         kept = sum(frame + end <= room for end in ends)

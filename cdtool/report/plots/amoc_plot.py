@@ -44,7 +44,6 @@ _FIGURES = (
     SideColumn("not\nassessable", 50),
     SideColumn("false alarms\nin hold-out", 66),
 )
-_ARROW = 15.0
 # Share of a panel's width for the points without a false alarm.
 _ZONE = 0.27
 
@@ -140,7 +139,7 @@ def _mark_in_use(axes: Axes, item: AmocCurve, x: float) -> None:
 
 def _arrow_up(axes: Axes, place: tuple[float, float], colour: str) -> None:
     """Draw an arrow upward from a point: with the next safety factor the median is not reached."""
-    axes.annotate("", place, xytext=(0.0, _ARROW), textcoords="offset points", arrowprops=_arrow(colour))
+    axes.annotate("", place, xytext=(0.0, 15.0), textcoords="offset points", arrowprops=_arrow(colour))
 
 
 def _arrow(colour: str) -> dict[str, object]:

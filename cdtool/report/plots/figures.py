@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
+#: Letters of 7 points are sharp, and a figure of 9 in is 1080 pixels wide.
 _DPI = 120
 _BACKENDS = {
     ".png": "matplotlib.backends.backend_agg",
@@ -61,7 +62,6 @@ _STYLE: dict[str, object] = {
 }
 # Settings other than appearance: a backend is never chosen here, and reading some of them warns.
 _NOT_STYLE = ("backend", "interactive", "toolbar", "timezone", "tk.", "webagg.", "keymap.", "docstring.", "savefig.dir")
-_LONGEST_NAME = 40
 
 
 @contextmanager
@@ -220,7 +220,7 @@ def _settle(figure: Figure) -> None:
 def slug(name: str, taken: set[str]) -> str:
     """Return a group or detector as part of a file name: letters, digits, hyphens; new among `taken`, and added."""
     letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-    base = re.sub(r"[^a-z0-9]+", "-", letters.lower())[:_LONGEST_NAME].strip("-") or "unnamed"
+    base = re.sub(r"[^a-z0-9]+", "-", letters.lower())[:40].strip("-") or "unnamed"
     found, number = base, 1
     while found in taken:
         number += 1

@@ -31,19 +31,17 @@ if TYPE_CHECKING:
 
 _PALE = "0.72"
 _WORST = "#A3123F"
-_EMPHASISED = 6
+#: More pale curves are one grey area.
 _MOST_CURVES = 100
+#: Lines that fit beside the curve.
 _ALARMS_LISTED = 4
 # A record that covers this share of the time axis is drawn as if it covered all of it.
-_WHOLE = 0.99
-_PIXELS = 700
+WHOLE = 0.99
 _UNSEEN = HATCHES[Status.GAP]
 _ORDER = ("fail", "not_assessable", "pass")
 # The first part of the time axis [s] is the shortest of these with alarms and first peak; the rest is compressed.
 _VIEWS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 5.0)
-_VIEW_SHARE = 0.72
 _TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-_MOST_TICKS = 8.01
 
 
 @drawing()
@@ -116,12 +114,13 @@ def _name_limits(axes: Axes, curves: Sequence[TracedForce], profile: ForceProfil
 def _draw_curves(axes: Axes, curves: Sequence[TracedForce]) -> None:
     """Draw the worst contact on top, the next ones grey, the rest paler."""
     for rank, curve in reversed(list(enumerate(curves[:_MOST_CURVES]))):
-        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < _EMPHASISED else (_PALE, 0.5)
-        kept = kept_samples(axes.xaxis.get_transform().transform(curve.time), curve.force, _PIXELS)
+        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < 6 else (_PALE, 0.5)
+        # As many samples as the plot is wide in pixels.
+        kept = kept_samples(axes.xaxis.get_transform().transform(curve.time), curve.force, 700)
         axes.plot(curve.time[kept], curve.force[kept], color=colour, linewidth=width, zorder=4 if rank == 0 else 3)
     worst = curves[0]
     end = axes.get_xlim()[1]
-    if worst.verdict.end < _WHOLE * end:
+    if worst.verdict.end < WHOLE * end:
         axes.axvspan(worst.verdict.end, end, fill=False, edgecolor=NOT_ASSESSED, linewidth=0, hatch=_UNSEEN, zorder=0.6)
     seen = [step for step in worst.verdict.steps if math.isfinite(step.peak)]
     if seen:
@@ -195,7 +194,7 @@ def _handles(ranked: Sequence[Sequence[TracedForce]], end: float) -> list[Artist
     ]
     if any(len(curves) > 1 for curves in ranked):
         handles.insert(1, Line2D([], [], color="0.45", linewidth=0.8, label="other contacts"))
-    if any(curves[0].verdict.end < _WHOLE * end for curves in ranked):
+    if any(curves[0].verdict.end < WHOLE * end for curves in ranked):
         text = "worst contact's record has ended"
         handles.append(Patch(facecolor="white", edgecolor=NOT_ASSESSED, hatch=_UNSEEN, label=text))
     detectors = dict.fromkeys(name for curves in ranked for name in curves[0].alarms)
@@ -224,12 +223,13 @@ def _set_time(axes: Axes, nodes: Sequence[float]) -> None:
     """Set a time axis that is linear between its nodes; nothing beyond its end is drawn."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    shares = np.linspace(_VIEW_SHARE, 1.0, len(nodes) - 1) if len(nodes) > 2 else np.array([1.0])
+    # The first view, in which contacts rise, has most of the axis.
+    shares = np.linspace(0.72, 1.0, len(nodes) - 1) if len(nodes) > 2 else np.array([1.0])
     times, places = np.asarray(nodes), np.concatenate(([0.0], shares))
     to_place, to_time = partial(np.interp, xp=times, fp=places), partial(np.interp, xp=places, fp=times)
     axes.set_xscale("function", functions=(to_place, to_time))
     axes.set_xlim(nodes[0], nodes[-1])
-    step = next((step for step in _TICKS if nodes[1] / step <= _MOST_TICKS), _TICKS[-1])
+    step = next((step for step in _TICKS if nodes[1] / step <= 8.01), _TICKS[-1])  # 8 ticks, and rounding
     ticks = [tick for tick in np.arange(0.0, nodes[1], step).tolist() if nodes[1] - tick > 0.6 * step]
     axes.xaxis.set_major_locator(FixedLocator([*ticks, *nodes[1:]]))
     axes.xaxis.set_minor_locator(NullLocator())

@@ -20,14 +20,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.transforms import Bbox
 
+#: Points, chosen by eye: below those of the axes.
 _SIZE, _LIMIT_SIZE = 7.5, 7
-# Distances in points: from a point to its label, from a label to anything else, between samples of a line.
-_AWAY, _CLEAR, _SAMPLED = 3.5, 5.0, 3.0
-# From a line to the label's foot, tried in this order [points]; steps along the line.
+# Distance between the samples of a line that a label must not cover [points]: less than a letter.
+_SAMPLED = 3.0
+# From a line to the label's foot, tried in this order [points].
 _LIFTS = (2.0, 9.0, 18.0, 27.0)
-_STEPS = 30
-_INDENT = 4.0
-_HEIGHT = 9.0
 
 
 @dataclass(frozen=True)
@@ -79,10 +77,10 @@ def _free_corner(
     places: FloatArray, size: FloatArray, own: FloatArray, others: FloatArray, frame: FloatArray
 ) -> FloatArray | None:
     """Return the lower left corner of the first position where a text of a size covers nothing and is in the frame."""
-    sides = np.array([(-0.5 * size[0], _AWAY), (-0.5 * size[0], -_AWAY - size[1])])
+    sides = np.array([(-0.5 * size[0], 3.5), (-0.5 * size[0], -3.5 - size[1])])
     for corner in (place + side for place in places for side in sides):
         inside = np.all(corner >= frame[0] + 1.0) and np.all(corner + size <= frame[1] - 1.0)
-        if inside and not _covers(corner, size, own, 1.0) and not _covers(corner, size, others, _CLEAR):
+        if inside and not _covers(corner, size, own, 1.0) and not _covers(corner, size, others, 5.0):
             return np.asarray(corner)
     return None
 
@@ -130,9 +128,10 @@ def place_labels(axes: Axes, labels: Sequence[LineLabel], curves: Sequence[tuple
     for label in labels:
         (left, line), (right, _) = to_pixels([(label.begin, label.height), (label.end, label.height)])
         width = text_width([label.text], _LIMIT_SIZE) * 72.0 * points
-        starts = np.linspace(left + _INDENT * points, max(right - width - points, left + _INDENT * points), _STEPS)
+        begin = left + 4.0 * points
+        starts = np.linspace(begin, max(right - width - points, begin), 30)
         boxes = [
-            Bbox.from_bounds(start, line + lift * points, width, _HEIGHT * points)
+            Bbox.from_bounds(start, line + lift * points, width, 9.0 * points)
             for lift, start in product(_LIFTS, starts.tolist())
         ]
         free = next((box for box in boxes if _free(box, drawn, taken)), None)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 FLOOR_MS = 1.0
 # Round numbers of a decade; the coarse ones if the ends differ by more than this factor.
 _FINE, _COARSE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0), (1.0, 2.0, 5.0)
-_DECADES = 100.0
 
 
 def latency_range(values: FloatArray) -> tuple[float, float, bool]:
@@ -34,7 +33,7 @@ def set_ticks(axis: Axis, low: float, high: float) -> None:
     """Set the ticks of a logarithmic axis of latencies at round numbers from `low` to `high` [ms]."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    steps = _FINE if high < _DECADES * low else _COARSE
+    steps = _FINE if high < 100.0 * low else _COARSE
     ticks = [step * 10.0**power for power in range(8) for step in steps]
     axis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
     axis.set_minor_locator(NullLocator())

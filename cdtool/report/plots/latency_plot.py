@@ -44,13 +44,8 @@ _COLUMNS = (
     SideColumn("not\nassessable", 52),
     SideColumn("false\nalarms", 36),
 )
-_IMPACT_FREE = 70.0
-_ROW, _PANEL = 0.36, 0.2
+#: More marks in a row cover each other.
 _MOST_MARKS = 400
-# A longer line below the axis would begin left of the figure [characters].
-_LONGEST_LINE = 90
-# Low-discrepancy sequences spread the marks evenly, without random numbers.
-_GOLDEN, _ACROSS = 0.6180339887, 0.7548776662
 # Share of the width of the strip right of the axis, for missed contacts that were monitored for longer.
 _BEYOND = 0.09
 
@@ -75,7 +70,8 @@ class _Axis:
     def shown(self, times: FloatArray) -> FloatArray:
         """Return where times are drawn: at least the lower end of a logarithmic axis, beyond its end in the strip."""
         inside = np.maximum(times, FLOOR_MS) if self.logarithmic else times
-        share = 0.2 + 0.6 * (_ACROSS * np.arange(len(times), dtype=np.float64) % 1.0)
+        # Low-discrepancy sequences spread the marks evenly, without random numbers.
+        share = 0.2 + 0.6 * (0.7548776662 * np.arange(len(times), dtype=np.float64) % 1.0)
         return np.asarray(np.where(times > self.end, self._strip(share), inside))
 
     def placed(self, time: float) -> float:
@@ -100,7 +96,7 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
     impact_free = list(dict.fromkeys(item.group for item in evaluated.summaries if not item.contacts))
-    more = [SideColumn(f"false alarms\nin {label(group, 11)}", _IMPACT_FREE) for group in impact_free]
+    more = [SideColumn(f"false alarms\nin {label(group, 11)}", 70.0) for group in impact_free]
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]
@@ -108,7 +104,7 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     explained = _explained(summaries, list(marks.values()), axis)
     bottom = 0.325 + 0.175 * len(explained.splitlines())
     margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, bottom)
-    heights = [_PANEL + _ROW * len(rows[group]) for group in groups]
+    heights = [0.2 + 0.36 * len(rows[group]) for group in groups]
     figure, panels = stacked_panels(margins.left + 4.4 + margins.right, heights, margins, gap=0.36)
     set_latency_scale(panels[-1], axis.low, axis.end, axis.logarithmic)
     panels[-1].set_xlim(axis.low, axis.high)
@@ -171,7 +167,7 @@ def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis)
     look = look_of(detector)
     for times, filled in ((marks.detected, True), (marks.missed, False)):
         shown = axis.shown(_thinned(times))
-        height = row - 0.12 + 0.42 * (np.arange(len(shown)) * _GOLDEN % 1.0 - 0.5)
+        height = row - 0.12 + 0.42 * (np.arange(len(shown)) * 0.6180339887 % 1.0 - 0.5)  # see _Axis.shown
         axes.plot(
             shown,
             height,
@@ -245,7 +241,8 @@ def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axi
         no_bar = f"no bar with fewer than {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
         lines = (
             [*lines, no_bar]
-            if len(lines[-1]) + len(no_bar) > _LONGEST_LINE
+            # A longer line below the axis would begin left of the figure [characters].
+            if len(lines[-1]) + len(no_bar) > 90
             else [*lines[:-1], f"{lines[-1]}; {no_bar}"]
         )
     return "\n".join(lines)

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-_PIXELS = 1000
+#: A panel has fewer pixels.
+PIXELS = 1000
 
 
 class Legend:
@@ -66,9 +67,9 @@ def draw_signal(axes: Axes, course: StatisticCurve, detector: str, span: Span, l
     if not len(part.time):
         return
     valid = part.status == Status.VALID
-    axes.plot(*decimate(part.time, part.value, _PIXELS), color=NOT_ASSESSED, linewidth=0.8, zorder=2)
+    axes.plot(*decimate(part.time, part.value, PIXELS), color=NOT_ASSESSED, linewidth=0.8, zorder=2)
     value = np.where(valid, part.value, np.nan)
-    axes.plot(*decimate(part.time, value, _PIXELS), color=look_of(detector).colour, zorder=3)
+    axes.plot(*decimate(part.time, value, PIXELS), color=look_of(detector).colour, zorder=3)
     legend.add("signal")
     _draw_band(axes, part.time, part.lower, part.upper, valid, legend)
     _draw_not_assessable(axes, part.time, part.status, span, legend)
@@ -103,7 +104,7 @@ def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, c
     axes.margins(y=0.06 if contact else 1.2)
     part = (time >= span[0]) & (time <= span[1])
     if part.any():
-        axes.plot(*decimate(time[part], force[part], _PIXELS), color=FORCE, linewidth=0.9)
+        axes.plot(*decimate(time[part], force[part], PIXELS), color=FORCE, linewidth=0.9)
 
 
 def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str, legend: Legend) -> None:
@@ -192,21 +193,21 @@ def _draw_band(
     for limit in (lower, upper):
         finite = np.where(np.isfinite(limit), limit, np.nan)
         if np.isfinite(finite).any():
-            axes.plot(*decimate(time, finite, _PIXELS), color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=3)
+            axes.plot(*decimate(time, finite, PIXELS), color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=3)
             legend.add("limit")
     if not ((np.isfinite(lower) | np.isfinite(upper)) & valid).any():
         return
     low = np.where(np.isneginf(lower), edge_low, lower)
     low[~valid] = np.nan
     high = np.where(np.isposinf(upper), edge_high, upper)
-    kept = np.union1d(kept_samples(time, low, _PIXELS), kept_samples(time, high, _PIXELS))
+    kept = np.union1d(kept_samples(time, low, PIXELS), kept_samples(time, high, PIXELS))
     axes.fill_between(time[kept], low[kept], high[kept], color=BAND, linewidth=0, zorder=1)
     legend.add("band")
 
 
 def _draw_not_assessable(axes: Axes, time: FloatArray, status: np.ndarray, span: Span, legend: Legend) -> None:
     for code, reason in REASONS.items():
-        column = (span[1] - span[0]) / _PIXELS
+        column = (span[1] - span[0]) / PIXELS
         found = [item for item in intervals(status == code, time, column) if item[1] - item[0] > 2.0 * column]
         if not found:
             continue

@@ -33,8 +33,6 @@ _FIGURES = (
 )
 # With more curves than this, bands would hide each other.
 _MOST_BANDS = 3
-_MARKS = 6
-_MOST_CENSORED = 200
 
 
 @drawing()
@@ -93,7 +91,7 @@ def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) ->
     if banded:
         axes.fill_between(times, below, above, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=1)
     falls = np.flatnonzero(np.diff(curve.share) < 0.0) + 1
-    shown = falls[np.linspace(0, len(falls) - 1, min(_MARKS, len(falls))).astype(int)] if len(falls) else falls
+    shown = falls[np.linspace(0, len(falls) - 1, min(6, len(falls))).astype(int)] if len(falls) else falls
     axes.plot(
         times[shown],
         curve.share[shown],
@@ -104,7 +102,7 @@ def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) ->
         zorder=4,
         clip_on=False,
     )
-    missed = np.unique(item.missed)[:_MOST_CENSORED]
+    missed = np.unique(item.missed)[:200]
     left = curve.share[np.searchsorted(curve.times, missed, side="right") - 1]
     axes.plot(
         np.maximum(missed, low),

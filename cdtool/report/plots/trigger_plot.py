@@ -39,12 +39,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STEPS = (0.01, 0.02, 0.05, 0.1, 0.2)
-_WIDTH = 9.0
-_FORCE, _ROW = 0.98, 0.66
+#: Points, chosen by eye.
 _NAME_SIZE, _VERDICT_SIZE, _DETAIL_SIZE = 9, 10, 8
 # From the axis to the name of a row, past the numbers of its ticks; from the axis to a verdict [points].
 _TICKS, _AWAY = 44.0, 8.0
-_LEGEND_COLUMNS, _LEGEND_ROW = 4, 0.18
+#: As many as are beside each other in 9 in.
+_LEGEND_COLUMNS = 4
 
 
 @drawing()
@@ -53,8 +53,8 @@ def trigger_figure(trace: Trace) -> Figure:
     contact = trace.shown
     rows = sorted(trace.panels, key=lambda row: (_late(trace, row), contact is not None and _blind(trace, row)))
     forced = len(trace.force) > 0
-    heights = [_FORCE] * forced + [_ROW] * len(rows)
-    figure, panels = stacked_panels(_WIDTH, heights, _margins(trace, rows), gap=0.14)
+    heights = [0.98] * forced + [0.66] * len(rows)
+    figure, panels = stacked_panels(9.0, heights, _margins(trace, rows), gap=0.14)
     legend = Legend(None)
     if forced:
         draw_force(panels[0], trace.force_time, trace.force, trace.view, contact=contact is not None)
@@ -85,9 +85,7 @@ def _margins(trace: Trace, rows: Sequence[Panel]) -> Margins:
     right = max(1.2 * verdict, text_width([detail for _, detail in verdicts], _DETAIL_SIZE))
     left = text_width([*names, "load cell"], _NAME_SIZE) + _TICKS / 72.0
     kinds = 5 + len({code for row in rows for code in row.course.within(trace.view).status.tolist() if code})
-    return Margins(
-        left + 0.08, right + _AWAY / 72.0 + 0.1, 0.34, 0.52 + _LEGEND_ROW * math.ceil(kinds / _LEGEND_COLUMNS)
-    )
+    return Margins(left + 0.08, right + _AWAY / 72.0 + 0.1, 0.34, 0.52 + 0.18 * math.ceil(kinds / _LEGEND_COLUMNS))
 
 
 def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) -> None:

@@ -27,7 +27,7 @@ from cdtool.report.tables.results import detector_cell, part_of
 from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, RecordingResult, Results, grouped
 from cdtool.results.summary import later_ms
 
-_MOST_LISTED = 3
+#: 48 bits: no two logs of a benchmark have the same.
 _DIGEST = 12
 _FORCE_ORDER = ("fail", "not_assessable", "pass")
 
@@ -208,7 +208,7 @@ def _outcome_cell(part: _Outcome, recording: RecordingResult, silent: bool) -> C
 
 
 def _contact_words(contacts: Sequence[ContactResult]) -> list[str]:
-    if len(contacts) <= _MOST_LISTED:
+    if len(contacts) <= 3:
         return [", ".join(map(_contact_word, contacts))] if contacts else []
     latencies = [item.latency_ms for item in contacts if item.latency_ms is not None]
     slowest = f", slowest {number(max(latencies))}" if latencies else ""

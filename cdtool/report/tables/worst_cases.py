@@ -20,8 +20,6 @@ from cdtool.report.tables.results import detector_cell
 from cdtool.results.results import ContactResult, FalseAlarmResult, ForceResult, Results, grouped
 
 Row = TypeVar("Row")
-# Cases of one kind, and at least so many of each detector and group.
-_MOST_OF_KIND, _FEWEST_OF_PAIR = 600, 5
 # Outcomes of contacts: name, tone, how all of them are counted, and which are the worst.
 _OUTCOMES = {
     "missed": ("missed", "bad", "missed", "peak_force_n"),
@@ -94,7 +92,7 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
 def _kinds(results: Results, traced: Collection[Log]) -> Iterator[tuple[str, Sequence[_Case], int]]:
     """Yield each kind of case in words, its listed cases, and how many there are."""
     pairs = max(len(results.every_group) * len(results.detectors), 1)
-    most = max(_MOST_OF_KIND // pairs, _FEWEST_OF_PAIR)
+    most = max(600 // pairs, 5)  # cases of one kind, and at least of each detector and group
     failed = grouped(results.forces, "verdict").get("fail", ())
     worst = _worst(failed, ("group",), "peak_n", most * max(len(results.detectors), 1), traced)
     yield "contacts above their force limits", [_of_force(item) for item in worst], len(failed)

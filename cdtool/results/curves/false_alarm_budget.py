@@ -24,7 +24,6 @@ _FORM = re.compile(
 )
 # Where a count has to be looked for, factors are tried that many to an octave.
 _STEPS = 32
-_HIGHEST_CONFIDENCE = 0.9999
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Budget:
         rate = count / exposure if exposure else math.nan
         if found is None or not (0.0 < count < math.inf and 0.0 < exposure < math.inf and 1e-12 < rate < 1e12):
             raise UsageError(f"false-alarm budget is '{text}'", "give 1/1000op (operations) or 0.1/h (hours)")
-        if confidence is not None and not 0.5 <= confidence <= _HIGHEST_CONFIDENCE:
+        if confidence is not None and not 0.5 <= confidence <= 0.9999:
             raise UsageError(f"false-alarm budget is '{text}'", "give a confidence from 50% to 99.99%, as 'at 95%'")
         if found[3].startswith("o") and rate > 1.0 and confidence is not None:
             raise UsageError(f"false-alarm budget is '{text}'", "with a confidence, give at most one per operation")

@@ -18,6 +18,7 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.detectors.detection import WHOLE_MACHINE
 from cdtool.recordings.recording import REFERENCES, Recording
+from cdtool.statistics.spread import MAD_TO_STD
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, NormalMotion, levels_of
 
 #: Commands to the machine. The reference torque is not one: it is a controller's output and responds to a contact.
@@ -35,8 +36,6 @@ LEAST_PAST_SECONDS = 0.2
 ENOUGH = 10
 #: A run's own offset counts up to this many spreads (friction varies from run to run); more is a departure.
 OWN_OFFSET = 2.5
-#: A standard deviation from the median absolute deviation of Gaussian noise.
-MAD = 1.4826
 #: Computed values are as exact as this share of the largest.
 ROUNDING = 1e-9
 #: Uncertainty of the time at which a channel left [s]: of channels that leave within it, the cause comes first.
@@ -139,7 +138,7 @@ def own_past(time: FloatArray, value: FloatArray, begin: float) -> list[FloatArr
     ahead, known = time - begin, value[past]
     line, first, second = (np.polyfit(ahead[part], value[part], 1) for part in (past, *np.array_split(past, 2)))
     mean = np.asarray(np.polyval(line, ahead), dtype=np.float64)
-    noise = max(MAD * float(np.median(np.abs(known - mean[past]))), quantisation(known))
+    noise = max(MAD_TO_STD * float(np.median(np.abs(known - mean[past]))), quantisation(known))
     return [value, mean, noise + abs(first[0] - second[0]) * np.maximum(ahead, 0.0)]
 
 

@@ -41,7 +41,6 @@ _PARTS: Mapping[str, tuple[str, ...]] = {
 # Tables that also have columns of the recording.
 _OF_RECORDING = ("contacts", "false_alarms", "recordings")
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
-_LONGEST_NAME = 40
 _NEXT_STEP = "write one with cdtool benchmark -o results.parquet"
 
 
@@ -208,7 +207,7 @@ def _parts(table: str, rows: Sequence[Any]) -> Iterator[tuple[str, Sequence[_Num
     for names, numbered in zip(keys, enumerate(rows), strict=True):
         parts.setdefault(names, []).append(numbered)
     for place, (names, part) in enumerate(parts.items()):
-        yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:_LONGEST_NAME] for name in names)}", part
+        yield f"{place:04d}-{'.'.join(_NO_NAME.sub('-', name)[:40] for name in names)}", part
 
 
 def _write(path: Path, kind: Any, rows: Sequence[_Numbered], of_recordings: _OfRecordings | None) -> None:

@@ -18,6 +18,7 @@ from cdtool.base.files.bounded_loading import MOST_JSON, ContentError, read_byte
 from cdtool.base.files.typed_json import encoded, typed
 from cdtool.results.traces.trace import Trace
 
+# Of the layout of the traces: a change of it counts on.
 SCHEMA_VERSION = 4
 # The name of the file in a results.parquet.
 TRACES_IN_FOLDER = "results.traces.json.gz"

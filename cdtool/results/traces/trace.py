@@ -20,12 +20,9 @@ from cdtool.truth.matching import Match, Matching
 Span = tuple[float, float]
 
 # Decimals of a time [s], and steps over the range of a panel: a plot has fewer pixels.
-_TIME_DECIMALS, _LEVELS = 5, 8000
-# Significant digits of a float64.
-_DIGITS = 15
+TIME_DECIMALS, LEVELS = 5, 8000
 # Columns of pixels kept of the whole operation, and again of the view on the contact.
 _WHOLE, _VIEW = 200, 250
-_SHORTEST_VIEW, _LONGEST_VIEW = 0.3, 1.2
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ class StatisticCurve:
         found = self.at(np.flatnonzero(kept))
         # One scale, so that a value above a limit is never below it.
         value, lower, upper = rounded(found.value, found.lower, found.upper)
-        return StatisticCurve(np.round(found.time, _TIME_DECIMALS), value, lower, upper, found.status)
+        return StatisticCurve(np.round(found.time, TIME_DECIMALS), value, lower, upper, found.status)
 
 
 def rounded(*curves: FloatArray) -> list[FloatArray]:
@@ -80,8 +77,8 @@ def rounded(*curves: FloatArray) -> list[FloatArray]:
     span = float(np.ptp(known)) if len(known) else 0.0
     if span == 0.0:
         return list(curves)
-    exact = _DIGITS - math.ceil(math.log10(float(np.abs(known).max())))
-    decimals = min(math.ceil(math.log10(_LEVELS / span)), exact)
+    exact = 15 - math.ceil(math.log10(float(np.abs(known).max())))  # the significant digits of a float64
+    decimals = min(math.ceil(math.log10(LEVELS / span)), exact)
     return [np.round(curve, decimals) for curve in curves]
 
 
@@ -206,11 +203,11 @@ def make_trace(
     return Trace(
         recording=operation.name,
         group=group,
-        start=round(recording.start, _TIME_DECIMALS),
-        end=round(recording.end, _TIME_DECIMALS),
+        start=round(recording.start, TIME_DECIMALS),
+        end=round(recording.end, TIME_DECIMALS),
         contacts=tuple(contacts),
         contact=contact,
-        view=(round(view[0], _TIME_DECIMALS), round(view[1], _TIME_DECIMALS)),
+        view=(round(view[0], TIME_DECIMALS), round(view[1], TIME_DECIMALS)),
         force_time=force_time,
         force=force,
         panels=tuple(panels),
@@ -255,7 +252,7 @@ def _view(contact: Contact | None, found: Sequence[Match | None], whole: Span) -
     if contact is None:
         return whole
     latest = max((item.latency for item in found if item and item.alarm), default=0.0)
-    length = min(max(1.25 * latest, _SHORTEST_VIEW), _LONGEST_VIEW)
+    length = min(max(1.25 * latest, 0.3), 1.2)
     return max(contact.start - 0.25 * length, whole[0]), min(contact.start + length, whole[1])
 
 

@@ -23,18 +23,8 @@ from cdtool.truth.rest_level import rest_before
 _STUCK = 5
 # Before the rounded top of a smooth peak, the reading one step lower lasts this share of it or more: a parabola 0.2.
 _SLOW = 0.15
-# Readings that differ by less than this share of the largest are equal: files have six digits or more.
-_ROUNDING = 1e-6
-# Readings up to so many steps apart are multiples of the step, within this share of it.
-_NEAR, _ON_GRID = 10.0, 0.1
-# An axis takes part in a contact from this share of the magnitude's peak on.
-_TAKES_PART = 0.3
-# The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
-# recording's top speed the axis is at rest.
-_BEFORE = 0.1
-_STANDSTILL = 0.05
-# A cell that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
-_TAIL = 0.1
+# A cell that ends earlier than its log by this time [s] has not recorded all of it.
+TAIL = 0.1
 
 
 @dataclass(frozen=True)
@@ -250,18 +240,20 @@ def _end(recording: Recording, contact: Contact, clock: CellClock) -> float:
     """Return until when samples are expected [s]: the cell's last one, or the log's if the cell ends in the contact."""
     last = float(recording["force"].time[-1])
     pressing = contact.end >= float(clock.time[-1]) - clock.longest_step
-    return recording.end if pressing and recording.end - last > _TAIL else last
+    return recording.end if pressing and recording.end - last > TAIL else last
 
 
 def _resolution(force: FloatArray) -> float:
     """Return the step in which readings are written [N]; 0 if they are on no such grid, or too few show one."""
     steps = np.diff(np.unique(force))
-    steps = steps[steps > _ROUNDING * float(np.max(np.abs(force)))]
+    # Readings that differ by less than 1e-6 of the largest are equal: files have six digits or more.
+    steps = steps[steps > 1e-6 * float(np.max(np.abs(force)))]
     if not len(steps):
         return 0.0
     smallest = float(steps.min())
-    near = steps[steps < _NEAR * smallest] / smallest
-    is_grid = len(near) > 1 and bool(np.all(np.abs(near - np.rint(near)) < _ON_GRID))
+    # Readings up to ten steps apart are multiples of the step, within a tenth of it.
+    near = steps[steps < 10.0 * smallest] / smallest
+    is_grid = len(near) > 1 and bool(np.all(np.abs(near - np.rint(near)) < 0.1))
     return smallest if is_grid else 0.0
 
 
@@ -311,7 +303,8 @@ def _axis_at_stop(series: Series, first: int, last: int) -> BoolArray | bool:
     at_stop = np.zeros(len(axes), dtype=bool)
     for over, reading in zip(axes.T, readings.T, strict=True):
         largest = float(over[np.argmax(np.abs(over))])
-        if abs(largest) >= _TAKES_PART * peak:
+        # An axis takes part in a contact from 30 % of the magnitude's peak on.
+        if abs(largest) >= 0.3 * peak:
             at_stop |= _at_stop(np.copysign(1.0, largest) * reading)
     return at_stop
 
@@ -339,10 +332,11 @@ def _direction(recording: Recording, joint: int, onset: float) -> float:
     """Return +1 or -1: the direction of the joint at the beginning of the contact."""
     series = recording["speed"]
     speed = series.values[:, joint]
-    before = speed[(series.time >= onset - _BEFORE) & (series.time <= onset)]
+    # The direction of travel is that of the mean speed over the last 0.1 s before the onset.
+    before = speed[(series.time >= onset - 0.1) & (series.time <= onset)]
     before = before[np.isfinite(before)]
     mean = float(np.mean(before)) if len(before) else 0.0
-    if abs(mean) <= _STANDSTILL * float(np.nanmax(np.abs(speed), initial=0.0)):
+    if abs(mean) <= 0.05 * float(np.nanmax(np.abs(speed), initial=0.0)):  # at rest
         raise RecordingError(
             f"{recording.name}: the axis is at rest at {onset:.3f} s: the direction of the contact force is unknown",
             "set mass_before_cell to 0",

@@ -24,30 +24,10 @@ from cdtool.truth.synchronisation.smoothing import POINTS_PER_WIDTH, REACH, Grid
 
 # Delays up to this are found [s].
 LONGEST_DELAY = 0.25
-# A periodic motion would allow longer ones: filters of drives are shorter than this [s].
-_LONGEST_IN_MOTION = 0.1
 # Widths of the smoothing: these multiples of the longer sample period. The least is what a local fit needs.
 _WIDTHS = (1.5, 3.0, 6.0, 12.0, 24.0)
-# Twice the chosen width must still resolve an event: at least this many widths per event [-].
-_WIDTHS_PER_EVENT = 12.0
-# A contact is examined from this time before its onset to this time after its end, and at most this long [s].
-_BEFORE, _AFTER, _LONGEST_CONTACT = 0.15, 0.05, 0.6
-# A motion is examined in sections of at least this length [s]; as many as are needed and as are affordable.
-_SECTION, _MOST_SECTIONS = 1.0, 48
-_PERIODS_PER_SECTION = 100.0
-# A long log is not cut into more sections than this, of which the ones to examine are chosen.
-_FINEST_CUT = 2000
-# A smoothing counts if at least this share of the events that another one shows have a delay.
-_ENOUGH_EVENTS = 0.75
-# So many sections must agree: a single one may show the machine's elasticity, not the channel.
-_LEAST_AGREEING = 3
-# Contacts that are examined: spread over the log.
-_MOST_CONTACTS = 200
-# A force that rises within a sample period is not resolved: its delay is uncertain by this share of the period, and by
-# less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so much.
-_ALIASING = 0.1
-# A delay whose standard error is larger than this [s] says nothing.
-_LARGEST_ERROR = 0.05
+# Sections of a motion that are examined: as many as are needed, and as are affordable.
+_MOST_SECTIONS = 48
 
 
 @dataclass(frozen=True)
@@ -166,7 +146,8 @@ def _by_sections(empty: ChannelDelay, observed: _Waveform, predictor: _Waveform,
     if not windows:
         return replace(empty, reason="the motion is too short, or at rest")
     found = _best_delay(empty, observed, [[predictor]], windows)
-    if found.assessable and len(found.used) < _LEAST_AGREEING:
+    # Three sections must agree: a single one may show the machine's elasticity, not the channel.
+    if found.assessable and len(found.used) < 3:
         reason = f"only {counted(len(found.used), 'section')} of {len(windows)} with a change of motion that both show"
         return replace(empty, events=found.events, reason=reason)
     return found
@@ -174,7 +155,8 @@ def _by_sections(empty: ChannelDelay, observed: _Waveform, predictor: _Waveform,
 
 def _sections(start: float, end: float, period: float, predictor: _Waveform) -> list[_Window]:
     """Return the sections of a motion in which it changes, at most `_MOST_SECTIONS`."""
-    length = max(_SECTION, _PERIODS_PER_SECTION * period, (end - start) / _FINEST_CUT)
+    # At least 1 s and 100 samples; a long log is cut into 2000 sections, from which the ones to examine are chosen.
+    length = max(1.0, 100.0 * period, (end - start) / 2000)
     if end - start < length:
         return []
     count = max(int((end - start) / length), 1)
@@ -211,13 +193,11 @@ def _load_cell_delays(
 
 
 def _contact_windows(force: Series, contacts: Sequence[Contact]) -> list[_Window]:
-    usable = [contact for contact in contacts if not contact.in_progress]
-    if len(usable) > _MOST_CONTACTS:
-        usable = [usable[i] for i in np.linspace(0, len(usable) - 1, _MOST_CONTACTS).round().astype(int)]
     windows = []
-    for contact in usable:
-        end = min(contact.end + _AFTER, contact.start + _LONGEST_CONTACT)
-        windows.append(_Window(contact.start - _BEFORE, end, _rise_time(force, contact)))
+    for contact in (item for item in contacts if not item.in_progress):
+        # From 0.15 s before its onset to 0.05 s after its end; of a long one, the rise and what follows it.
+        end = min(contact.end + 0.05, contact.start + 0.6)
+        windows.append(_Window(contact.start - 0.15, end, _rise_time(force, contact)))
     return windows
 
 
@@ -287,14 +267,14 @@ def _best_delay(
     """Return the delay with the narrowest interval of all smoothings, widened by its change at twice that."""
     period = max(observed.period, *(part.period for parts in sums for part in parts))
     shortest = min(window.end - window.start for window in windows)
-    widths = [factor * period for factor in _WIDTHS if factor * period * _WIDTHS_PER_EVENT <= shortest] or [
-        _WIDTHS[0] * period
-    ]
+    # Twice the chosen width must still resolve an event: at least 12 widths per event.
+    widths = [factor * period for factor in _WIDTHS if factor * period * 12.0 <= shortest] or [_WIDTHS[0] * period]
     trials = [_joint_events(observed, sums, windows, width) for width in widths]
     counts = [sum(event.delay.known for event in events) for events in trials]
     # A few events by chance, of many, do not show a smoothing to be good.
     scores = [
-        _score(events) if count >= _ENOUGH_EVENTS * max(counts) else math.inf
+        # A smoothing counts if it shows a delay in at least 75 % of the events in which another one does.
+        _score(events) if count >= 0.75 * max(counts) else math.inf
         for events, count in zip(trials, counts, strict=True)
     ]
     best = int(np.argmin(scores))
@@ -323,16 +303,20 @@ def _event(observed: _Waveform, parts: Sequence[_Waveform], window: _Window, wid
     is_contact = not math.isnan(window.rise)
     # A contact that is later than half of its window would be compared with what is not part of it.
     half = 0.5 * (window.end - window.start)
-    longest = min(LONGEST_DELAY, half) if is_contact else max(_LONGEST_IN_MOTION, 4.0 * width)
+    # A periodic motion would allow longer ones: filters of drives are shorter than 0.1 s.
+    longest = min(LONGEST_DELAY, half) if is_contact else max(0.1, 4.0 * width)
     wide = Grid.over(window.start - longest - step, window.end + longest + step, step)
     predicted = sum((part.on(wide, width) for part in parts), np.zeros(wide.count))
     y = SmoothSignal(own, observed.on(own, width))
     delay = delay_of(y, SmoothSignal(wide, predicted), window.start, window.end, longest, is_contact)
-    if delay.known and delay.error > _LARGEST_ERROR:
+    # A delay whose standard error is above 50 ms says nothing.
+    if delay.known and delay.error > 0.05:
         delay = EventDelay(delay.time, math.nan, math.nan, delay.explained, reason="the signals do not change enough")
     if delay.known and is_contact:
         period = max(observed.period, *(part.period for part in parts))
-        aliasing = _ALIASING * period * min(period / window.rise, 1.0)
+        # A force that rises within a sample period is not resolved: its delay is uncertain by a tenth of the period,
+        # and by less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so.
+        aliasing = 0.1 * period * min(period / window.rise, 1.0)
         delay = replace(delay, error=math.hypot(delay.error, aliasing))
     return TimedEvent(delay, window.rise)
 

@@ -22,16 +22,10 @@ from cdtool.truth.synchronisation.delay import EventDelay
 RestsOn = Literal["derivative", "two masses", "momentum balance", "deceleration"]
 
 _UNKNOWN = Interval(math.nan, math.nan, math.nan)
-# The rise times of soft contacts are at least so many times those of stiff ones.
-_KINDS_APART = 2.5
-# An interval is clearly narrower than another one from this ratio.
-_PREFERENCE = 0.5
 #: Fewer contacts do not show how much contacts scatter: one contact read 1.50 ms (1.35 to 1.65) at a true offset of 0.
 LEAST_CONTACTS = 5
 #: An offset whose interval is wider than this [s] says nothing about a clock: it is as long as a stiff contact's rise.
 _WIDEST_OFFSET = 0.02
-# A drift is not assessable if its interval is wider than this to each side [s/s]: no clock drifts so much.
-_WIDEST_DRIFT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -211,7 +205,8 @@ def preferred(delays: Sequence[ChannelDelay]) -> tuple[ChannelDelay, ...]:
     best: dict[tuple[str, str], ChannelDelay] = {}
     for item in delays:
         key = (item.channel, item.joint)
-        if key not in best or _half(item) < _PREFERENCE * _half(best[key]):
+        # Half as wide is clearly narrower.
+        if key not in best or _half(item) < 0.5 * _half(best[key]):
             best[key] = item
     return tuple(best.values())
 
@@ -224,7 +219,8 @@ def _half(delay: ChannelDelay) -> float:
 def _is_unclear(drift: Interval, rests_on: RestsOn) -> bool:
     """Return True for a drift that is not assessable, or that of channels of one device if it may be zero."""
     is_zero = drift.low <= 0.0 <= drift.high
-    return drift.high - drift.low > 2.0 * _WIDEST_DRIFT or (rests_on == "derivative" and is_zero)
+    # No clock drifts by 1 ms/s: a drift that is known no better to each side is not assessable.
+    return drift.high - drift.low > 2e-3 or (rests_on == "derivative" and is_zero)
 
 
 def _widened(interval: Interval, dependence: float) -> Interval:
@@ -245,7 +241,7 @@ def _by_kind(events: Sequence[TimedEvent]) -> tuple[Interval, Interval]:
         return _UNKNOWN, _UNKNOWN
     ratios = [later / max(rise, 1e-6) for rise, later in pairwise(rises[1:-1])]
     widest = max(range(len(ratios)), key=ratios.__getitem__)
-    if ratios[widest] < _KINDS_APART:
+    if ratios[widest] < 2.5:  # soft contacts rise at least so much slower than stiff ones
         return _UNKNOWN, _UNKNOWN
     limit = rises[widest + 1]
     stiff = [event.delay for event in events if event.rise <= limit]

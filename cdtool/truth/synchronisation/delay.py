@@ -13,23 +13,13 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.truth.synchronisation.smoothing import Grid
 
-# Steps of Gauss and Newton; they end when the delay changes by less than this share of the grid's step.
-_STEPS, _ENOUGH = 20, 1e-4
 # The best fit must explain this share of the variance (the correlation is its root).
 LEAST_EXPLAINED = 0.5
 # A second maximum of the explained share counts as another solution from this share of the first one.
 _AMBIGUOUS = 0.95
-# Lags that the autocovariance of the residual is computed for: in steps of the grid, and as a share of the section.
-_LEAST_LAGS, _SHARE_OF_LAGS = 12, 8
 # A correlation counts from so many standard deviations of chance: the best of many delays is chosen.
 # An event that both signals must show, as a contact, needs less.
 _SIGNIFICANT, _SIGNIFICANT_EVENT = 3.5, 2.0
-# Scale, offset, delay and the width of the smoothing.
-_PARAMETERS = 4.0
-# A standard error is never smaller [s]: data without noise do not make an infinite weight.
-_LEAST_ERROR = 1e-9
-# Of values up to 1, a smaller variance is rounding.
-_ROUNDING = 1e-24
 # A section needs so many grid points.
 LEAST_POINTS = 16
 
@@ -193,7 +183,7 @@ def _explained(y: FloatArray, x: FloatArray, most: int) -> FloatArray:
     squares_y = sums(known_x, own**2) - sum_y**2 / count
     products = sums(other, own) - sum_x * sum_y / count
     sound = count >= max(LEAST_POINTS, np.count_nonzero(is_y) // 2)
-    sound &= (squares_x > _ROUNDING * count) & (squares_y > _ROUNDING * count)
+    sound &= (squares_x > 1e-24 * count) & (squares_y > 1e-24 * count)  # of values up to 1, less is rounding
     shares[sound] = products[sound] ** 2 / (squares_x[sound] * squares_y[sound])
     return shares
 
@@ -223,7 +213,7 @@ def _refined(y: FloatArray, x: FloatArray, most: int, delay: float, step: float,
     at_x = step * (np.arange(len(x)) - most)
     is_x = np.asarray(np.isfinite(x))
     spline = CubicSpline(at_x[is_x], x[is_x])
-    for _ in range(_STEPS):
+    for _ in range(20):  # steps of Gauss and Newton, which end at 1e-4 of the grid's step
         both = _usable(y, is_x, at_y - delay, float(at_x[0]), step)
         if np.count_nonzero(both) < LEAST_POINTS:
             return _unknown(middle, "too few samples")
@@ -239,7 +229,7 @@ def _refined(y: FloatArray, x: FloatArray, most: int, delay: float, step: float,
             return _unknown(middle, "the signals do not change enough")
         change = float(own @ residual) / power
         delay += float(np.clip(change, -step, step))
-        if abs(change) < _ENOUGH * step:
+        if abs(change) < 1e-4 * step:
             break
     else:
         return _unknown(middle, "no unique delay")
@@ -248,7 +238,8 @@ def _refined(y: FloatArray, x: FloatArray, most: int, delay: float, step: float,
     error, freedom = _standard_error(own, residual)
     total = float(np.sum((y[both] - y[both].mean()) ** 2))
     explained = 1.0 - float(residual @ residual) / total
-    return EventDelay(middle, delay, max(error, _LEAST_ERROR), explained, freedom)
+    # A standard error is at least 1 ns: data without noise do not make an infinite weight.
+    return EventDelay(middle, delay, max(error, 1e-9), explained, freedom)
 
 
 def _usable(y: FloatArray, is_x: BoolArray, at: FloatArray, first: float, step: float) -> BoolArray:
@@ -264,7 +255,8 @@ def _standard_error(own: FloatArray, residual: FloatArray) -> tuple[float, float
     The larger of two estimates: with the autocovariance of the scores (Newey and West), and with that of the residual.
     """
     count, power = len(own), float(own @ own)
-    lags = min(max(_LEAST_LAGS, count // _SHARE_OF_LAGS), count - 1)
+    # Six widths of the smoothing, and an eighth of a long section.
+    lags = min(max(12, count // 8), count - 1)
     weights = 1.0 - np.arange(1, lags + 1) / (lags + 1)
     of_scores, of_residual, of_own = (_autocovariance(item, lags) for item in (own * residual, residual, own))
     scores = float(of_scores[0] + 2.0 * weights @ of_scores[1:])
@@ -273,7 +265,7 @@ def _standard_error(own: FloatArray, residual: FloatArray) -> tuple[float, float
     # Of the independent residuals those count at which the signals change.
     decay = max(1.0 + 2.0 * float(weights @ of_residual[1:]) / max(float(of_residual[0]), 1e-300), 1.0)
     independent = power**2 / float(np.sum(own**4)) / decay
-    freedom = max(independent - _PARAMETERS, 1.0)
+    freedom = max(independent - 4.0, 1.0)  # scale, offset, delay and the width of the smoothing
     return math.sqrt(variance * max(independent / freedom, 1.0)) / power, freedom
 
 

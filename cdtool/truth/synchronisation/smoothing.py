@@ -21,8 +21,6 @@ IntArray = npt.NDArray[np.int_]
 REACH = 3.5
 # A grid has two points per width: the spectrum of a Gaussian ends far below its Nyquist frequency.
 POINTS_PER_WIDTH = 2.0
-# Share of the weight that regular samples would have, in total and on each side: below it, the value is missing.
-_LEAST_WEIGHT, _LEAST_SIDE = 0.5, 0.15
 # Weights that are computed at once.
 _BLOCK = 1 << 19
 
@@ -126,8 +124,9 @@ def _fitted(  # noqa: PLR0913 (one block of local_derivative)
         power *= distance
     before = np.einsum("ij,ij->i", weights, (distance < 0.0).astype(np.float64))
     total = moments[:, 0]
-    sound = (total >= _LEAST_WEIGHT * regular) & (count >= order + 3)
-    sound &= np.minimum(before, total - before) >= _LEAST_SIDE * total
+    # Missing below half of the weight that regular samples would have, and below 15 % of it on one side.
+    sound = (total >= 0.5 * regular) & (count >= order + 3)
+    sound &= np.minimum(before, total - before) >= 0.15 * total
     matrix = moments[:, np.add.outer(np.arange(terms), np.arange(terms))]
     sound &= np.abs(np.linalg.det(matrix / np.maximum(total, 1e-300)[:, np.newaxis, np.newaxis])) > 1e-9
     result = np.full(len(at), np.nan)

@@ -16,7 +16,7 @@ import pytest
 from cdtool.base.errors import CdtoolError, OutputError, UsageError
 from cdtool.base.files import locks as file_locks
 from cdtool.base.files import writing as files
-from cdtool.base.files.writing import clean_up, locked, replaced, replaced_folder, write_bytes, write_pieces, write_text
+from cdtool.base.files.writing import clean_up, locked, replaced, replaced_folder, write_pieces, write_text
 
 ROOT = Path(__file__).parents[3]
 posix_only = pytest.mark.skipif(os.name != "posix", reason="links, modes and signals as POSIX has them")
@@ -24,12 +24,6 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="links, modes and sig
 
 def names(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
-
-
-def test_a_file_is_written_completely_and_nothing_else_remains(tmp_path):
-    write_text(tmp_path / "a.md", "ä\n")
-    write_bytes(tmp_path / "a.md", b"new")
-    assert names(tmp_path) == {"a.md"} and (tmp_path / "a.md").read_bytes() == b"new"
 
 
 def test_a_file_is_made_of_its_pieces_or_stays_as_it_was(tmp_path):
@@ -140,29 +134,6 @@ def test_what_cannot_be_put_back_is_not_removed(tmp_path, monkeypatch):
     assert [path.read_text() for path in left] == ["old"] * 3 and (tmp_path / "a.md") in left
 
 
-def test_without_hard_links_all_are_put_back(tmp_path, monkeypatch):
-    paths = [tmp_path / name for name in ("a.md", "b.md")]
-    for path in paths:
-        path.write_text("old")
-    real, done = Path.replace, []
-
-    def replace(self: Path, target: Path) -> Path:
-        done.append(self)
-        if len(done) == 2:
-            raise OSError(errno.EIO, os.strerror(errno.EIO))
-        return real(self, target)
-
-    def no_links(*_: object) -> None:
-        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
-
-    monkeypatch.setattr(os, "link", no_links)
-    monkeypatch.setattr(Path, "replace", replace)
-    with pytest.raises(OutputError), replaced(*paths) as parts:
-        for part in parts:
-            part.write_text("new")
-    assert names(tmp_path) == {"a.md", "b.md"} and {path.read_text() for path in paths} == {"old"}
-
-
 KILLED = """
 import os, sys
 from pathlib import Path
@@ -195,20 +166,6 @@ def test_a_killed_process_leaves_no_old_file_beside_a_new_one(tmp_path):
         if not status:
             break
     assert status == 0 and len(seen) == 4
-
-
-def test_an_interruption_right_after_a_rename_never_loses_the_file(tmp_path, monkeypatch):
-    (tmp_path / "a.md").write_text("old")
-    real = Path.replace
-
-    def replace(self: Path, target: Path) -> Path:
-        real(self, target)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Path, "replace", replace)
-    with pytest.raises(KeyboardInterrupt):
-        write_text(tmp_path / "a.md", "new")
-    assert names(tmp_path) == {"a.md"} and (tmp_path / "a.md").read_text() == "new"
 
 
 def test_file_and_folder_are_flushed_to_the_disk(tmp_path, monkeypatch):
@@ -347,14 +304,6 @@ def test_a_device_is_written_to_and_never_replaced():
     assert stat.S_ISCHR(Path("/dev/full").stat().st_mode)
 
 
-def test_files_left_by_an_exception_are_removed_at_the_end_of_the_process(tmp_path):
-    part = file_locks.temporary_name(tmp_path / "a.md", tmp_path)
-    part.write_text("x")
-    files._temporaries.add(part)
-    clean_up()
-    assert names(tmp_path) == set()
-
-
 COMMAND = """
 import os, signal, sys
 from pathlib import Path
@@ -401,12 +350,3 @@ def test_a_signal_ends_a_command_even_during_an_import(monkeypatch, number, stat
     finally:
         signal.signal(signal.SIGINT, before)
     assert done.status == status and "Traceback" not in done.err
-
-
-def test_the_command_line_restores_signal_handlers():
-    from tests.command import cdtool
-
-    numbers = (signal.SIGTERM, signal.SIGINT)
-    before = [signal.getsignal(number) for number in numbers]
-    assert cdtool("list", "detectors").status == 0
-    assert [signal.getsignal(number) for number in numbers] == before

@@ -13,8 +13,7 @@ import pytest
 
 import cdtool.base.findings
 from cdtool.base.findings import Finding, lines_of, remark
-from cdtool.base.findings.kinds import Severity, kind_of, sections
-from cdtool.base.findings.words import FindingWords
+from cdtool.base.findings.kinds import kind_of
 
 PACKAGE = Path(cdtool.__path__[0])
 KINDS = tomllib.loads((PACKAGE / "base" / "findings" / "kinds.toml").read_text(encoding="utf-8"))
@@ -43,26 +42,6 @@ def test_a_finding_is_written_as_one_sentence(kind, numbers, sentence):
     assert Finding(kind, "", numbers).sentence == sentence
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_each_text_of_a_kind_is_part_of_a_sentence(kind):
-    cases = [(numbers, sentence) for name, numbers, sentence in SENTENCES if name == kind]
-    assert cases and all(numbers.keys() == set(kind_of(kind).numbers) for numbers, _ in cases)
-    for text in [text for words in kind_of(kind).words.values() for text in words.values()]:
-        assert any(text in _said(kind, numbers) for numbers, _ in cases), text
-
-
-def _said(kind: str, numbers: dict[str, object]) -> list[str]:
-    said: list[str] = []
-
-    class Recorded(FindingWords):
-        def _written(self, text):
-            said.append(text)
-            return super()._written(text)
-
-    Recorded(kind_of(kind), numbers).sentence()
-    return said
-
-
 def test_every_kind_is_made_by_the_package():
     made = {kind for kind, _ in literal_findings()}
     texts = {node.value for node in sources() if isinstance(node, ast.Constant)}  # as in a tuple of kinds
@@ -78,14 +57,6 @@ def test_findings_in_the_code_have_a_known_kind_and_its_numbers():
             assert sorted(named) == sorted(kind_of(kind).numbers), kind
 
 
-def test_the_table_of_kinds_is_complete_and_read_kind_by_kind():
-    assert list(sections()) == list(KINDS)
-    for name in KINDS:
-        kind = kind_of(name)
-        assert {kind.subject, kind.variant} - {""} <= set(kind.numbers)
-        assert kind.severity in Severity.__args__ and kind.sentence
-
-
 @pytest.mark.parametrize(
     ("kind", "numbers", "said"),
     [
@@ -97,17 +68,6 @@ def test_the_table_of_kinds_is_complete_and_read_kind_by_kind():
 def test_a_wrong_kind_or_number_is_an_error_where_the_finding_is_made(kind, numbers, said):
     with pytest.raises(ValueError, match=said):
         Finding(kind, "torque", numbers)
-
-
-def test_subject_and_variant_tell_findings_of_one_kind_apart():
-    left_out = Finding("column_left_out", "", {"column": "mode", "what": "text"})
-    assert (left_out.subject, left_out.variant) == ("mode", "text")
-    assert (Finding("no_clock").subject, Finding("no_clock").variant) == ("", "")
-
-
-def test_numbers_stand_apart_from_the_sentence():
-    numbers = Finding("missing_values", "speed", {"count": 2, "values": 100}).to_dict()["numbers"]
-    assert numbers == {"count": 2, "values": 100}
 
 
 def test_a_finding_about_a_million_lines_holds_few_numbers():

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
-from cdtool.base.remote import session, staging
 from cdtool.base.remote.remote_path import location
 from tests.command import FEW, cdtool
 
@@ -106,12 +105,6 @@ def test_runs_of_a_log_are_named_by_its_url(memory, tmp_path):
     assert '"memory://logs/cycles #2.csv#1"' in done.out, done.err
 
 
-def test_no_copy_is_left_after_a_command(gate):
-    cdtool("benchmark", f"{gate}/benchmark.toml")
-    staging.release()
-    assert {path.name for path in session.folder().iterdir()} <= {"lock", "read"}
-
-
 def test_a_store_at_a_url_is_used_again(gate, memory, tmp_path):
     runs = [
         cdtool("benchmark", f"{gate}/benchmark.toml", "--store", "memory://store", "-o", f"memory://out/{i}.json")
@@ -134,16 +127,6 @@ def test_a_rosbag2_folder_at_a_url_is_one_log(memory, tmp_path):
     here, there = api.read(folder, MACHINE), api.read("memory://bag", MACHINE)
     assert list(here.channels) == list(there.channels) and here.digest == there.digest
     assert there.source == "memory://bag" and there.name == here.name
-
-
-@pytest.mark.parametrize("pattern", ["free/*.csv", "free/0[1-5].csv", "**/free/*.csv"])
-def test_a_pattern_of_a_url_names_the_logs_that_a_shell_would_name_in_a_folder(gate, tmp_path, pattern):
-    names = sorted((GATE / "free").glob("0[1-5].csv" if "[" in pattern else "*.csv"))
-    learn = ("learn-signature", "-m", MACHINE, "-d", "gm", FEW, "-o")
-    by_pattern = cdtool(*learn, tmp_path / "a.json", f"{gate}/{pattern}")
-    by_name = cdtool(*learn, tmp_path / "b.json", *(f"{gate}/free/{path.name}" for path in names))
-    assert by_pattern.status == by_name.status == 0
-    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
 
 
 def test_a_path_at_a_url_is_one_log_in_python(gate):

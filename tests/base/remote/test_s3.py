@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 import zlib
 from pathlib import Path
 
@@ -40,13 +39,6 @@ def shell(*arguments: object, **environment: str) -> subprocess.CompletedProcess
 def gate(bucket):
     """The sample logs of the gate in the bucket."""
     return bucket.put_folder(GATE)
-
-
-@pytest.fixture
-def without_limits(gate, bucket):
-    """The same; the benchmark has no limits."""
-    text = (GATE / "benchmark.toml").read_text(encoding="utf-8").partition("[limits]")[0]
-    return bucket.put("gate/benchmark.toml", text.encode())
 
 
 def test_a_benchmark_in_several_processes_has_the_bytes_of_a_local_one(gate, bucket, tmp_path):
@@ -99,35 +91,6 @@ def test_a_missing_object_or_bucket_is_one_line(bucket):
     assert out.status == 2 and "no bucket s3://no-such-bucket (create the bucket first)" in out.err
 
 
-def test_without_credentials_one_line_says_so(bucket, monkeypatch, tmp_path):
-    import s3fs
-
-    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("HOME", str(tmp_path))
-    s3fs.S3FileSystem.clear_instance_cache()
-    done = cdtool("info", f"{bucket.url}/a.csv")
-    assert (
-        f"{bucket.url}/a.csv: cannot be read: no credentials are set" in done.err
-        or "no credentials are set" in done.err
-    )
-    assert done.status != 0 and len(done.err.splitlines()) == 1
-    s3fs.S3FileSystem.clear_instance_cache()
-
-
-def test_a_log_that_is_deleted_or_damaged_is_left_out_and_the_others_are_as_in_a_folder(gate, bucket, tmp_path):
-    import shutil
-
-    shutil.copytree(GATE, tmp_path / "gate")
-    damaged = (GATE / "stiff" / "01.mcap").read_bytes()[:3000]
-    (tmp_path / "gate" / "stiff" / "01.mcap").write_bytes(damaged)
-    bucket.put("gate/stiff/01.mcap", damaged)
-    there = cdtool("benchmark", f"{gate}/benchmark.toml", "-o", tmp_path / "there.json")
-    here = cdtool("benchmark", tmp_path / "gate" / "benchmark.toml", "-o", tmp_path / "here.json")
-    assert there.status == here.status != 0
-    assert (tmp_path / "there.json").read_bytes() == (tmp_path / "here.json").read_bytes()
-
-
 @pytest.fixture
 def changing(monkeypatch):
     """changing(name, change): after a log of that name was copied, `change` is called."""
@@ -142,16 +105,6 @@ def changing(monkeypatch):
         monkeypatch.setattr(storage, "fetch", changed)
 
     return set_up
-
-
-def test_a_log_that_is_replaced_while_it_is_read_is_reported_once(without_limits, bucket, changing, tmp_path):
-    contents = iter(b"\n" * count for count in range(1, 9))
-    log = (GATE / "stiff" / "03.csv").read_bytes()
-    changing("stiff/03.csv", lambda: bucket.put("gate/stiff/03.csv", log + next(contents)))
-    done = cdtool("benchmark", without_limits, "-o", tmp_path / "results.json")
-    skipped = json.loads((tmp_path / "results.json").read_text())["skipped"]
-    assert [item["recording"] for item in skipped] == ["stiff/03.csv"] and done.status == 3
-    assert "changed while it was read" in skipped[0]["reason"]
 
 
 def test_a_server_that_ends_meanwhile_is_one_line_per_log_and_nothing_lasting(monkeypatch, tmp_path):
@@ -263,50 +216,3 @@ def test_credentials_of_urls_are_used_and_not_in_results(monkeypatch, tmp_path):
         assert any("sig=5ecretS1gn" in path for path in asked)
     finally:
         server.shutdown()
-
-
-def test_sigterm_leaves_no_copies(gate, tmp_path):
-    import signal
-
-    # A command that another one has started uses its folder, as this process may have one from a test before.
-    own = {name: value for name, value in os.environ.items() if name != "CDTOOL_REMOTE_FOLDER"}
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-c",
-            "from cdtool.commands.app import main; main()",
-            "benchmark",
-            f"{gate}/benchmark.toml",
-            "-j",
-            "2",
-        ],
-        env={**own, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    for _ in range(2000):
-        if list(tmp_path.glob("cdtool-remote-*")) or process.poll() is not None:  # there as long as the command runs
-            break
-        time.sleep(0.01)
-    assert process.poll() is None
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(60) == 143
-    assert not list(tmp_path.glob("cdtool-remote-*"))
-
-
-def test_a_large_mcap_is_read_by_ranges(bucket, tmp_path):
-    from tests.formats.mcap.test_by_ranges import MACHINE as AXIS
-    from tests.formats.mcap.test_by_ranges import recorded
-
-    content = recorded()
-    url = bucket.put("large.mcap", content)
-    (tmp_path / "large.mcap").write_bytes(content)
-    (tmp_path / "axis.toml").write_text(AXIS)
-    from cdtool.base.remote import session
-
-    before = session.amount_read()[0]
-    there = api.read(url, tmp_path / "axis.toml")
-    assert session.amount_read()[0] - before < 0.1 * len(content)
-    here = api.read(tmp_path / "large.mcap", tmp_path / "axis.toml")
-    assert here["torque"].values.tobytes() == there["torque"].values.tobytes() and there.findings == here.findings
-    assert there.digest.startswith("etag:") and there.digest == api.read(url, tmp_path / "axis.toml").digest

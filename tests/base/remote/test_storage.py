@@ -5,13 +5,10 @@ from __future__ import annotations
 import errno
 import pickle
 import sys
-from importlib import import_module
 
 import pytest
 
-from cdtool.base.errors import CdtoolError, ConfigurationError, is_lasting
-from cdtool.base.files.bounded_loading import read_bytes
-from cdtool.base.remote import storage
+from cdtool.base.errors import CdtoolError, is_lasting
 from cdtool.base.remote.remote_path import location
 from cdtool.base.remote.storage import MissingObjectError, ObjectInfo, StorageError
 from tests.command import cdtool
@@ -69,12 +66,6 @@ def test_a_fault_in_any_file_of_a_command_is_one_line(failing):
     assert failing in done.err and len(done.err.strip().splitlines()) == 1 and "Traceback" not in done.err
 
 
-def test_a_caller_gets_its_own_error_with_the_cause(failing):
-    with pytest.raises(ConfigurationError, match=r"^memory://logs/a\.toml: ") as caught:
-        read_bytes(location("memory://logs/a.toml"), ConfigurationError)
-    assert not is_lasting(caught.value)
-
-
 def test_a_missing_object_is_a_missing_file(memory):
     with pytest.raises(MissingObjectError) as caught:
         location("memory://logs/a.csv").stat()
@@ -89,18 +80,6 @@ def test_without_fsspec_one_line_names_the_extra(monkeypatch):
     assert done.err.splitlines() == [
         "error: s3://bucket/a.csv: reading a URL needs fsspec, which is not installed (pip install '.[remote]')"
     ]
-
-
-def test_without_the_package_of_a_protocol_one_line_names_it(monkeypatch):
-    monkeypatch.setitem(sys.modules, "gcsfs", None)
-    monkeypatch.setitem(sys.modules, "s3fs", None)
-    registered = import_module("fsspec.registry")
-    for protocol in ("gs", "s3"):
-        monkeypatch.delitem(registered._registry, protocol, raising=False)
-    with pytest.raises(StorageError, match=r"gs:// needs a package that is not installed \(.*gcsfs.*\)"):
-        storage.info("gs://bucket/a.csv")
-    with pytest.raises(StorageError, match=r"s3:// needs .* \(pip install '\.\[remote\]'\)"):
-        storage.info("s3://bucket/a.csv")
 
 
 def test_an_unknown_protocol_is_answered_with_the_nearest():

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 from cdtool.base.errors import OutputError, UsageError
 from cdtool.base.files.foreign import Kind, refuse_inputs, refuse_other_kind
-from cdtool.base.files.writing import locked, made_folder, replaced, replaced_folder, write_bytes, write_text
+from cdtool.base.files.writing import locked, replaced, replaced_folder, write_bytes, write_text
 from cdtool.base.remote.remote_path import location
 
 
@@ -74,12 +72,6 @@ def test_a_storage_that_cannot_be_written_is_named_in_one_line(memory, monkeypat
         (part / "a.json").write_bytes(b"")
 
 
-def test_folders_are_only_made_where_there_are_real_ones(memory):
-    with made_folder(location("memory://out/new")) as folder:
-        assert str(folder) == "memory://out/new"
-    assert not memory.find("/", withdirs=True)
-
-
 def test_an_update_on_s3_does_not_overwrite_what_another_process_wrote(bucket):
     path = location(bucket.put("gate.json", b"first"))
     with locked(path):
@@ -91,22 +83,3 @@ def test_an_update_on_s3_does_not_overwrite_what_another_process_wrote(bucket):
     assert bucket.get("gate.json") == b"of another process"
     write_bytes(path, b"fourth")  # without the lock, the last writer wins
     assert bucket.get("gate.json") == b"fourth"
-
-
-def test_a_large_file_is_uploaded_in_parts(bucket, tmp_path, monkeypatch):
-    import s3fs
-
-    monkeypatch.setattr(s3fs.core, "calculate_chunksize", lambda *_, **__: 5 << 20)
-    content = os.urandom(16 << 20)
-    path = location(f"{bucket.url}/large.bin")
-    with replaced(path) as (part,):
-        part.write_bytes(content)
-    assert bucket.get("large.bin") == content and bucket.names() == {"large.bin"}
-
-
-def test_a_bucket_that_does_not_exist_is_named_before_the_work(bucket):
-    from cdtool.base.remote.remote_path import check_place
-
-    check_place(location(f"{bucket.url}/new/report.html"))
-    with pytest.raises(UsageError, match=r"s3://no-such-bucket/report.html: no bucket s3://no-such-bucket"):
-        check_place(location("s3://no-such-bucket/report.html"))

@@ -10,7 +10,7 @@ import pytest
 
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, status_of
-from cdtool.commands.compare.comparison import compare_builds
+from cdtool.commands.compare.comparison import compare
 from cdtool.statistics.rates import binomial_at_most, binomial_increase_at_most, poisson_increase_at_most
 from tests.commands.compare.questions import asked, latencies, row_of, single
 from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
@@ -22,7 +22,7 @@ def test_the_example_of_a_debounce_of_200_is_worse_and_inconclusive_never_no_cha
     stiff, soft = ("friction_ekf", "stiff"), ("friction_ekf", "soft")
     old = build_results({stiff: [33.0, 31.0, 35.0, 34.0], soft: [82.0, 79.0, 88.0, 81.0]}, hours=0.01)
     new = build_results({stiff: [MISSED] * 4, soft: [330.0, 310.0, 350.0, 320.0]}, hours=0.01)
-    found = compare_builds(old, new)
+    found = compare(old, new)
     assert found.verdict == "worse" and "no change" not in found.words
     by_group = {row.group: row for row in found.rows}
     assert by_group["stiff"].outcome == "worse" and by_group["soft"].outcome == "inconclusive"
@@ -34,36 +34,36 @@ def test_the_example_of_a_debounce_of_200_is_worse_and_inconclusive_never_no_cha
 
 @pytest.mark.parametrize("n", [1, 2, 4, 7, 30])
 def test_every_contact_missed_that_was_detected_has_a_probability_of_one_half_for_each(n):
-    question = asked(compare_builds(single(latencies(n)), single([MISSED] * n)), "missed")
+    question = asked(compare(single(latencies(n)), single([MISSED] * n)), "missed")
     assert question.complete_change_p == pytest.approx(0.5**n, rel=1e-12) and question.outcome == "worse"
-    back = asked(compare_builds(single([MISSED] * n), single(latencies(n))), "missed")
+    back = asked(compare(single([MISSED] * n), single(latencies(n))), "missed")
     assert back.complete_change_p == pytest.approx(0.5**n, rel=1e-12) and back.outcome == "better"
 
 
 @pytest.mark.parametrize(("n_old", "n_new"), [(3, 3), (4, 4), (4, 6), (9, 2)])
 def test_on_other_contacts_the_probability_is_that_of_one_division_in_all(n_old, n_new):
-    question = asked(compare_builds(single(latencies(n_old)), single([MISSED] * n_new, **OTHERS)), "missed")
+    question = asked(compare(single(latencies(n_old)), single([MISSED] * n_new, **OTHERS)), "missed")
     divisions = len(list(combinations(range(n_old + n_new), n_old)))
     assert question.complete_change_p == pytest.approx(1.0 / divisions, rel=1e-12) and question.outcome == "worse"
 
 
 def test_on_other_contacts_two_against_two_are_too_few_to_call_it_complete():
-    question = asked(compare_builds(single(latencies(2)), single([MISSED] * 2, **OTHERS)), "missed")
+    question = asked(compare(single(latencies(2)), single([MISSED] * 2, **OTHERS)), "missed")
     assert math.isnan(question.complete_change_p) and question.outcome == "inconclusive"
 
 
 def test_a_detector_that_detected_hardly_anything_has_no_complete_change():
-    question = asked(compare_builds(single([40.0, *[MISSED] * 9]), single([MISSED] * 10)), "missed")
+    question = asked(compare(single([40.0, *[MISSED] * 9]), single([MISSED] * 10)), "missed")
     assert math.isnan(question.complete_change_p) and question.outcome == "inconclusive"
 
 
 def test_one_contact_that_is_still_detected_is_no_complete_change():
-    question = asked(compare_builds(single(latencies(4)), single([40.0, *[MISSED] * 3])), "missed")
+    question = asked(compare(single(latencies(4)), single([40.0, *[MISSED] * 3])), "missed")
     assert math.isnan(question.complete_change_p) and question.outcome == "inconclusive"
 
 
 def test_a_build_that_can_no_longer_assess_anything_is_worse_for_any_number_of_contacts():
-    found = compare_builds(single(latencies(3)), single([NOT_ASSESSABLE] * 3))
+    found = compare(single(latencies(3)), single([NOT_ASSESSABLE] * 3))
     assert found.verdict == "worse" and asked(found, "not_assessable").complete_change_p == 0.125
     assert "nothing is assessable: not assessable 3 of 3, before 0 of 3" in row_of(found).words
 
@@ -73,7 +73,7 @@ def test_four_contacts_are_inconclusive_and_thirty_are_not():
         old = latencies(n, 40.0, 3.0)
         noise = latencies(n, 0.0, 2.0, seed=5)
         noise = [x - float(np.mean(noise)) for x in noise]
-        found = compare_builds(single(old), single([a + b for a, b in zip(old, noise, strict=True)]))
+        found = compare(single(old), single([a + b for a, b in zip(old, noise, strict=True)]))
         assert found.verdict == verdict, n
         assert found.words.startswith(verdict) and (Fact.INCONCLUSIVE in found.facts) == (n == 4)
 
@@ -83,11 +83,11 @@ def test_a_spread_too_large_for_a_relevant_change_is_inconclusive_with_the_detec
     noise = latencies(30, 0.0, 20.0, seed=6)
     noise = [x - float(np.mean(noise)) for x in noise]
     new = single([a + b for a, b in zip(old, noise, strict=True)], force=None)
-    found = compare_builds(single(old, force=None), new)
+    found = compare(single(old, force=None), new)
     latency = asked(found, "latency_ms")
     assert found.verdict == "inconclusive" and latency.left_open == pytest.approx(latency.detectable / latency.old)
     assert f"only a change of {latency.detectable:.1f} ms would have been shown" in row_of(found).words
-    wide = compare_builds(single(old, force=None), new, relevant_change=0.5)
+    wide = compare(single(old, force=None), new, relevant_change=0.5)
     assert wide.verdict == "no change shown" and wide.relevant_change == 0.5
 
 
@@ -113,4 +113,4 @@ def test_bounds_of_an_increase_hold_in_at_least_95_of_100_draws():
 def test_the_smallest_relevant_change_is_a_share():
     for wrong in (0.0, -0.1, 1.5, math.nan):
         with pytest.raises(UsageError, match="relevant change is"):
-            compare_builds(single(latencies()), single(latencies()), relevant_change=wrong)
+            compare(single(latencies()), single(latencies()), relevant_change=wrong)

@@ -1,10 +1,9 @@
-"""A part of a log: the keys from and to of detect and learn-signature, and convert with --from and --to."""
+"""A part of a log: the keys from and to of detect and learn-signature."""
 
 import json
 
 import pytest
 
-import cdtool as api
 from tests.command import cdtool, one_line
 
 
@@ -33,32 +32,6 @@ def test_detect_uses_only_the_part(log, machine):
     assert before["verdict"] == "no alarm" and not before["alarms"]
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".mcap", ".parquet"])
-@pytest.mark.parametrize("mapped", [True, False])
-def test_convert_writes_only_the_rows_of_the_part_with_their_times(log, machine, tmp_path, suffix, mapped):
-    output = tmp_path / f"part{suffix}"
-    arguments = ("-m", machine) if mapped else ()
-    done = cdtool("convert", log, output, "--from", "1.5s", "--to", "3.2s", *arguments)
-    assert done.status == 0, done.err
-    companion = tmp_path / f"part{suffix}.machine.toml" if mapped else machine
-    if not mapped and suffix != ".csv":
-        return
-    speed = api.read(output, companion)["speed"]
-    whole = api.read(log, machine)["speed"].between(1.5, 3.2)
-    assert speed.time.tolist() == whole.time.tolist()
-    assert speed.values.tolist() == whole.values.tolist()
-
-
-def test_convert_cuts_by_the_distance_travelled_with_a_machine_file(log, machine, tmp_path):
-    done = cdtool("convert", log, tmp_path / "way.csv", "--from", "0.1m", "--to", "50cm", "-m", machine)
-    assert done.status == 0, done.err
-    position = api.read(tmp_path / "way.csv", tmp_path / "way.csv.machine.toml")["position"].values
-    assert position[0] == pytest.approx(0.1, abs=1e-3) and position[-1] == pytest.approx(0.5, abs=1e-3)
-    alone = cdtool("convert", log, tmp_path / "x.csv", "--from", "0.1m")
-    assert alone.status == 2 and "pass a machine file with -m" in one_line(alone.err)
-    assert "# cdtool.section: from 0.1 m of travel to 0.5 m of travel" in (tmp_path / "way.csv").read_text()
-
-
 @pytest.mark.parametrize(
     ("marks", "words"),
     [
@@ -68,14 +41,10 @@ def test_convert_cuts_by_the_distance_travelled_with_a_machine_file(log, machine
         ({"to": "1rad"}, "1 rad of travel"),
     ],
 )
-def test_a_wrong_part_is_one_line(log, machine, tmp_path, marks, words):
+def test_a_wrong_part_is_one_line(log, machine, marks, words):
     by_key = [f"--set={name}={mark}" for name, mark in marks.items()]
-    by_option = [f"--{name}={mark}" for name, mark in marks.items()]
-    detect = ("detect", log, "-d", "gm", "--set=threshold.limits=400", *by_key)
-    for command in (detect, ("convert", log, tmp_path / "x.csv", *by_option)):
-        done = cdtool(*command, "-m", machine)
-        assert done.status == 2 and words in one_line(done.err) and "Traceback" not in done.err
-    assert not (tmp_path / "x.csv").exists()
+    done = cdtool("detect", log, "-d", "gm", "--set=threshold.limits=400", *by_key, "-m", machine)
+    assert done.status == 2 and words in one_line(done.err) and "Traceback" not in done.err
 
 
 def test_a_signature_is_learned_from_what_is_before_the_contacts(gate_folder, machine, tmp_path):

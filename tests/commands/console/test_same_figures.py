@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from cdtool.commands.console.console import number
-from cdtool.commands.detecting import prepared_benchmark
+from cdtool.commands.detecting import prepared
 from tests.command import cdtool
 
 SAMPLES = Path(__file__).parents[3] / "sample_logs"
@@ -43,13 +43,15 @@ mass_before_cell_kg = {mass}
 @pytest.fixture(autouse=True)
 def learn_once(monkeypatch):
     """Learn the threshold once per file and detector instead of in each command."""
-    prepare_again = prepared_benchmark.prepare_benchmark
+    prepare_again = prepared._of_benchmark
     prepare_once = cache(prepare_again)
 
-    def prepare(file, settings, **given):
-        return prepare_again(file, settings=settings, **given) if settings else prepare_once(file, **given)
+    def prepare(file, detector, signature, settings):
+        if settings:
+            return prepare_again(file, detector, signature, settings)
+        return prepare_once(file, detector, signature, None)
 
-    monkeypatch.setattr(prepared_benchmark, "prepare_benchmark", prepare)
+    monkeypatch.setattr(prepared, "_of_benchmark", prepare)
 
 
 def benchmark_with_other_settings(folder: Path, sample: str) -> Path:
@@ -105,22 +107,23 @@ def check(file: Path, detector: str) -> int:
         values = json.loads(cdtool("explain", path, "--benchmark", file, "--detectors", detector, "--json").out)
         own = rows_of(values["contacts"])
         assert own and all(truth[key] == row for key, row in own.items())
-        alarms = {item["time_s"]: item for item in values["alarms"] if item["role"] == "detection"}
-        missed = {item["onset_s"]: item for item in values["missed"]}
+        alarms = {item["alarm"]["time"]: item for item in values["alarms"] if item["role"] == "detection"}
+        missed = {item["contact"]["start"]: item for item in values["missed"]}
         for row in own.values():
             if row["outcome"] == "detected":
                 item = alarms[row["alarm_s"]]
-                for name in ("onset_s", "statistic", "limit", "side", "joint"):
-                    assert item[name] == row[name]
+                assert item["contact"]["start"] == row["onset_s"]
+                for name in ("statistic", "limit", "side", "joint"):
+                    assert item["alarm"][name] == row[name]
                 (late,) = re.findall(r"(-?\d+) ms after the contact", item["words"][0]) or [None]
                 if late is not None and not row["clipped"]:
                     assert int(late) == round(row["latency_ms"])
                 assert number(row["latency_ms"], 3) in shown
             else:
-                assert missed[row["onset_s"]]["watched_ms"] == row["watched_ms"]
+                assert 1e3 * missed[row["onset_s"]]["watched"] == row["watched_ms"]
         for item in values["alarms"]:
             if item["role"] == "false alarm":
-                false[item["operation"].partition("#")[0], item["time_s"]] = item["statistic"]
+                false[item["operation"].partition("#")[0], item["alarm"]["time"]] = item["alarm"]["statistic"]
     names = {item["recording"] for item in results["recordings"] if item["group"] != "holdout"}
     alone = [item for item in results["false_alarms"] if item["recording"] in names]
     assert {(item["recording"], item["time_s"]): item["statistic"] for item in alone} == false

@@ -102,7 +102,7 @@ def test_detect_shows_the_force_with_its_alarms(tmp_path):
         0
     ]
     estimate = values["estimated_force"]
-    assert estimate["link"] == "arm" and estimate["point_m"] == [0.28, 0.0, 0.0]
+    assert estimate["contact"] == {"link": "arm", "point": [0.28, 0.0, 0.0]}
     # The load cell's peak, plus what the joint's dry friction, unknown to the machine file, adds at this lever.
-    assert 20.0 < estimate["largest_n"] < 60.0
-    assert values["alarms"] and 0.0 < estimate["at_alarm_n"] <= estimate["largest_n"]
+    assert 20.0 < estimate["largest"] < 60.0
+    assert values["alarms"] and 0.0 < estimate["at_alarm"] <= estimate["largest"]

@@ -87,14 +87,14 @@ def test_the_json_is_strict_and_contains_every_number(explain):
     values = json.loads(done.out, parse_constant=lambda name: pytest.fail(name))
     (missed,) = values["missed"]
     assert values["alarms"] == [] and values["verdicts"][0]["verdict"] == "no alarm"
-    near = missed["joints"][0]
-    assert missed["outcome"] == "missed" and missed["debounce_samples"] == 9
+    near = missed["approaches"][0]
+    assert missed["role"] == "missed" and missed["debounce"] == 9
     assert near["nearest"]["margin"] == pytest.approx(30.0 - abs(near["nearest"]["statistic"]))
-    assert near["nearest"]["share_of_limit"] == pytest.approx(abs(near["nearest"]["statistic"]) / 30.0)
-    assert near["outside_before_contact_from_s"] is None
-    still = [item for item in missed["moved"] if item["time_s"] is None]
+    assert near["nearest"]["share"] == pytest.approx(abs(near["nearest"]["statistic"]) / 30.0)
+    assert near["latched_from"] is None
+    still = [item for item in missed["departed"] if item["time"] is None]
     assert {item["reason"] for item in still} == {"no departure"}
-    assert missed["not_compared_because"] == "limits set by hand" and missed["compared_with_runs"] == 0
+    assert missed["absent"] == "limits set by hand" and missed["runs"] == 0
 
 
 def test_a_spike_is_named_on_screen_and_in_the_json(explain, gate_folder, feekf_signature):
@@ -110,7 +110,7 @@ def test_a_spike_is_named_on_screen_and_in_the_json(explain, gate_folder, feekf_
     (alarm, *_) = json.loads(explain(*arguments, "--json").out)["alarms"]
     (found,) = alarm["glitches"]
     assert (found["kind"], found["channel"], found["joint"], found["samples"]) == ("spike", "speed", "gate", 6)
-    assert found["end_s"] - found["start_s"] == pytest.approx(0.005) and found["unit"] == "m/s"
+    assert found["end"] - found["start"] == pytest.approx(0.005) and found["unit"] == "m/s"
     assert "Spike of speed of gate: -0.1" in " ".join(explain(*arguments).out.split())
 
 
@@ -118,10 +118,12 @@ def test_the_alarm_in_the_json_is_that_of_detect(explain, feekf_signature, gate_
     (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
     machine = ("-m", gate_folder / "machine.toml", "-s", feekf_signature, "--json")
     (detected,) = json.loads(cdtool("detect", gate_folder / "stiff/01.csv", *machine).out)
-    for key in ("time_s", "joint", "side", "statistic", "limit"):
-        assert alarm[key] == detected["alarms"][0][key]
-    assert alarm["onset_s"] == detected["contacts"][0]["onset_s"] and alarm["role"] == "detection"
-    assert alarm["time_s"] - alarm["left_band_s"] == pytest.approx(0.008)
+    (shown,) = detected["alarms"]
+    for key in ("joint", "side", "statistic", "limit"):
+        assert alarm["alarm"][key] == shown[key]
+    assert alarm["alarm"]["time"] == shown["time_s"] and alarm["role"] == "detection"
+    assert alarm["contact"]["start"] == detected["contacts"][0]["onset_s"]
+    assert alarm["alarm"]["time"] - alarm["left"] == pytest.approx(0.008)
 
 
 def test_a_folder_gets_a_figure_of_every_event(explain, tmp_path):
@@ -136,9 +138,9 @@ def test_an_arm_is_explained_joint_by_joint():
     command = ("explain", arm / "stiff" / "01.csv", "-m", arm / "machine.toml", "-d", "gm")
     done = cdtool(*command, "--set=threshold.limits=4", "--json")
     (alarm,) = json.loads(done.out)["alarms"]
-    assert alarm["joint"] == "arm" and {item["joint"] for item in alarm["moved"]} == {"arm"}
-    assert alarm["moved"][0]["channel"] == "acceleration"
-    assert "position" in alarm["detector_reads"]  # a model of coupled links requires the pose
+    assert alarm["joint"] == "arm" and {item["joint"] for item in alarm["departed"]} == {"arm"}
+    assert alarm["departed"][0]["channel"] == "acceleration"
+    assert "position" in alarm["inputs"]  # a model of coupled links requires the pose
 
 
 @pytest.mark.parametrize(
@@ -187,7 +189,7 @@ def test_the_same_explanation_comes_from_python(gate_folder, feekf_signature, ex
     explained = api.explain(gate_folder / "stiff/01.csv", gate_folder / "machine.toml", signature=feekf_signature)
     ((_, event),) = explained.events
     (alarm,) = json.loads(explain("stiff/01.csv", "-s", feekf_signature, "--json").out)["alarms"]
-    assert alarm["words"] == words(event) and alarm["time_s"] == event.alarm.time
+    assert alarm["words"] == words(event) and alarm["alarm"]["time"] == event.alarm.time
 
 
 def test_the_examples_on_the_page_are_what_the_commands_print(tmp_path, monkeypatch):

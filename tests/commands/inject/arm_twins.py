@@ -19,18 +19,19 @@ from cdtool.alarms.pipeline import detect_operation
 from cdtool.base.errors import CdtoolError
 from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.robot_contact import RobotLog, robot_contact
-from cdtool.commands.learning.fitting import fit_operations
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
-from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.detectors.base import Detector
 from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Recording
 from cdtool.thresholds.base import FittedThreshold
+from tests.fitted_runs import fit_operations
 from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
+from tests.synthetic.arm_as_recording import as_recording
 
 LEARNED = 14
 # Of the mean paired difference: share of the true latency, and [ms].

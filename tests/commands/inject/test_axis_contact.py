@@ -10,16 +10,17 @@ import pytest
 
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.commands.inject.axis_contact import Doubt, InjectedContact, axis_contact
+from cdtool.commands.inject.axis_contact import axis_contact
+from cdtool.commands.inject.injected_contact import Doubt, InjectedContact
 from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.with_injected import Refusal, refusal
 from cdtool.commands.simulate.gate_model import GateRun, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.axis_model.parameters import AxisModel, ElasticDrive, Sensors
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.recordings.recording import Recording
 from tests.machines.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle
+from tests.synthetic.gate_as_recording import as_recording
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, without, without_references
 
 MODEL = gate_as_model(GATE)

@@ -10,12 +10,11 @@ import pytest
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import RecordingError
 from cdtool.commands.inject.assumption import Assumption, ControllerReaction, DriveBeyond
-from cdtool.commands.inject.axis_contact import Doubt, InjectedContact
+from cdtool.commands.inject.injected_contact import Doubt, InjectedContact
 from cdtool.commands.inject.injected_logs import injected_recording
 from cdtool.commands.inject.robot_contact import RobotLog, StruckPoint, robot_contact
 from cdtool.commands.simulate.arm_model import Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
-from cdtool.commands.simulate.arm_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import axis_run
 from cdtool.machines.axis_model.model_table import ModelTable
 from cdtool.machines.axis_model.obstacle import Obstacle
@@ -27,6 +26,7 @@ from tests.commands.inject.arm_twins import compare
 from tests.data_folder import UR10E_LOGS
 from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
 from tests.machines.robot_model.test_chain import planar_arm
+from tests.synthetic.arm_as_recording import as_recording
 from tests.synthetic.robot_motion import robot_recording
 from tests.synthetic.robots import six_joint_robot
 

@@ -187,7 +187,9 @@ def test_detect_and_explain_show_each_run_by_name(folder):
         (f"all.csv#{key}", "alarm" if key.startswith(("stiff", "soft")) else "no alarm") for key in IDS
     ]
     alone = json.loads(command("detect", folder / "stiff_03.csv", *limit, "--json").out)
-    assert [item["alarms"] for item in found if item["log"].endswith("#stiff_03")] == [alone[0]["alarms"]]
+    (of_run,) = (item["alarms"] for item in found if item["log"].endswith("#stiff_03"))
+    named = {name: of_run[0][name] for name in ("recording", "operation")}
+    assert of_run == [alarm | named for alarm in alone[0]["alarms"]]
     explained = json.loads(command("explain", f"{folder / 'all.csv'}#s*", *options, "--json").out)
     assert [Path(item["log"]).name for item in explained] == ["all.csv#stiff_03", "all.csv#soft_03"]
     refused = command("detect", folder / "all.csv", *options, "--plot", folder / "one.png")

@@ -7,7 +7,8 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import ConfigurationError
-from cdtool.commands.detecting.prepared_benchmark import PreparedBenchmark, prepare_benchmark
+from cdtool.commands.detecting.prepared import PreparedDetector
+from cdtool.commands.detecting.prepared import prepared as prepare
 from cdtool.commands.judging.runs import load_runs
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
@@ -53,8 +54,8 @@ def results(setup) -> Results:
 
 
 @pytest.fixture(scope="module")
-def prepared(gate) -> PreparedBenchmark:
-    return prepare_benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
+def prepared(gate) -> PreparedDetector:
+    return prepare(None, benchmark=setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
 
 
 def test_all_contacts_are_detected_and_nothing_before_them_is_an_alarm(results):

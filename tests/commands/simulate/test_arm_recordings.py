@@ -14,10 +14,11 @@ import cdtool
 from cdtool.base.errors import UsageError
 from cdtool.commands.simulate.arm_model import ArmRun, Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
-from cdtool.commands.simulate.arm_recordings import as_recording, simulate_arm
+from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.recording import Recording
 from tests.command import cdtool as command
+from tests.synthetic.arm_as_recording import as_recording
 
 ARM = ArmParameters()
 COUNTS = {"free": 1, "holdout": 1, "stiff": 3, "soft": 1}

@@ -124,15 +124,15 @@ def test_the_files_can_be_used(written, gate):
     }
     made = api.benchmark(folder / "benchmark.toml").results
     summary = json.loads((folder / "tuning.json").read_text(encoding="utf-8"))
-    chosen = summary["detectors"][0]["chosen"]
-    assert made.provenance["gains"]["momentum"] == chosen["gains"]
-    assert made.provenance["threshold"] == chosen["threshold"]["rule"] == "glr"
+    chosen = summary["detectors"][0]
+    assert made.provenance["gains"]["momentum"] == chosen["choice"]["gains"]
+    assert made.provenance["threshold"] == chosen["choice"]["threshold"]["rule"] == "glr"
     assert made.provenance["debounce_samples"] == chosen["debounce"] == 3
     signature = read_signature(folder / "signature_momentum.json")
     factor = signature.current[0].safety_factor
     assert made.provenance["threshold_rule"]["safety_factor"] == factor
     # The factor of the search has five folds, that of learning ten.
-    assert chosen["safety_factor"] == pytest.approx(factor, rel=0.15)
+    assert chosen["factor"] == pytest.approx(factor, rel=0.15)
     log = gate / "stiff" / "01.csv"
     found = command("detect", log, "-m", folder / "machine.toml", "-s", folder / "signature_momentum.json")
     assert found.status == 0 and "alarm" in found.out

@@ -12,10 +12,8 @@ import pytest
 import zstandard
 
 from cdtool.base.errors import RecordingError
-from cdtool.formats.bags.rosbag2 import Rosbag2
 from cdtool.formats.channels.reading import read_recording, survey
 from cdtool.formats.machine_file import read_machine_file
-from cdtool.formats.messages.schemas import DEFINITIONS
 
 START = 1_700_000_000_000_000_000
 MACHINE = """[machine]
@@ -181,55 +179,6 @@ def bag_folder(folder: Path, parts: int = 3, compress: bool = False) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("version", [8, 9])
-@pytest.mark.parametrize("mode", ["NONE", "MESSAGE"])
-def test_what_rosbags_writes_is_read_to_the_bit(tmp_path, version, mode):
-    pytest.importorskip("rosbags")
-    from rosbags.rosbag2 import CompressionFormat, CompressionMode, Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    state, header = store.types["sensor_msgs/msg/JointState"], store.types["std_msgs/msg/Header"]
-    time = store.types["builtin_interfaces/msg/Time"]
-    values = np.random.default_rng(6).normal(size=(60, 3, 2))
-    writer = Writer(tmp_path / "bag", version=version)
-    if mode != "NONE":
-        writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
-    with writer:
-        connection = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
-        for k, row in enumerate(values):
-            content = state(header(time(1_700_000_000, k * 10**7), ""), ["shoulder", "elbow"], *row)
-            writer.write(connection, START + k * 10**7, store.serialize_cdr(content, state.__msgtype__))
-    source = survey(tmp_path / "bag")
-    assert source.columns["/joint_states velocity[:]"].values.tobytes() == values[:, 1].tobytes()
-    file = next(path for path in (tmp_path / "bag").iterdir() if ".db3" in path.name)
-    assert Rosbag2().element_names(file, "/joint_states") == ("shoulder", "elbow")
-    assert not [item for item in source.findings if item.severity == "loss"]
-
-
-@pytest.mark.parametrize("index", [True, False])
-def test_a_damaged_bag_is_one_line_or_a_counted_loss(tmp_path, index):
-    path = write_bag(tmp_path / "log.db3", schema=FOXY if index else FOXY.partition("CREATE INDEX")[0])
-    whole = path.read_bytes()
-    random = np.random.default_rng(3)
-    cases = [whole[:cut] for cut in (17, 100, 4096, len(whole) // 2, len(whole) - 1)]
-    for _ in range(60):
-        wrong = bytearray(whole)
-        for at in random.integers(16, len(whole), int(random.integers(1, 8))):
-            wrong[int(at)] = int(random.integers(256))
-        cases.append(bytes(wrong))
-    for content in cases:
-        path.write_bytes(content)
-        try:
-            source = survey(path)
-        except RecordingError as fault:
-            assert "\n" not in str(fault) and len(str(fault)) < 600
-        else:
-            counts = [len(column.values) for column in source.columns.values()]
-            if counts != [100, 50] and index:
-                assert any(item.severity in ("loss", "warning") for item in source.findings), counts
-
-
 @pytest.mark.parametrize(
     ("row", "count"),
     [
@@ -272,12 +221,3 @@ def test_decompression_bombs_are_refused(tmp_path):
     zeros = zstandard.compress(bytes(2**29))
     bomb = write_bag(tmp_path / "messages.db3", [(1, START + k, zeros) for k in range(3)])
     assert [item.numbers["count"] for item in survey(bomb).findings if item.kind == "damaged_rows"] == [3]
-
-
-def test_definitions_of_the_standard_packages_are_known_and_others_are_not():
-    from cdtool.formats.bags.rosbag2 import _standard_definition
-
-    assert all(_standard_definition(kind) == DEFINITIONS[kind] for kind in DEFINITIONS)
-    assert _standard_definition("std_msgs/Float64") == DEFINITIONS[FLOAT]
-    assert _standard_definition("std_msgs/msg/Float32").split() == ["float32", "data"]
-    assert _standard_definition("machine_msgs/msg/Axis") == ""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.commands.judging.information import info
-from cdtool.formats.csv.table import DAY_S
+from cdtool.recordings.units import DAY_S
 
 
 @pytest.mark.parametrize("rate_hz", [1.0, 10.0, 1000.0])

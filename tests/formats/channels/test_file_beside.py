@@ -149,15 +149,6 @@ def test_two_clocks_since_1970_are_aligned_by_it(tmp_path):
     assert np.abs(force.values[:, 0] / 100.0 - force.time - recording.origin + EPOCH).max() < 1e-3
 
 
-@pytest.mark.parametrize(("log", "cell", "which"), [(0.0, EPOCH, "log's"), (EPOCH, 0.0, "file's")])
-def test_a_clock_that_does_not_count_from_1970_leaves_the_cell_out(tmp_path, log, cell, which):
-    write_log(tmp_path, start=log)
-    write_cell(tmp_path, cell)
-    recording = read(tmp_path, 'clock = "epoch"')
-    assert "force" not in recording
-    assert f"the {which} clock does not count from 1970" in facts(recording, "absent_file")[0].numbers["reason"]
-
-
 def test_a_missing_file_is_a_note_with_the_path_from_the_log(tmp_path):
     write_log(tmp_path)
     recording = read(tmp_path, TRIGGER)
@@ -167,21 +158,38 @@ def test_a_missing_file_is_a_note_with_the_path_from_the_log(tmp_path):
     assert "force" not in recording and recording.beside == ()
 
 
-@pytest.mark.parametrize(
-    ("ons", "cell", "said"),
-    [
-        ((), {"ons": (1.0,)}, "the trigger in the log never rises"),
-        ((1.0,), {"ons": ()}, "the trigger in the file never rises"),  # it is noise
-        ((1.0,), {"ons": (1.0,), "shift": 2.0, "offset": ", time_offset = 100.0"}, "are outside the log"),
-    ],
-)
-def test_a_file_that_cannot_be_aligned_is_a_loss_with_the_reason(tmp_path, ons, cell, said):
-    write_log(tmp_path, ons)
-    write_cell(tmp_path, cell.get("shift", 0.0), cell["ons"])
-    recording = read(tmp_path, TRIGGER + cell.get("offset", ""))
-    lost = [item for item in recording.findings if item.kind == "absent_file"]
-    assert "force" not in recording and [item.severity for item in lost] == ["loss"]
-    assert said in lost[0].numbers["reason"] and "cell_03.csv" in str(lost[0])
+def beside(log: dict, cell: dict, align: str, said: str, name: str = "F") -> tuple:
+    """A log and a cell that cannot be aligned: arguments of write_log and write_cell, and the reason that is given."""
+    return log, cell, align, said, name
+
+
+ABSENT = {
+    "a trigger that never rises in the log": beside({"ons": ()}, {"shift": 0.0}, TRIGGER, "the log never rises"),
+    "a trigger that is noise in the file": beside({}, {"shift": 0.0, "ons": ()}, TRIGGER, "the file never rises"),
+    "an offset beyond the log": beside({}, {"shift": 2.0}, f"{TRIGGER}, time_offset = 100.0", "are outside the log"),
+    "a trigger that the log has not": beside({}, {"shift": 0.0}, TRIGGER.replace("sync", "synch"), "no column 'synch'"),
+    "a log that does not count from 1970": beside(
+        {}, {"shift": EPOCH}, 'clock = "epoch"', "the log's clock does not count from 1970"
+    ),
+    "a file that does not count from 1970": beside(
+        {"start": EPOCH}, {"shift": 0.0}, 'clock = "epoch"', "the file's clock does not count from 1970"
+    ),
+    "a file in another unit": beside(
+        {}, {"shift": 0.0}, TRIGGER, "'F [kN]', the machine file N (a factor of 1000)", "F [kN]"
+    ),
+}
+
+
+@pytest.mark.parametrize(("written", "cell", "align", "said", "name"), ABSENT.values(), ids=ABSENT)
+def test_a_file_that_cannot_be_aligned_is_a_loss_with_the_reason(tmp_path, written, cell, align, said, name):
+    write_log(tmp_path, **written)
+    write_cell(tmp_path, **cell)
+    path = tmp_path / "cell_03.csv"
+    path.write_text(path.read_text(encoding="utf-8").replace("F", name, 1), encoding="utf-8")
+    recording = read(tmp_path, align)
+    (lost,) = [item for item in recording.findings if item.kind == "absent_file"]
+    assert "force" not in recording and lost.severity == "loss"
+    assert said in lost.numbers["reason"] and "cell_03.csv" in str(lost)
 
 
 @pytest.mark.parametrize(
@@ -193,16 +201,6 @@ def test_a_damaged_file_leaves_the_log_without_a_cell(tmp_path, content):
     recording = read(tmp_path, TRIGGER)
     assert "force" not in recording and "speed" in recording
     assert len(facts(recording, "absent_file")) == 1
-
-
-def test_a_file_in_another_unit_than_the_machine_file_says_is_a_loss(tmp_path):
-    write_log(tmp_path)
-    write_cell(tmp_path, 0.0)
-    path = tmp_path / "cell_03.csv"
-    path.write_text(path.read_text(encoding="utf-8").replace("F", "F [kN]", 1), encoding="utf-8")
-    recording = read(tmp_path, TRIGGER)
-    assert "force" not in recording
-    assert "'F [kN]', the machine file N (a factor of 1000)" in facts(recording, "absent_file")[0].numbers["reason"]
 
 
 def test_the_log_itself_is_not_its_load_cell(tmp_path):
@@ -219,13 +217,6 @@ def test_the_onset_may_be_earlier_by_what_is_not_known_of_the_clocks(tmp_path):
         find_contacts(item, OnsetRule(above=20.0)) for item in (known, replace(known, truth_clock=0.01))
     )
     assert wide.uncertainty == pytest.approx(exact.uncertainty + 0.01) and wide.start == exact.start
-
-
-def test_a_log_without_the_trigger_has_no_cell(tmp_path):
-    write_log(tmp_path)
-    write_cell(tmp_path, 0.0)
-    recording = read(tmp_path, TRIGGER.replace("sync", "synch"))
-    assert "no column 'synch'" in facts(recording, "absent_file")[0].numbers["reason"]
 
 
 @pytest.mark.parametrize(

@@ -66,15 +66,6 @@ def test_lines_that_are_not_rows_do_not_shift_the_stamps(log, machine, monkeypat
     assert same(np.delete(time, 20), np.delete(differences, 20))
 
 
-def test_a_missing_stamp_and_one_with_an_exponent_do_not_affect_the_others(log, machine):
-    stamps = [str(EPOCH + 1_000_001 * i) for i in range(20)]
-    stamps[4], stamps[9] = "", "1.700000000132456e18"
-    text = "t,i_motor,n_motor\n" + "".join(f"{stamp},1,{i}\n" for i, stamp in enumerate(stamps))
-    recording = read_recording(log(text), machine(clock_in("ns")))
-    assert same(np.delete(recording["speed"].time, 8), [1_000_001 * i for i in range(20) if i not in (4, 9)])
-    assert recording["speed"].time[8] == pytest.approx(0.009000, abs=1e-6)
-
-
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(
     first=st.integers(10**17, 9 * 10**18),

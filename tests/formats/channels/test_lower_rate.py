@@ -7,7 +7,6 @@ import pytest
 
 import cdtool
 from cdtool.formats.channels.reading import read_recording
-from cdtool.recordings.clock.held_samples import previous_value
 from cdtool.recordings.clock.lost_samples import lost_samples
 from tests.base.findings.facts import fact_of
 
@@ -43,13 +42,6 @@ def test_a_channel_of_a_lower_rate_has_its_own_clock_and_misses_nothing(log, mac
     assert lost_samples(recording, ["torque", "speed"], recording["torque"].time) is None
 
 
-def test_a_value_is_held_until_the_next_and_never_interpolated(log, machine):
-    recording = read_recording(log(table()), machine(CHANNELS))
-    clock = recording["torque"].time
-    held = previous_value(recording["speed"], clock)[:, 0]
-    assert held.tolist() == [recording["speed"].values[i // 4, 0] for i in range(400)]
-
-
 def test_a_lost_sample_of_a_lower_rate_is_a_gap_and_lost(log, machine):
     recording = read_recording(log(table(lost=range(200, 220))), machine(CHANNELS))
     assert "sample_gaps" in [fact.kind for fact in facts(recording, "speed")]
@@ -78,27 +70,3 @@ def test_info_shows_the_rate_of_a_channel_and_no_missing_values(log, machine):
     assert (plain["torque"].samples, plain["torque"].missing) == (400, 0)
     mapped = {channel.name: channel for channel in cdtool.info(path, machine=machine(CHANNELS)).channels}
     assert mapped["speed"].rate_hz == pytest.approx(250.0) and mapped["speed"].missing == 0
-
-
-def test_the_channels_are_those_of_a_container_with_a_clock_for_each(tmp_path, log, machine):
-    h5py = pytest.importorskip("h5py")
-    rows = 400
-    t, random = np.arange(rows) / 1000.0, np.random.default_rng(3)
-    torque, speed = random.normal(size=rows), 20.0 * np.sin(3.0 * t)
-    lines = [
-        f"{i},{float(torque[i])!r},{float(speed[i])!r}" if i % 4 == 0 else f"{i},{float(torque[i])!r},"
-        for i in range(rows)
-    ]
-    channels = "".join(f"{line}\n" for line in CHANNELS.splitlines() if not line.startswith(("position", "label")))
-    shared = read_recording(log("t,torque,speed\n" + "\n".join(lines) + "\n"), machine(channels))
-    with h5py.File(tmp_path / "own.h5", "w") as file:
-        for name, values, times in (("torque", torque, t), ("speed", speed[::4], t[::4])):
-            group = file.create_group(name)
-            group["value"], group["time"] = values, times
-            group["time"].attrs["unit"] = "s"
-    own = channels.replace('"t", unit = "ms"', '"time", unit = "s"')
-    own = own.replace('"torque",', '"torque/value",').replace('"speed",', '"speed/value",')
-    several = read_recording(tmp_path / "own.h5", machine(own))
-    for name in ("torque", "speed"):
-        assert shared[name].time == pytest.approx(several[name].time)
-        assert np.array_equal(shared[name].values, several[name].values)

@@ -49,8 +49,12 @@ def table(run: int, rows: int = ROWS) -> list[str]:
 
 def log_of(path: Path, ids: list[str], separator: str = ",") -> Path:
     """Runs one after the other in one file, each with the text `id` in its last column."""
-    lines = [f"{row},{text}" for run, text in enumerate(ids) for row in table(run)]
-    path.write_text("\n".join(["t,w,tau,cell,run_id", *lines, ""]).replace(",", separator))
+    rows = [f"{row},{text}" for run, text in enumerate(ids) for row in table(run)]
+    return written(path, [row.replace(",", separator) for row in rows], separator)
+
+
+def written(path: Path, rows: list[str], separator: str = ",", more: str = "") -> Path:
+    path.write_text("\n".join([f"t,w,tau,cell,run_id{more}".replace(",", separator), *rows, ""]))
     return path
 
 
@@ -122,8 +126,7 @@ def test_rows_without_an_id_are_counted_and_a_label_of_none_ends_a_run(tmp_path,
 
 def test_a_run_that_is_too_short_is_left_out_by_name(tmp_path, machine):
     lines = [f"{row},long" for row in table(0)] + [f"{row},brief" for row in table(1, 7)]
-    log = tmp_path / "log.csv"
-    log.write_text("\n".join(["t,w,tau,cell,run_id", *lines, ""]))
+    log = written(tmp_path / "log.csv", lines)
     found = read_runs(log, machine, RunCut("column", "run_id"))
     assert [logged.recording.name for logged in found.runs] == ["log#long"]
     assert found.left_out == ((log, "1 run (brief) with 7 samples in all is shorter than 8 samples: left out"),)
@@ -131,8 +134,7 @@ def test_a_run_that_is_too_short_is_left_out_by_name(tmp_path, machine):
 
 def test_a_run_that_cannot_be_read_does_not_stop_the_others(tmp_path, machine):
     lines = [f"{row},1" for row in table(0)] + [f"5.0,{row.partition(',')[2]},2" for row in table(1)]
-    log = tmp_path / "log.csv"
-    log.write_text("\n".join(["t,w,tau,cell,run_id", *lines, ""]))
+    log = written(tmp_path / "log.csv", lines)
     found = read_runs(log, machine, RunCut("column", "run_id"))
     assert [logged.recording.name for logged in found.runs] == ["log#1"]
     ((path, reason),) = found.left_out
@@ -163,8 +165,7 @@ def test_runs_can_be_chosen_by_id_or_by_pattern(tmp_path, machine):
 )
 def test_a_wrong_column_is_an_error_with_the_next_step(tmp_path, machine, cut, words):
     lines = [f"{row},{run}," for run in range(3) for row in table(run)]
-    log = tmp_path / "log.csv"
-    log.write_text("\n".join(["t,w,tau,cell,run_id,none", *lines, ""]))
+    log = written(tmp_path / "log.csv", lines, more=",none")
     with pytest.raises(RecordingError, match=words):
         read_runs(log, machine, cut)
 
@@ -185,8 +186,7 @@ def test_the_time_of_a_run_counts_from_its_own_start_if_the_clock_counts_from_an
     machine = read_machine_file(tmp_path / "machine.toml")
     starts = [1_700_000_000.0 + apart * run for run in range(3)]
     lines = [f"{stamp(begin + k / 100)},{k},1,0,{run}" for run, begin in enumerate(starts) for k in range(ROWS)]
-    log = tmp_path / "log.csv"
-    log.write_text("\n".join(["t,w,tau,cell,run_id", *lines, ""]))
+    log = written(tmp_path / "log.csv", lines)
     cuts = [RunCut("column", "run_id"), RunCut("column", "4")]
     for cut in [*cuts, RunCut("clock-reset")] if apart < 0.0 else cuts:
         found = read_runs(log, machine, cut).runs

@@ -3,10 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdtool.base.errors import RecordingError
-from cdtool.base.findings import Finding
 from cdtool.formats.channels.reading import survey
-from cdtool.formats.containers.tdms import Tdms
 from tests.base.findings.facts import fact_of
 
 nptdms = pytest.importorskip("nptdms")
@@ -74,58 +71,7 @@ def test_the_complete_part_of_a_cut_file_is_read_and_the_loss_is_reported(saved)
         assert any(finding.severity == "loss" for finding in source.findings), cut
 
 
-def test_damaged_files_are_one_line(saved):
-    path = saved([channel("m", "v", np.random.default_rng(1).normal(size=50), unit_string="A")])
-    whole = path.read_bytes()
-    random = np.random.default_rng(3)
-    for _ in range(150):
-        wrong = bytearray(whole)
-        wrong[int(random.integers(4, len(whole)))] ^= 1 << int(random.integers(8))
-        path.write_bytes(wrong)
-        try:
-            Tdms().columns(path)
-        except RecordingError as fault:
-            assert "\n" not in str(fault)
-
-
 START = np.datetime64("2025-03-04T05:06:07.5", "us")
-
-
-def later(seconds: float) -> np.datetime64:
-    return START + np.timedelta64(int(seconds * 1e6), "us")
-
-
-def test_waveforms_without_a_start_keep_their_offset_from_the_common_origin(saved):
-    path = saved(
-        [
-            channel("m", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=later(0.0)),
-            channel("m", "F", np.arange(5.0), wf_increment=0.01, wf_start_time=later(3600.25)),
-            channel("m", "n", np.arange(5.0), wf_increment=0.01, wf_start_offset=0.5),
-        ]
-    )
-    source = survey(path)
-    starts = {key: float(column.time[0]) for key, column in source.columns.items()}
-    assert starts == {"i": 0.0, "F": 3600.25, "n": 0.5}
-    assert source.origin == (START - np.datetime64(0, "us")) / np.timedelta64(1, "s")
-    (warning,) = [finding for finding in source.findings if finding.severity == "warning"]
-    assert fact_of(warning) == ("no_start_time", {"channels": ("n",)})
-
-
-def test_stamps_in_nanoseconds_since_1970_are_exact_next_to_waveforms(saved):
-    first = int(START.astype("datetime64[ns]").astype(np.int64)) + 123_456_789
-    stamps = first + np.cumsum(np.random.default_rng(5).integers(900_001, 1_100_000, 200))
-    path = saved(
-        [
-            channel("a", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=START),
-            channel("b", "time", stamps, unit_string="ns"),
-            channel("b", "F", np.arange(200.0)),
-        ]
-    )
-    source = survey(path)
-    nanoseconds = stamps - first + 123_456_789
-    assert np.allclose(source.columns["F"].time, nanoseconds / 1e9, rtol=1e-15, atol=0.0)
-    assert source.columns["i"].time[0] == 0.0
-    assert Finding("rounded_integers", "time", {"count": 200}) in source.findings
 
 
 def test_a_clock_with_its_own_start_is_not_shifted_and_is_reported(saved):

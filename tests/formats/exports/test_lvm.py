@@ -48,12 +48,6 @@ def test_a_file_is_a_table_with_the_units_of_its_head(log, machine, style, encod
     assert recording["force"].time == pytest.approx(FORCE.seconds, abs=1e-12)
 
 
-def test_a_column_of_times_for_each_channel_is_read(log):
-    columns = survey(log(measurement(Style(x_columns="Multi"), [FORCE, TORQUE]), "gate.lvm")).columns
-    assert columns["Force"].values.tolist() == FORCE.values
-    assert columns["Torque"].values.tolist() == TORQUE.values
-
-
 @pytest.mark.parametrize("names", [["V"], ["N"], ["V", "A"], ["m/s", "Torque"], ["1", "2"], ["Channels", "Samples"]])
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 6, 40, 400])
 @pytest.mark.parametrize("x_columns", ["One", "Multi"])
@@ -89,17 +83,6 @@ def test_a_comment_in_the_first_row_is_no_channel(log):
     source = survey(log(text, "gate.lvm"))
     assert list(source.columns) == ["X_Value", "Force", "Torque"]
     assert source.columns["Force"].values.tolist() == FORCE.values
-
-
-@pytest.mark.parametrize("rows", [1, 2, 3, 9])
-@pytest.mark.parametrize("decimal", [",", "."])
-def test_the_line_of_names_states_the_separator(log, rows, decimal):
-    channel = Channel("V", [1000.0 * i for i in range(rows)])
-    columns = survey(log(measurement(Style(decimal=decimal), [channel]), "gate.lvm")).columns
-    assert {name: column.values.tolist() for name, column in columns.items()} == {
-        "X_Value": channel.seconds,
-        "V": channel.values,
-    }
 
 
 LATER = replace(TORQUE, time="12:00:01")
@@ -162,23 +145,3 @@ def test_a_segment_that_begins_below_the_first_lines_is_seen(log):
     long = [replace(FORCE, values=np.arange(20_000) / 8.0)]
     with pytest.raises(RecordingError, match="it has 2 segments"):
         survey(log(measurement(Style(headings="Yes"), long, [FORCE]), "gate.lvm"))
-
-
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(data=st.data())
-def test_damaged_bytes_are_read_or_refused_in_one_line(log, data):
-    content = bytearray(measurement(Style(headings="Yes"), [FORCE, TORQUE]).encode())
-    for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(content) - 1))
-        damage = data.draw(st.sampled_from(["byte", "cut", "remove"]))
-        if damage == "byte":
-            content[at] = data.draw(st.integers(0, 255))
-        elif damage == "cut":
-            del content[at + 20 :]
-        else:
-            del content[at : at + data.draw(st.integers(1, 200))]
-        content = content or bytearray(b"LabVIEW")
-    try:
-        survey(log(bytes(content), "gate.lvm"))
-    except RecordingError as fault:
-        assert "\n" not in str(fault)

@@ -72,6 +72,12 @@ def test_each_channel_has_its_values_and_its_own_times_whatever_the_options(tmp_
     assert [column.unit for column in source.columns.values()] == [c.unit or None if stated else None for c in order]
 
 
+def test_all_rows_of_a_block_may_end_before_the_last_clock(tmp_path, monkeypatch):
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 512)
+    channels = [Channel("a", "1", ramp(200)), Channel("b", "2", ramp(20))]
+    assert_read(survey(write_export(tmp_path / "run.csv", channels, Options(full_stamps=True))), channels, True)
+
+
 @pytest.mark.parametrize("digits", [20, 17, 16])
 def test_a_stamp_with_another_number_of_digits_than_a_filetime_is_no_time(tmp_path, digits):
     text = export([Channel("a", "1", ramp(20))], Options(full_stamps=True, end="\n"))
@@ -94,14 +100,6 @@ def test_any_encoding_of_text_is_read(tmp_path, encoding):
     path = write_export(tmp_path / "run.csv", channels, Options(decimal=","), encoding)
     assert choose_format(path).name == "twincat_scope"
     assert_read(survey(path), channels)
-
-
-def test_ticks_are_exact_where_float64_cannot_represent_them(tmp_path):
-    """A FILETIME has 18 digits: float64 resolves 1.6 us, Scope's fastest sample time is shorter."""
-    channels = [Channel("fast", "0.0007", ramp(300))]
-    source = survey(write_export(tmp_path / "run.csv", channels, Options(full_stamps=True)))
-    assert source.columns["fast"].time.tolist() == [i * 7 / 1e7 for i in range(300)]
-    assert float(START + 7) - START != 7
 
 
 def test_channels_that_are_mapped_keep_their_own_clocks_for_every_command(tmp_path, machine):
@@ -168,27 +166,10 @@ def test_a_truncated_line_is_dropped_and_reported(tmp_path):
     assert [(finding.kind, finding.severity) for finding in source.findings] == [("last_line_cut", "loss")]
 
 
-def test_a_file_cut_in_its_head_is_refused_in_one_line(tmp_path):
-    content = export(CHANNELS, Options()).encode()
-    path = tmp_path / "run.csv"
-    for size in range(100, content.index(b"\r\n0\t0\t"), 97):
-        path.write_bytes(content[:size])
-        with pytest.raises(RecordingError, match=r"run\.csv: ") as caught:
-            TwincatScope().columns(path)
-        assert len(str(caught.value)) < 300 and "\n" not in str(caught.value)
-
-
 def test_an_export_without_columns_of_times_is_refused_with_the_option_that_helps(tmp_path):
     names = "Name\ta\tb\nSampleTime[ms]\t1\t1\nPort\t851\t851\n\n"
     (tmp_path / "run.csv").write_text(names + "".join(f"{i}\t{i + 0.5}\n" for i in range(20)))
     with pytest.raises(RecordingError, match=r"line 5 has 2 cells for 3 names: no columns of times\? .*Timelines"):
-        survey(tmp_path / "run.csv")
-
-
-def test_an_export_without_any_name_is_refused_with_the_option_that_helps(tmp_path):
-    text = export(CHANNELS, Options(keys=(), end="\n"))
-    (tmp_path / "run.csv").write_text(text)
-    with pytest.raises(RecordingError, match=r"no line with the names of channels .*at least the names"):
         survey(tmp_path / "run.csv")
 
 
@@ -199,13 +180,6 @@ def test_pinned_lines_are_those_of_a_table(tmp_path, machine):
     pins = f"[csv]\nskip_lines = {lines}\nheader = false\n"
     found = read_recording(path, machine(channels.replace('"ActTorque"', "2") + pins))
     assert found["position"].time.tolist() == pytest.approx(CHANNELS[0].seconds())
-
-
-def test_names_without_number_are_refused(tmp_path):
-    names = "Name" + "\tx" * 200_000 + "\nSampleTime[ms]" + "\t1" * 200_000 + "\n\n"
-    (tmp_path / "run.csv").write_text(names + "0" + "\t0" * 200_000 + "\n1\t1\n")
-    with pytest.raises(RecordingError, match="names 200001 columns, more than 16384"):
-        TwincatScope().columns(tmp_path / "run.csv")
 
 
 def test_short_rows_of_many_channels_do_not_fill_the_memory(tmp_path):
@@ -242,29 +216,8 @@ def test_any_rates_and_values_are_read_to_the_bit(tmp_path, data):
     assert_read(source, channels, options.full_stamps)
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(data=st.data())
-def test_damaged_bytes_are_read_or_refused_in_one_line(tmp_path, data):
-    options = Options(shared=data.draw(st.booleans()), separator=data.draw(st.sampled_from("\t;:, ")))
-    options = replace(options, full_stamps=data.draw(st.booleans()))
-    content = bytearray(export(SORTED, options).encode())
-    for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(content) - 1))
-        kind = data.draw(st.sampled_from(["byte", "cut", "remove", "repeat"]))
-        if kind == "byte":
-            content[at] = data.draw(st.integers(0, 255))
-        elif kind == "cut":
-            del content[at + 20 :]
-        elif kind == "remove":
-            del content[at : at + data.draw(st.integers(1, 200))]
-        else:
-            content[at:at] = content[at : at + 100]
-        content = content or bytearray(b"Name")
-    path = tmp_path / "run.csv"
-    path.write_bytes(content)
-    try:
-        source = TwincatScope().columns(path)
-    except RecordingError as fault:
-        assert "\n" not in str(fault)
-    else:
-        assert all(len(column.time) == len(column.values) for column in source.columns.values())
+def test_names_without_number_are_refused(tmp_path):
+    names = "Name" + "\tx" * 200_000 + "\nSampleTime[ms]" + "\t1" * 200_000 + "\n\n"
+    (tmp_path / "run.csv").write_text(names + "0" + "\t0" * 200_000 + "\n1\t1\n")
+    with pytest.raises(RecordingError, match="names 200001 columns, more than 16384"):
+        TwincatScope().columns(tmp_path / "run.csv")

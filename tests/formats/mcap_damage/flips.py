@@ -10,10 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from tests.formats.mcap_damage import records
-from tests.formats.mcap_damage.logs import Log, Span, style, write
+from tests.formats.mcap_damage.draft import pick, share
+from tests.formats.mcap_damage.logs import Log, Span, span_of_any_kind, style, write
 from tests.formats.mcap_damage.truth import Case, Message, Truth
 
 
+@share(8)
 def flipped_bit(rng: np.random.Generator) -> Case:
     """Flip one bit anywhere."""
     log = write(rng, style(rng))
@@ -21,26 +23,26 @@ def flipped_bit(rng: np.random.Generator) -> Case:
     return _flipped(log, {at: log.data[at] ^ (1 << int(rng.integers(8)))}, "flipped_bit")
 
 
+@share(7)
 def flipped_bit_of_a_kind(rng: np.random.Generator) -> Case:
     """Flip one bit in a record of a randomly chosen kind, so that small records are hit as often as large ones."""
     log = write(rng, style(rng))
-    kinds = sorted({span.opcode for span in log.spans})
-    kind = kinds[int(rng.integers(len(kinds)))]
-    spans = [span for span in log.spans if span.opcode == kind]
-    span = spans[int(rng.integers(len(spans)))]
+    span = span_of_any_kind(rng, log)
     at = int(rng.integers(span.start, span.end))
-    return _flipped(log, {at: log.data[at] ^ (1 << int(rng.integers(8)))}, f"flipped_bit_of_a_kind {kind:#x}")
+    return _flipped(log, {at: log.data[at] ^ (1 << int(rng.integers(8)))}, f"flipped_bit_of_a_kind {span.opcode:#x}")
 
 
+@share(7)
 def flipped_bit_of_a_frame(rng: np.random.Generator) -> Case:
     """Flip one bit of a record's opcode or length, or of a chunk's header."""
     log = write(rng, style(rng))
-    span = log.spans[int(rng.integers(len(log.spans)))]
+    span = pick(rng, log.spans)
     end = span.data_at if span.opcode == records.CHUNK else span.start + 9
     at = int(rng.integers(span.start, end))
     return _flipped(log, {at: log.data[at] ^ (1 << int(rng.integers(8)))}, f"flipped_bit_of_a_frame {span.opcode:#x}")
 
 
+@share(4)
 def changed_byte(rng: np.random.Generator) -> Case:
     """Change one byte to any other value."""
     log = write(rng, style(rng))
@@ -48,6 +50,7 @@ def changed_byte(rng: np.random.Generator) -> Case:
     return _flipped(log, {at: (log.data[at] + int(rng.integers(1, 256))) % 256}, "changed_byte")
 
 
+@share(4)
 def changed_bytes(rng: np.random.Generator) -> Case:
     """Change some bytes at several positions."""
     log = write(rng, style(rng))
@@ -55,6 +58,7 @@ def changed_bytes(rng: np.random.Generator) -> Case:
     return _flipped(log, {at: (log.data[at] + int(rng.integers(1, 256))) % 256 for at in positions}, "changed_bytes")
 
 
+@share(3)
 def zeroed_sector(rng: np.random.Generator) -> Case:
     """Set 512 bytes to 0, like a sector that a disk has not written."""
     log = write(rng, style(rng))
@@ -147,13 +151,3 @@ def _silent(log: Log, spans: list[Span | None], hit: list[int]) -> bool:
         return len(hit) > 1
     hits_prefix = [span for span, at in zip(spans, hit, strict=True) if span is None or at < span.start + 9]
     return bool(hits_prefix) or not style.crcs or not style.chunked
-
-
-KINDS = {
-    flipped_bit: 8,
-    flipped_bit_of_a_kind: 7,
-    flipped_bit_of_a_frame: 7,
-    changed_byte: 4,
-    changed_bytes: 4,
-    zeroed_sector: 3,
-}

@@ -1,26 +1,17 @@
-"""All kinds of damage with their shares of the cases: `cases(seed, count)`."""
+"""Cases of all kinds of damage: `cases(seed, count)`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from importlib import import_module
 
 import numpy as np
 
-from tests.formats.mcap_damage import chunks, cuts, definitions, flips, inserted_bytes, payloads, summaries
+from tests.formats.mcap_damage.draft import KINDS, Kind
 from tests.formats.mcap_damage.truth import Case
 
-Kind = Callable[[np.random.Generator], Case]
-
-# Kind of damage -> its share.
-KINDS: dict[Kind, float] = {
-    **cuts.KINDS,
-    **flips.KINDS,
-    **chunks.KINDS,
-    **definitions.KINDS,
-    **payloads.KINDS,
-    **inserted_bytes.KINDS,
-    **summaries.KINDS,
-}
+for _module in ("cuts", "flips", "chunks", "definitions", "payloads", "inserted_bytes", "summaries"):
+    import_module(f"tests.formats.mcap_damage.{_module}")  # registers its kinds
 
 
 def kind_of(seed: int, number: int) -> tuple[Kind, np.random.Generator]:

@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 
+import lz4.frame
 import numpy as np
+import zstandard
 from mcap.writer import CompressionType, IndexType, Writer
 
 from tests.formats.mcap_damage import records
+from tests.formats.mcap_damage.draft import COMPRESSIONS, pick
 from tests.formats.mcap_damage.messages import DEFINITIONS, ordinary
 from tests.formats.mcap_damage.truth import Message
 
@@ -29,13 +32,9 @@ class Style:
     indexed: bool = True
 
     def __str__(self) -> str:
-        marks = [self.compression or "none"]
-        marks += ["unchunked"] if not self.chunked else []
-        marks += ["without CRCs"] if not self.crcs else []
-        marks += ["data CRC"] if self.data_crc else []
-        marks += ["no summary"] if not self.summary else []
-        marks += ["no indexes"] if not self.indexed else []
-        return ", ".join(marks)
+        marks = {"unchunked": not self.chunked, "without CRCs": not self.crcs, "data CRC": self.data_crc}
+        marks |= {"no summary": not self.summary, "no indexes": not self.indexed}
+        return ", ".join([self.compression or "none", *(mark for mark, holds in marks.items() if holds)])
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ class Log:
 
 def style(rng: np.random.Generator) -> Style:
     """Return random options: each compression equally often; usually chunked, with CRCs and a summary, like loggers."""
-    compression = ("", "lz4", "zstd")[int(rng.integers(3))]
+    compression = pick(rng, COMPRESSIONS)
     chunked = bool(rng.random() < 0.85)
     crcs, data_crc, summary, indexed = (rng.random(4) < (0.8, 0.25, 0.7, 0.85)).tolist()
     return Style(compression if chunked else "", chunked, crcs, data_crc, summary, indexed)
@@ -125,6 +124,12 @@ def write(rng: np.random.Generator, style: Style, count: int = 96, chunk_size: i
     return Log(style, data, tuple(messages), tuple(_spans(data, messages)))
 
 
+def span_of_any_kind(rng: np.random.Generator, log: Log) -> Span:
+    """Return a record of a randomly chosen kind, so that rare kinds occur as often as messages."""
+    kind = pick(rng, sorted({span.opcode for span in log.spans}))
+    return pick(rng, [span for span in log.spans if span.opcode == kind])
+
+
 def inner(content: bytes) -> Iterator[tuple[int, int, int]]:
     """Yield (opcode, start, end) of the complete records in a chunk's content."""
     at = 0
@@ -138,9 +143,6 @@ def inner(content: bytes) -> Iterator[tuple[int, int, int]]:
 
 def unpacked(compression: str, data: bytes) -> bytes:
     """Return the decompressed part of a chunk's data, which may be cut off."""
-    import lz4.frame
-    import zstandard
-
     if compression == "zstd":
         return zstandard.ZstdDecompressor().decompressobj().decompress(data)
     return lz4.frame.LZ4FrameDecompressor().decompress(data) if compression == "lz4" else data

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from tests.formats.mcap_damage import records
-from tests.formats.mcap_damage.assembly import Block, assemble
-from tests.formats.mcap_damage.chunks import draw_blocks, draw_ending
+from tests.formats.mcap_damage.assembly import Block
+from tests.formats.mcap_damage.draft import Draft, share
 from tests.formats.mcap_damage.messages import ALL_DEFINITIONS, DEFINITIONS, START, payload
-from tests.formats.mcap_damage.truth import Case, Message, Truth, without
+from tests.formats.mcap_damage.truth import Case, Message, without
 
 
 def _block(tag: bytes, body: bytes) -> bytes:
@@ -26,121 +27,99 @@ _NUMBER += _block(b"\x12", _block(b"\n", b"count") + b"\x18\2\x20\1\x28\3")
 _FILE = _block(b"\n", b"m.proto") + _block(b"\x12", b"m") + _block(b'"', _NUMBER) + _block(b"b", b"proto3")
 PROTOBUF_SCHEMA = _block(b"\n", _FILE)
 
+# JSON that never gives a value and is always counted.
+GARBLED = (
+    *(b"[1, 2]", b"3.5", b"{'x': 1}", b'{"x": 1}}', b'{"x": 1,}', b'{"x" 1}', b'{"x": 01}', b'{"x": .5}'),
+    *(b'{"x": 1e}', b'{"x": --1}', b'{"x": 1} trailing', b'\xff\xfe{"x": 1}', b'{"x": "\xff"}'),
+    *(b'{"x": ' + b"[" * 100_000, b'{"a":' * 50_000 + b"1", b"null", b"\0" * 16, b'{"x": 1, "x', b'{"x": tru}'),
+)
+NUMBERS = (math.nan, math.inf, -math.inf, -0.0, 5e-324, 1.7976931348623157e308, float(2**53), 1e22, 1e-5)
 
+
+@share(5)
 def cut_payload(rng: np.random.Generator) -> Case:
     """Truncate some messages of a topic at random bytes, or set the length of their string too large."""
-    messages, blocks = draw_blocks(rng)
-    topic = list(DEFINITIONS)[int(rng.integers(4))]
-    hit = [message for message in messages if message.topic == topic]
-    hit = [hit[i] for i in rng.choice(len(hit), 3, replace=False).tolist()]
+    draft = Draft(rng)
+    topic = draft.pick(list(DEFINITIONS))
+    hit = _some(draft, topic, 3)
     short = {id(message): replace(message, payload=_cut(message, rng)) for message in hit}
-    return _changed(rng, messages, blocks, short, f"cut_payload {topic}")
+    return _undecodable(draft, short, f"cut_payload {topic}")
 
 
+@share(3)
 def garbled_payload(rng: np.random.Generator) -> Case:
-    """Write invalid JSON, which never gives a value and is always counted."""
-    messages, blocks = draw_blocks(rng)
-    variants = [
-        b"[1, 2]",
-        b"3.5",
-        b"{'x': 1}",
-        b'{"x": 1}}',
-        b'{"x": 1,}',
-        b'{"x" 1}',
-        b'{"x": 01}',
-        b'{"x": .5}',
-        b'{"x": 1e}',
-        b'{"x": --1}',
-        b'{"x": 1} trailing',
-        b'\xff\xfe{"x": 1}',
-        b'{"x": "\xff"}',
-        b'{"x": ' + b"[" * 100_000,
-        b'{"a":' * 50_000 + b"1",
-        b"null",
-        b"\0" * 16,
-        b'{"x": 1, "x',
-        b'{"x": tru}',
-    ]
-    hit = [message for message in messages if message.topic == "/state"]
-    hit = [hit[i] for i in rng.choice(len(hit), 2, replace=False).tolist()]
-    changed = {id(message): replace(message, payload=variants[int(rng.integers(len(variants)))]) for message in hit}
-    return _changed(rng, messages, blocks, changed, "garbled_payload")
+    """Write invalid JSON."""
+    draft = Draft(rng)
+    changed = {id(m): replace(m, payload=draft.pick(GARBLED)) for m in _some(draft, "/state", 2)}
+    return _undecodable(draft, changed, "garbled_payload")
 
 
+@share(2)
 def other_cdr(rng: np.random.Generator) -> Case:
     """Write another encapsulation (parameter lists, XCDR2), which is refused per message and counted."""
-    messages, blocks = draw_blocks(rng)
+    draft = Draft(rng)
     kind = int(rng.choice([2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0xFF]))
-    topic = ("/force", "/axis")[int(rng.integers(2))]
-    hit = [message for message in messages if message.topic == topic][:4]
-    changed = {
-        id(m): replace(m, payload=(b"\0" if kind < 255 else b"\xff") + bytes([kind]) + m.payload[2:]) for m in hit
-    }
-    return _changed(rng, messages, blocks, changed, f"other_cdr {kind}")
+    topic = draft.pick(("/force", "/axis"))
+    hit = [message for message in draft.messages if message.topic == topic][:4]
+    head = (b"\0" if kind < 255 else b"\xff") + bytes([kind])
+    changed = {id(message): replace(message, payload=head + message.payload[2:]) for message in hit}
+    return _undecodable(draft, changed, f"other_cdr {kind}")
 
 
+@share(1)
 def big_endian_cdr(rng: np.random.Generator) -> Case:
     """Write all or some messages in big-endian CDR, which must be read."""
-    messages, blocks = draw_blocks(rng)
-    share = (0.3, 1.0)[int(rng.integers(2))]
-    changed = {
-        id(m): replace(m, payload=payload(m.topic, m.time, m.value, big_endian=True))
-        for m in messages
-        if m.topic in ("/force", "/axis") and rng.random() < share
-    }
-    blocks = _with(blocks, changed)
-    written = tuple(changed.get(id(message), message) for message in messages)
-    return Case("big_endian_cdr", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
+    draft = Draft(rng)
+    of_all = draft.pick((0.3, 1.0))
+    draft.change(
+        {
+            id(m): replace(m, payload=payload(m.topic, m.time, m.value, big_endian=True))
+            for m in draft.messages
+            if m.topic in ("/force", "/axis") and rng.random() < of_all
+        }
+    )
+    return draft.case("big_endian_cdr", loss=False)
 
 
+@share(1)
 def long_payload(rng: np.random.Generator) -> Case:
     """Append padding to CDR messages, and white space to JSON, which must be ignored."""
-    messages, blocks = draw_blocks(rng)
+    draft = Draft(rng)
     changed = {}
-    for message in messages:
-        if message.topic == "/state":
-            changed[id(message)] = replace(message, payload=b" \n" + message.payload + b"\t ")
-        elif message.topic != "/raw":
-            changed[id(message)] = replace(message, payload=message.payload + bytes(int(rng.integers(0, 4))))
-    blocks = _with(blocks, changed)
-    written = tuple(changed.get(id(message), message) for message in messages)
-    return Case("long_payload", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
+    for message in draft.other_than("/raw"):
+        padded = b" \n" + message.payload + b"\t " if message.topic == "/state" else None
+        padded = message.payload + bytes(int(rng.integers(0, 4))) if padded is None else padded
+        changed[id(message)] = replace(message, payload=padded)
+    draft.change(changed)
+    return draft.case("long_payload", loss=False)
 
 
+@share(3)
 def unknown_encoding(rng: np.random.Generator) -> Case:
     """Give /force an unknown message or schema encoding, or an unknown schema; the other topics must be read."""
-    messages, blocks = draw_blocks(rng, everywhere=False)
+    draft = Draft(rng, everywhere=False)
     known = DEFINITIONS["/force"]
+    itself = b"std_msgs/Float64 data\n" + b"=" * 80 + b"\nMSG: std_msgs/Float64\nFloat64 data"
+    schemas = (b"not ? a definition", b"float64 data extra words [", b"pkg/Missing data", b"\xff\xfe\x00")
+    schemas += (b"float64[99999999999999999999] data", itself)
     variants = [
-        replace(known, encoding="flatbuffer"),
-        replace(known, encoding=""),
-        replace(known, encoding="CDR"),
-        replace(known, encoding="cdr\0"),
-        replace(known, schema_encoding="omgidl"),
-        replace(known, schema_encoding=""),
-        replace(known, schema_data=b"not ? a definition"),
-        replace(known, schema_data=b"float64 data extra words ["),
-        replace(known, schema_data=b"pkg/Missing data"),
-        replace(known, schema_data=b"\xff\xfe\x00"),
-        replace(known, schema_data=b"float64[99999999999999999999] data"),
-        replace(known, schema_data=b"std_msgs/Float64 data\n" + b"=" * 80 + b"\nMSG: std_msgs/Float64\nFloat64 data"),
+        *(replace(known, encoding=encoding) for encoding in ("flatbuffer", "", "CDR", "cdr\0")),
+        *(replace(known, schema_encoding=encoding) for encoding in ("omgidl", "")),
+        *(replace(known, schema_data=schema) for schema in schemas),
         replace(known, encoding="protobuf", schema_encoding="protobuf", schema_data=b"\xff" * 30),
         replace(known, encoding="ros1", schema_encoding="ros1msg", schema_data=b"\0"),
     ]
-    chosen = variants[int(rng.integers(len(variants)))]
-    definitions = ALL_DEFINITIONS.replace(known.records, chosen.records)
-    blocks[0] = replace(blocks[0], before=definitions)
-    others = tuple(message for message in messages if message.topic != "/force")
-    how = replace(draw_ending(rng), definitions=definitions)
+    chosen = draft.pick(variants)
+    draft.define(ALL_DEFINITIONS.replace(known.records, chosen.records))
     name = f"unknown_encoding {chosen.encoding!r} {chosen.schema_encoding!r} {chosen.schema_data[:20]!r}"
-    return Case(name, assemble(blocks, how), Truth(tuple(messages), others))
+    return draft.case(name, required=draft.other_than("/force"))
 
 
+@share(1)
 def cut_protobuf(rng: np.random.Generator) -> Case:
     """Write protobuf messages, some of them truncated in a field; an omitted number is 0, as in proto3."""
-    messages, blocks = draw_blocks(rng, everywhere=False)
+    draft = Draft(rng, everywhere=False)
     schema = records.schema(9, "m.Number", "protobuf", PROTOBUF_SCHEMA)
-    definition = schema + records.channel(9, 9, "/count", "protobuf")
     own, after = [], b""
     for k, value in enumerate(rng.integers(1, 2**40, 8).tolist()):
         whole = b"\x09" + struct.pack("<d", 0.5) + b"\x10" + _varint(value)
@@ -149,40 +128,30 @@ def cut_protobuf(rng: np.random.Generator) -> Case:
         body = whole[: int(rng.choice([*range(1, 9), *range(10, len(whole))]))] if cut else whole
         after += records.message(9, START + k, body)
         own.append(Message("/count", START + k, body, math.nan if cut else float(value)))
-    blocks.append(Block((), definition, after, blocks[0].compression))
-    how = replace(draw_ending(rng), summary=False)
-    written = (*messages, *own)
-    required = tuple(message for message in written if not math.isnan(message.value))
-    return Case("cut_protobuf", assemble(blocks, how), Truth(written, required))
+    definition = schema + records.channel(9, 9, "/count", "protobuf")
+    draft.blocks.append(Block((), definition, after, draft.blocks[0].compression))
+    draft.ending = replace(draft.ending, summary=False)
+    written = (*draft.messages, *own)
+    return draft.case("cut_protobuf", required=(m for m in written if not math.isnan(m.value)), written=written)
 
 
+@share(2)
 def special_numbers(rng: np.random.Generator) -> Case:
-    """Write NaN, infinities, -0, subnormals and 2^53 + 1, which must be read."""
-    messages, blocks = draw_blocks(rng)
-    variants = [
-        float("nan"),
-        float("inf"),
-        float("-inf"),
-        -0.0,
-        5e-324,
-        1.7976931348623157e308,
-        float(2**53),
-        1e22,
-        1e-5,
-    ]
+    """Write NaN, infinities, -0, subnormals and 2^53, which must be read."""
+    draft = Draft(rng)
     changed = {}
-    for message in messages:
+    for message in draft.messages:
         if rng.random() < 0.4:
-            value = variants[int(rng.integers(len(variants)))]
+            value = draft.pick(NUMBERS)
             changed[id(message)] = replace(message, value=value, payload=payload(message.topic, message.time, value))
-    blocks = _with(blocks, changed)
-    written = tuple(changed.get(id(message), message) for message in messages)
-    return Case("special_numbers", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
+    draft.change(changed)
+    return draft.case("special_numbers", loss=False)
 
 
+@share(2)
 def unusual_times(rng: np.random.Generator) -> Case:
     """Write times that repeat, go backwards, are 0 or 2^64 - 1, which must be read unchanged."""
-    messages, blocks = draw_blocks(rng)
+    draft = Draft(rng)
     choices = [
         lambda _: START,
         lambda i: START + (64 - i) * 1000,
@@ -193,24 +162,20 @@ def unusual_times(rng: np.random.Generator) -> Case:
         lambda i: 1_700_000_000 * 10**9 + i * 1_000_000,
     ]
     which = int(rng.integers(len(choices)))
-    changed = {id(m): replace(m, time=choices[which](i)) for i, m in enumerate(messages)}
-    blocks = _with(blocks, changed)
-    written = tuple(changed[id(message)] for message in messages)
-    return Case(f"unusual_times {which}", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
+    draft.change({id(m): replace(m, time=choices[which](i)) for i, m in enumerate(draft.messages)})
+    return draft.case(f"unusual_times {which}", loss=False)
 
 
-def _changed(
-    rng: np.random.Generator, messages: list[Message], blocks: list[Block], changed: dict[int, Message], name: str
-) -> Case:
+def _some(draft: Draft, topic: str, count: int) -> list[Message]:
+    own = [message for message in draft.messages if message.topic == topic]
+    return [own[i] for i in draft.rng.choice(len(own), count, replace=False).tolist()]
+
+
+def _undecodable(draft: Draft, changed: Mapping[int, Message], name: str) -> Case:
     """Return a case with payloads that cannot be decoded: they have no value, and are reported with their topic."""
-    changed = {key: replace(message, value=math.nan) for key, message in changed.items()}
-    written = tuple(changed.get(id(message), message) for message in messages)
-    required = without(written, changed.values())
-    return Case(name, assemble(_with(blocks, changed), draw_ending(rng)), Truth(written, required))
-
-
-def _with(blocks: list[Block], changed: dict[int, Message]) -> list[Block]:
-    return [replace(block, messages=tuple(changed.get(id(m), m) for m in block.messages)) for block in blocks]
+    without_value = {key: replace(message, value=math.nan) for key, message in changed.items()}
+    draft.change(without_value)
+    return draft.case(name, required=without(draft.messages, without_value.values()))
 
 
 def _cut(message: Message, rng: np.random.Generator) -> bytes:
@@ -226,16 +191,3 @@ def _varint(value: int) -> bytes:
         encoded += bytes([value & 127 | 128])
         value >>= 7
     return encoded + bytes([value])
-
-
-KINDS = {
-    cut_payload: 5,
-    garbled_payload: 3,
-    other_cdr: 2,
-    big_endian_cdr: 1,
-    long_payload: 1,
-    unknown_encoding: 3,
-    cut_protobuf: 1,
-    special_numbers: 2,
-    unusual_times: 2,
-}

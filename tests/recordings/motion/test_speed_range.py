@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,13 +9,13 @@ from hypothesis import strategies as st
 
 from cdtool.commands.simulate.changed_machine import ChangedMachine
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.recordings.motion import MotionClass
 from cdtool.recordings.motion.speed_course import TOLERANCE
 from cdtool.recordings.motion.speed_range import FORGET, GUARD, KNOWN, SpeedRange
-from cdtool.recordings.recording import Recording, Series
+from cdtool.recordings.recording import Recording
 from cdtool.thresholds.common_class import common_class
 from tests.recordings.motion.speed_logs import log
+from tests.synthetic.gate_as_recording import as_recording
 
 
 def learned(speed: float, direction: int = 1) -> MotionClass:
@@ -87,14 +85,3 @@ def test_a_contact_that_slows_the_axis_changes_nothing_before_it_is_as_old_as_th
         _, fits, _ = found_in(struck)
         assert not fits[departed].any()
         assert np.nanmin(found[departed]) > 0.295
-
-
-def test_it_is_the_speed_of_the_joint_that_leads():
-    recording = log((0.25, 3.6), (0.0, 1.0))
-    channels = {
-        name: Series(series.time, np.column_stack((0.3 * series.values, series.values)), series.unit)
-        for name, series in recording.channels.items()
-    }
-    several = Recording("two", "made up", ("first", "second"), channels)
-    second = SpeedRange(tuple(replace(item, joint=1) for item in RANGE.classes))
-    assert np.array_equal(found_in(several, second)[2], found_in(recording)[2], equal_nan=True)

@@ -124,17 +124,6 @@ def test_a_click_on_a_recording_shows_its_trigger_plot(shown):
     assert "stiff/02.csv" in texts(browser, "tr.open")[0]
 
 
-def test_an_operation_without_contact_shows_false_alarms_and_detectors_that_assessed_nothing(shown):
-    browser = shown(to_html(Report(*case())))
-    for _ in range(3):
-        all_of(browser, '[data-do="after"]')[0].click()
-    assert texts(browser, "#viewer-title") == ["free.csv#2"]
-    words = texts(browser, "#viewer-plot text")
-    assert "1 false alarm" in words
-    assert any(word.startswith("start-up 100 %") and word.endswith("not assessable") for word in words)
-    assert not all_of(browser, '[data-do="after"]')[0].is_enabled()
-
-
 def test_dragging_keys_and_buttons_change_the_range_that_is_drawn(shown):
     browser = shown(to_html(Report(*case())))
     plot = all_of(browser, "#viewer-plot")[0]
@@ -154,22 +143,6 @@ def test_dragging_keys_and_buttons_change_the_range_that_is_drawn(shown):
     assert drawn_range(browser) == pytest.approx((0.0, 4.0))
     press(plot, "-")
     assert drawn_range(browser) == pytest.approx((0.0, 4.0))
-
-
-def test_the_first_table_sorts_by_a_click_on_its_heading(shown):
-    browser = shown(to_html(Report(*case(limits=False))))
-    rows = "#results-table tbody tr td:nth-child(5)"
-    before = texts(browser, rows)
-    heading = all_of(browser, "#results-table th:nth-child(5) button")[0]
-    heading.click()
-    rising = [text.split(" ")[0] for text in texts(browser, rows)]
-    assert rising[:4] == sorted((text.split(" ")[0] for text in before[:4]), key=float)
-    assert rising[4:] == ["–", "–"]
-    heading.click()
-    falling = [text.split(" ")[0] for text in texts(browser, rows)]
-    assert falling[:4] == rising[3::-1]
-    assert falling[4:] == ["–", "–"]
-    assert all_of(browser, "#results-table th:nth-child(5)")[0].get_attribute("aria-sort") == "descending"
 
 
 def test_recordings_are_paged_searched_and_filtered(shown):

@@ -40,16 +40,6 @@ def drawn(results: Results):
         return latency_plot.latency_figure(evaluate(results))
 
 
-def test_counts_are_listed_next_to_the_latencies(evaluated, tmp_path):
-    save(latency_figure(evaluated), tmp_path / "a.svg")
-    shown = texts(tmp_path / "a.svg")
-    for expected in ("stiff", "soft", "friction_ekf", "momentum", "3 of 4", "2 of 3", "30 of 30", "missed"):
-        assert expected in shown
-    assert "34.0 (–)" in shown
-    assert "1 in 40 op." in shown and "in holdout" in shown
-    assert "holdout" not in shown
-
-
 def test_every_detected_contact_has_a_filled_mark_and_every_missed_one_an_open_mark(results):
     filled, opened = marks(drawn(of(results, [30.0, 34.0, 50.0, None, None, "blind"])))
     assert sorted(filled) == [30.0, 34.0, 50.0]

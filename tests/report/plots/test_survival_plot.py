@@ -50,13 +50,6 @@ def test_a_missed_contact_is_an_open_mark_at_the_end_of_its_monitoring():
     assert figure.axes[0].get_xlim()[1] >= 1000.0
 
 
-def test_below_ten_contacts_a_curve_has_no_band_and_the_figure_states_this(tmp_path):
-    nine = {"momentum": [20.0 + i for i in range(9)], "direct": [20.0 + i for i in range(10)]}
-    assert len(drawn(of(nine)).axes[0].collections) == 1
-    save(survival_figure(of(nine)), tmp_path / "a.svg")
-    assert "band: 95 % at each time; no band with fewer than 10 contacts" in joined(tmp_path / "a.svg")
-
-
 def test_everything_missed_nothing_assessable_one_contact_and_none_are_drawn_too(evaluated, tmp_path):
     figure = drawn(of({"momentum": [None] * 20}))
     assert set(steps(figure)[0].get_ydata()) == {1.0}

@@ -79,17 +79,6 @@ def test_a_sample_not_assessable_has_no_margin_but_a_reason():
     assert math.isnan(moment.margin) and math.isnan(moment.share) and moment.reason == "start-up"
 
 
-def test_an_alarm_is_traced_to_the_last_exit_from_the_band():
-    values = pulse(3020, 200)
-    values[3010:3013] = 1.5  # three samples outside, then inside again: not the last exit
-    item = detection(values)
-    (alarm,) = item.verdict.alarms
-    found = Explainer(item, NINE).alarm(alarm, CONTACT)
-    assert (found.joint, found.alarm.side, found.role) == ("hip", "above", "detection")
-    assert found.left == pytest.approx(3.020) and alarm.time == pytest.approx(3.028)
-    assert (found.debounce, found.skipped) == (9, 0)
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_between_leaving_the_band_and_any_alarm_lie_just_the_debounced_samples(seed):
     rng = np.random.default_rng(seed)
@@ -152,8 +141,6 @@ def test_every_alarm_and_every_miss_is_explained_once_in_order_of_time_with_its_
     roles = [part.role for part in found]
     assert roles == ["false alarm", "detection", "further alarm", "missed"]
     assert [part.contact.start if part.contact else None for part in found] == [None, 3.0, 3.0, 4.2]
-    assert [words(part)[0].split(":")[0] for part in found[:1]] == ["false alarm at 1.008 s"]
-    assert words(found[2])[0].startswith("further alarm at 3.708 s, 708 ms after the contact")
 
 
 def test_an_alarm_of_a_contact_in_progress_has_neither_onset_nor_latency():
@@ -161,10 +148,7 @@ def test_an_alarm_of_a_contact_in_progress_has_neither_onset_nor_latency():
     begun = Contact(0.0, 1.0, 0.0, in_progress=True)
     first, second = explain(item, matching(item, begun, CONTACT), NINE)
     assert (first.role, first.contact, second.role) == ("in progress", None, "detection")
-    told = " ".join(words(first))
-    assert told.startswith("alarm at 0.408 s, in a contact in progress when the recording begins")
-    assert "its onset is not recorded: no latency" in told
-    assert "onset at" not in told and "after the contact" not in told and "after the onset" not in told
+    assert "its onset is not recorded: no latency" in " ".join(words(first))
 
 
 def test_without_ground_truth_an_alarm_is_not_called_false():
@@ -183,20 +167,3 @@ def test_an_alarm_that_is_latched_still_explains_the_contact_it_detected():
     assert len(item.verdict.alarms) == 1
     found = explain(item, matching(item, CONTACT), NINE)
     assert [part.role for part in found] == ["false alarm", "detection"]
-
-
-def test_the_words_name_joint_limit_debounce_and_what_moved_first():
-    rng = np.random.default_rng(8)
-    acceleration = -4.0 * (TIME >= 3.005) + 0.05 * rng.normal(size=len(TIME))
-    item = detection(pulse(3020, 200), channels={"acceleration": acceleration})
-    (found,) = explain(item, matching(item, CONTACT), NINE, inputs=("torque",))
-    assert words(found) == [
-        "alarm at 3.028 s, 28 ms after the contact (onset at 3.000 s, load cell)",
-        "hip: above its upper limit, 1.5 against 1 N m. Last exit from the band 20 ms after the onset, 8 ms before "
-        "the alarm (debounce: 9 consecutive samples outside).",
-        "No impact-free runs to compare with: limits set by hand are not learned from runs; learn a signature with "
-        "cdtool learn-signature and give it to cdtool detect --signature. Compared with this log's own past instead.",
-        "Moved first: acceleration down 5 ms after the onset (farthest -4 against 0.004674 +- 0.008679), torque up 20 "
-        "ms (farthest 1.5 against 0.2 +- 2e-10).",
-        "First input of momentum: torque, 20 ms after the onset.",
-    ]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import UsageError
 from cdtool.results.traces.decimation import decimate
 
 numbers = st.one_of(st.floats(-1e6, 1e6), st.just(float("nan")))
@@ -38,14 +36,6 @@ def test_least_largest_first_and_last_value_stay_and_the_size_is_bounded(values,
         assert np.isnan(kept).all()
 
 
-@given(series)
-def test_a_short_series_is_returned_as_it_is(values):
-    time = clock(values)
-    kept_time, kept = decimate(time, values, max(2, -(-len(values) // 4)))
-    np.testing.assert_array_equal(kept_time, time)
-    np.testing.assert_array_equal(kept, values)
-
-
 def test_a_spike_and_the_extremes_of_each_column_survive_a_million_samples():
     time = np.arange(1_000_000) * 1e-3
     values = np.sin(time)
@@ -57,8 +47,3 @@ def test_a_spike_and_the_extremes_of_each_column_survive_a_million_samples():
     inside = (kept_time > 701.0) & (kept_time < 799.0)
     assert inside.any()
     assert np.isnan(kept[inside]).all()
-
-
-def test_less_than_two_pixels_is_refused():
-    with pytest.raises(UsageError, match="pixels is 1"):
-        decimate(np.arange(9.0), np.arange(9.0), 1)

@@ -163,8 +163,3 @@ def test_the_force_at_an_alarm_is_that_of_the_last_sample_before_it():
     assert np.isnan(force_at(curve, -0.001))
     assert np.isnan(force_at(curve, 1.3))
     assert np.isnan(force_at(curve, 99.0))
-
-
-def test_a_stronger_pull_long_after_the_contact_does_not_turn_its_sign():
-    pulled = half_sine(TIME) - 9000.0 * ((TIME > 6.0) & (TIME < 6.2))
-    assert force_time_curve(recording(pulled), CONTACT).peak == pytest.approx(PEAK, rel=1e-3)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -65,11 +63,3 @@ def test_a_kept_curve_is_the_contacts_force_with_its_verdict_and_alarms(hit, con
     assert found.verdict.time_budget == pytest.approx(verdict.time_budget)
     assert found.verdict.steps[0].peak_at == pytest.approx(verdict.steps[0].peak_at, abs=0.02)
     assert np.isnan(found.verdict.steps[2].peak) and np.isnan(found.verdict.steps[2].peak_at)
-
-
-def test_a_contact_ends_where_the_next_begins_and_each_has_its_verdict(hit, contacts):
-    second = replace(contacts[0], start=contacts[0].start + 0.1)
-    both = [contacts[0], second]
-    first, other = traced_forces(scored(hit, both), [traced(hit, both)])
-    assert first.time[-1] < 0.1
-    assert (first.contact, other.contact) == (1, 2)

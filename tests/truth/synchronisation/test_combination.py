@@ -34,7 +34,7 @@ def test_the_intervals_contain_offset_and_drift_whatever_the_scatter_between_eve
         line = clock_line(events(times, delays, errors))
         offsets += line.offset.low <= 4e-3 + 50e-6 * line.at <= line.offset.high
         drifts += line.drift.low <= 50e-6 <= line.drift.high
-    assert min(offsets, drifts) >= 108
+    assert min(offsets, drifts) >= 104  # of 114: four standard deviations less
 
 
 def test_an_event_far_from_the_others_is_left_out():

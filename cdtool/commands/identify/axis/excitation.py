@@ -11,16 +11,10 @@ import numpy as np
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.axis.filtered_regression import FilteredRun
 
-# A speed is held if this share of the moving time is spent within this relative distance of it.
-_HELD_SHARE, SAME_SPEED = 0.05, 0.1
-# Two held speeds are distinct if they differ by this factor.
-_DISTINCT = 1.25
+# A speed is held within this relative distance of it.
+SAME_SPEED = 0.1
 # With one or two speeds, the viscous friction of a real axis came out 20-60 % wrong.
 SPEEDS_NEEDED = 3
-# A direction counts if this share of the moving time is spent in it.
-_DIRECTION_SHARE = 0.05
-# The root mean square of the acceleration, noise included, must be this many times that of the noise.
-_ABOVE_NOISE = 1.1
 
 
 @dataclass(frozen=True)
@@ -43,12 +37,13 @@ class Excitation:
     @property
     def is_one_way(self) -> bool:
         """Whether less than 5 % of the moving time is spent in one of the directions."""
-        return min(self.forward_share, 1.0 - self.forward_share) < _DIRECTION_SHARE
+        return min(self.forward_share, 1.0 - self.forward_share) < 0.05
 
     @property
     def is_accelerated(self) -> bool:
         """Whether the acceleration is more than its noise."""
-        return self.acceleration > _ABOVE_NOISE * self.acceleration_noise
+        # The root mean square, noise included, must be 10 % above that of the noise.
+        return self.acceleration > 1.1 * self.acceleration_noise
 
 
 def measure_excitation(runs: Sequence[FilteredRun]) -> Excitation:
@@ -102,11 +97,12 @@ def distinct_speeds(speed: FloatArray, share: FloatArray) -> tuple[float, ...]:
         last = np.searchsorted(speed, speed * (1.0 + SAME_SPEED), side="right")
         weight = cumulated[last] - cumulated[first]
         best = int(np.argmax(weight))
-        if weight[best] < _HELD_SHARE:
+        if weight[best] < 0.05:  # a speed is held if 5 % of the moving time are spent within 10 % of it
             break
         near = slice(first[best], last[best])
         centre = float(np.average(speed[near], weights=share[near]))
         held.append(centre)
-        kept = (speed < centre / _DISTINCT) | (speed > centre * _DISTINCT)
+        # Held speeds are distinct if they differ by a quarter.
+        kept = (speed < centre / 1.25) | (speed > centre * 1.25)
         speed, share = speed[kept], share[kept]
     return tuple(sorted(held))

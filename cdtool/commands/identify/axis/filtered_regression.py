@@ -27,34 +27,6 @@ _AVERAGES = 4
 _CORNER = 0.2256
 # A fourth difference of white noise has the variance 70 times that of the noise.
 _FOURTH_DIFFERENCE = math.sqrt(70.0)
-# The largest share of the largest differences that is motion rather than noise.
-_MOTION_SHARE = 0.05
-# Samples in which the noise is about the same.
-_NOISE_BLOCK = 400
-# A reference with fewer samples than this share of the run's is not used.
-_KNOWN_SHARE = 0.5
-# Rounding of a channel relative to its largest value [-].
-_ROUNDING = 1e-12
-# The sign of a speed is unknown below this share of the usual highest speed and this many standard deviations of its
-# noise.
-_UNKNOWN_SHARE, _UNKNOWN_DEVIATIONS = 0.005, 4.0
-# Noise hides the motion where the sign is unknown up to this share of the usual highest speed.
-_HIDDEN_SHARE = 0.5
-# A travel is motion if it is this many times what the noise alone can look like.
-_TRAVEL_SEEN = 3.0
-# An equation is used if at most this share of its weight falls on samples whose sign of speed is unknown.
-_UNKNOWN_WEIGHT = 0.1
-# A stroke whose highest speed is below this share of the usual highest speed is an oscillation at rest.
-_STROKE_SHARE = 0.1
-# From rest to this share of the stroke's highest speed, and back, a drive winds up and sticks: motor and load do not
-# move as one.
-_START_UP_SHARE = 0.15
-# Regressors with a larger condition number depend on each other.
-_DEPENDENT = 1e7
-# A block without which fewer than this share of an excitation remains cannot be left out.
-_LEAST_REMAINING = 1e-6
-# A coefficient takes part in a combination that is lost if its share is above this [-].
-_INVOLVED = 1e-3
 
 
 class LowPass:
@@ -151,14 +123,16 @@ def _noise_of(signal: FloatArray) -> float:
     differences = differences[np.isfinite(differences) & ~repeats]
     if len(differences) < 6:
         return 0.0
-    blocks = np.array_split(differences, max(len(differences) // _NOISE_BLOCK, 1))
+    # In 400 samples the noise is about the same.
+    blocks = np.array_split(differences, max(len(differences) // 400, 1))
     variances = [_trimmed_mean_square(block) for block in blocks]
     lengths = [len(block) for block in blocks]
     return math.sqrt(float(np.average(variances, weights=lengths))) / _FOURTH_DIFFERENCE
 
 
 def _trimmed_mean_square(differences: FloatArray) -> float:
-    kept = np.sort(differences)[: max(int((1.0 - _MOTION_SHARE) * len(differences)), 1)]
+    # At most the largest 5 % are motion rather than noise.
+    kept = np.sort(differences)[: max(int(0.95 * len(differences)), 1)]
     # Without its largest 5 % the square of a normal variable has 0.759 of its mean.
     return float(np.mean(kept**2)) / 0.759
 
@@ -196,8 +170,10 @@ class FilteredRun:
         known = self.position[np.isfinite(self.position)]
         travel = float(np.ptp(known)) if len(known) else 0.0
         seen_as_rest = self.unknown_speed * self.low_pass.reach * self.run.period
-        is_moving = travel > _TRAVEL_SEEN * seen_as_rest
-        return is_moving and self.unknown_speed >= _HIDDEN_SHARE * _usual_highest(self.inner_speed)
+        # A travel is motion if it is three times what the noise alone can look like.
+        is_moving = travel > 3.0 * seen_as_rest
+        # Noise hides the motion where the sign is unknown up to half of the usual highest speed.
+        return is_moving and self.unknown_speed >= 0.5 * _usual_highest(self.inner_speed)
 
     @cached_property
     def complete(self) -> npt.NDArray[np.bool_]:
@@ -210,7 +186,8 @@ class FilteredRun:
         """Return where the run is complete and the axis moves almost all the time within reach (n,)."""
         unknown = np.where(np.isnan(self.inner_speed), np.nan, np.abs(self.inner_speed) < self.unknown_speed)
         weight = self.low_pass.value(unknown)
-        moving: npt.NDArray[np.bool_] = np.nan_to_num(weight, nan=1.0) <= _UNKNOWN_WEIGHT
+        # An equation is used if at most a tenth of its weight falls on samples whose sign of speed is unknown.
+        moving: npt.NDArray[np.bool_] = np.nan_to_num(weight, nan=1.0) <= 0.1
         return moving & self.complete & (self.stroke >= 0)
 
     @cached_property
@@ -230,7 +207,9 @@ class FilteredRun:
 
     def _start_up_over(self, first: int, last: int) -> npt.NDArray[np.bool_]:
         speed = np.nan_to_num(np.abs(self.inner_speed[first : last + 1]))
-        over: npt.NDArray[np.bool_] = speed >= _START_UP_SHARE * np.max(speed)
+        # From rest to 15 % of the stroke's highest speed, and back, a drive winds up and sticks: motor and load do not
+        # move as one.
+        over: npt.NDArray[np.bool_] = speed >= 0.15 * np.max(speed)
         return over
 
     @cached_property
@@ -263,7 +242,8 @@ class FilteredRun:
         stroke = np.concatenate(([0], np.cumsum(rests | turns)))
         highest = np.zeros(stroke[-1] + 1)
         np.maximum.at(highest, stroke, np.abs(self.inner_speed[moving]))
-        is_stroke = highest >= _STROKE_SHARE * _usual_highest(self.inner_speed)
+        # A slower stroke is an oscillation at rest.
+        is_stroke = highest >= 0.1 * _usual_highest(self.inner_speed)
         number[moving] = np.where(is_stroke, np.cumsum(is_stroke) - 1, -1)[stroke]
         return number
 
@@ -301,9 +281,11 @@ def filter_run(run: AxisRun, corner: float, torque_lag: float = 0.0) -> Filtered
         speed_noise, acceleration_noise = noise / math.sqrt(inner.steps), low_pass.slope_noise(noise)
     else:
         raise IdentificationError(f"{run.name}: no speed or position", "map one of them in [channels]")
-    rounding = _ROUNDING * float(np.max(np.abs(source[np.isfinite(source)]), initial=0.0))
+    # Rounding of a channel relative to its largest value.
+    rounding = 1e-12 * float(np.max(np.abs(source[np.isfinite(source)]), initial=0.0))
     speed_noise += inner.slope_noise(rounding) if by_position else rounding
-    unknown_speed = max(_UNKNOWN_SHARE * _usual_highest(inner_speed), _UNKNOWN_DEVIATIONS * speed_noise)
+    # Below it the sign of a speed is unknown: one of 16,000 samples of noise is above four standard deviations.
+    unknown_speed = max(0.005 * _usual_highest(inner_speed), 4.0 * speed_noise)
     position = run.position
     if position is None:
         position = np.cumsum(np.nan_to_num(source)) * run.period
@@ -347,7 +329,7 @@ def _columns(
 
 
 def _is_mostly_known(reference: FloatArray) -> bool:
-    return bool(np.isfinite(reference).mean() > _KNOWN_SHARE)
+    return bool(np.isfinite(reference).mean() > 0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -416,7 +398,7 @@ def fit_linear(regressors: FloatArray, force: FloatArray, instruments: FloatArra
     scaled = regressors / scale
     given = scaled if instruments is None else instruments / _lengths(instruments)
     condition = _condition(given.T @ scaled, instruments is None)
-    if not condition < _DEPENDENT:
+    if not condition < 1e7:  # they depend on each other
         raise IdentificationError(
             f"the regressors depend on each other (condition number {condition:.3g})",
             "the recordings need more varied motion",
@@ -463,8 +445,10 @@ def block_covariance(fit: LinearFit, block: IntArray) -> FloatArray:
         # (A - A_g)^-1 u_g with A^-1 A_g = influence @ regressors of the block.
         remaining = np.eye(unknowns) - (influence @ fit.regressors[inside]) * scale[:, None] / scale
         left, strength, right = np.linalg.svd(remaining)
-        is_lost = strength < _LEAST_REMAINING
-        lost |= np.any(np.abs(right[is_lost]) > _INVOLVED, axis=0)
+        # A block without which nothing of an excitation remains, but for rounding, cannot be left out.
+        is_lost = strength < 1e-6
+        # Coefficients that take part in a combination that is lost.
+        lost |= np.any(np.abs(right[is_lost]) > 1e-3, axis=0)
         change = (influence @ fit.residuals[inside]) * scale
         inverse = np.divide(1.0, strength, out=np.zeros(unknowns), where=~is_lost)
         changes[row] = (right.T @ (inverse * (left.T @ change))) / scale

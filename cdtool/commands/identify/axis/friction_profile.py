@@ -17,8 +17,6 @@ from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.axis.start_ensemble import StartEnsemble, motor_speed
 from cdtool.machines.axis_model.axis_run import AxisRun
 
-# The motion is settled this long after it reached this share of the nominal speed, while it stays within a band [s, -].
-_SETTLED_AFTER, _REACHED, _BAND = 0.5, 0.95, 0.3
 # The grid over the travel: this long at nominal speed; force and speed pass a Gaussian of this deviation, so that the
 # third derivative of the speed is above its noise [s].
 _GRID, _AVERAGED = 0.01, 0.04
@@ -132,9 +130,10 @@ def _settled(
     speed, torque = (ensemble.direction * np.nan_to_num(values[first:]) for values in (motor_speed(run), run.torque))
     smooth, acceleration = rate(speed, 0), rate(speed, 1)
     force, curvature = (rate(torque, order) - motor_mass * rate(speed, order + 1) for order in (0, 2))
-    is_fast = smooth >= _REACHED * ensemble.nominal_speed
-    begin = int(np.argmax(is_fast)) + round(_SETTLED_AFTER / run.period)
-    left = np.flatnonzero(np.abs(smooth[begin:] / ensemble.nominal_speed - 1.0) > _BAND)
+    # Settled 0.5 s after it reached 95 % of the nominal speed, while it stays within 30 % of it.
+    is_fast = smooth >= 0.95 * ensemble.nominal_speed
+    begin = int(np.argmax(is_fast)) + round(0.5 / run.period)
+    left = np.flatnonzero(np.abs(smooth[begin:] / ensemble.nominal_speed - 1.0) > 0.3)
     # The averages at the end of a log reach beyond it.
     end = min(begin + int(left[0]) if len(left) else len(speed), len(speed) - round(3.0 * _AVERAGED / run.period))
     step = max(round(_GRID / run.period), 1)

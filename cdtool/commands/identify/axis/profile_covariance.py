@@ -11,8 +11,6 @@ from cdtool.commands.identify.axis.filtered_regression import IntArray
 
 # The wave numbers of a profile that the fitted coefficients absorb: their magnitude comes from those above.
 _ABSORBED = 2
-# The most points of a profile over the travel, and the fewest equations per point.
-_MOST_POINTS, _FEWEST_PER_POINT = 256, 4
 
 
 def profile_covariance(
@@ -62,7 +60,8 @@ def _by_direction(direction: FloatArray) -> Sequence[IntArray]:
 def _profile(position: FloatArray, residuals: FloatArray) -> tuple[float, float, FloatArray]:
     """Return begin, spacing and mean residual on a grid over the positions."""
     low, high = float(np.min(position)), float(np.max(position))
-    points = int(np.clip(len(position) // _FEWEST_PER_POINT, 1, _MOST_POINTS))
+    # At most 256 points over the travel, with at least four equations for each.
+    points = int(np.clip(len(position) // 4, 1, 256))
     spacing = max((high - low) / points, 1e-12)
     number = np.minimum(((position - low) / spacing).astype(np.int64), points - 1)
     counts = np.bincount(number, minlength=points)

@@ -68,11 +68,9 @@ class RigidAxisSettings:
     folds: int = 8
 
 
-# Strokes are the blocks of the standard errors; with fewer per direction they are cut into this many pieces.
-_ENOUGH_STROKES, _PIECES = 3, 6
-# Strokes repeat each other within this share of duration and travel; their forces are compared at so many times within
-# this share of them, as their ends do not agree to a sample.
-_SAME_STROKE, _TIMES, _INNER = 0.02, 400, 0.98
+# The forces of strokes that repeat each other are compared at so many times within this share of them, as their ends do
+# not agree to a sample.
+_TIMES, _INNER = 400, 0.98
 
 
 @dataclass(frozen=True)
@@ -226,7 +224,8 @@ class _Equations:
         total = 0
         for sign in (1.0, -1.0):
             strokes = np.unique(self.stroke[self.direction == sign])
-            pieces = 1 if len(strokes) >= _ENOUGH_STROKES else math.ceil(_PIECES / max(len(strokes), 1))
+            # Strokes are the blocks of the standard errors; with fewer than three they are cut into six pieces.
+            pieces = 1 if len(strokes) >= 3 else math.ceil(6 / max(len(strokes), 1))
             for stroke in strokes:
                 inside = np.flatnonzero((self.stroke == stroke) & (self.direction == sign))
                 block[inside] = total + np.arange(len(inside)) * pieces // len(inside)
@@ -521,7 +520,8 @@ def _repeat_floor(filtered: Sequence[FilteredRun]) -> tuple[float, int]:
             kind = np.array([np.sum(speed) * period, period * len(inside)])
             stroke = kind, period * (index - 0.5 * (fast[0] + fast[-1])), run.force[inside]
             for group in groups:
-                if (np.abs(kind - group[0][0]) <= _SAME_STROKE * np.abs(group[0][0])).all():
+                # Strokes repeat each other within 2 % of duration and travel.
+                if (np.abs(kind - group[0][0]) <= 0.02 * np.abs(group[0][0])).all():
                     group.append(stroke)
                     break
             else:

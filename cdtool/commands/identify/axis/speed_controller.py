@@ -31,6 +31,7 @@ from cdtool.commands.identify.estimate import (
 )
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.parameters import Controller
+from cdtool.statistics.spread import MAD_TO_STD
 
 SECTION = "model.controller"
 Indices = np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -92,41 +93,21 @@ class ControllerSettings:
     unexplained_speed: float = 0.02
 
 
-# A structure is better if it reduces the cost by so many times what one parameter does by chance, and by this share.
-_BETTER_GAIN, _BETTER_SHARE = 20.0, 0.01
 # A less plausible source of the error, or another rate of the controller, must leave less than this share of the cost.
 _OTHER_SOURCE_SHARE = 0.5
-# A residual within this share of the output's variance is explained: no more is looked for.
-_EXPLAINED = 1e-4
-# Only the rounding of doubles is left below this share of the output's deviation.
-_ROUNDING = 1e-6
 # A gain within so many standard errors of 0 is compatible with 0.
-_SIGNIFICANT = 3.0
-# Errors are independent from block to block: so many blocks.
-_BLOCKS = 40
-# A fit begins with a speed filter at this share of the sampling rate, and with this anti-windup rate [1/s].
-_FIRST_CORNER, _FIRST_ANTI_WINDUP = 0.15, 5.0
+SIGNIFICANT = 3.0
+# A fit begins with a speed filter at this share of the sampling rate.
+_FIRST_CORNER = 0.15
 # A lag of this share of a period is none; a fit with a limit begins with at most so many periods, as a limit that is
 # not in the model looks like a lag.
 _LEAST_LAG, _LONGEST_FIRST_LAG = 0.2, 15.0
-# A drive's torque follows within this time [s]: a longer lag would stand for an integral.
-_LONGEST_LAG = 0.2
-# A command above its limit by more than the log's rounding has another limit, or none.
-_BEYOND_LIMIT = 1.005
-# The noise of a torque is compared over these times [s]; a larger ratio of the variances of means is no noise.
-_NOISE_WINDOWS, _MORE_THAN_NOISE = (0.05, 0.4), 2.5
+# The noise of a torque is compared over these times [s].
+_NOISE_WINDOWS = (0.05, 0.4)
 # A controller that may be faster than its log is also simulated so many times per sample.
 _SUBSTEPS = 10.0
-# Evaluations of a trial, of a chosen structure, and of the last fit.
-_TRIAL, _CHOSEN, _LAST = 10, 25, 50
-# The median of the magnitude of normal noise over its standard deviation.
-_MEDIAN_TO_DEVIATION = 0.6745
-# The largest of thousands of values of noise, in standard deviations.
-_NOISE_DEVIATIONS = 4.0
-# A measured torque is averaged over at least so many samples.
-_FEWEST_AVERAGED = 4
-# Lags of the torque over which its slope is taken: it has followed the command by then.
-_SLOPE_LAGS = 3.0
+# Evaluations of a chosen structure, and of the last fit.
+_CHOSEN, _LAST = 25, 50
 # Windows, in shortest ones.
 _SLOPE_WINDOWS = (1, 2, 4, 8, 16)
 
@@ -246,7 +227,7 @@ class _Fit:
     @property
     def is_exact(self) -> bool:
         """Whether only the rounding of doubles is left."""
-        return self.residual_rms < _ROUNDING * float(np.std(self.sections.output))
+        return self.residual_rms < 1e-6 * float(np.std(self.sections.output))
 
     @property
     def unexplained(self) -> float:
@@ -362,7 +343,8 @@ def _lowest(name: str, period: float) -> float:
 
 
 def _highest(name: str, period: float) -> float:
-    return {"speed_filter_hz": 1.0 / period, "lag": _LONGEST_LAG}.get(name, math.inf)
+    # A drive's torque follows within 0.2 s: a longer lag would stand for an integral.
+    return {"speed_filter_hz": 1.0 / period, "lag": 0.2}.get(name, math.inf)
 
 
 def _standard_errors(fit: _Fit, is_command: bool) -> FloatArray:
@@ -392,7 +374,7 @@ def _standard_errors(fit: _Fit, is_command: bool) -> FloatArray:
         other_influence = np.add.reduceat(weighted * residual[:, np.newaxis], blocks, axis=0) @ other
         moved = np.abs(np.sum(other_influence, axis=0))
         scatter = np.sqrt(degrees * np.sum((other_influence - influence) ** 2, axis=0))
-        systematic = np.maximum(systematic, np.where(moved > _SIGNIFICANT * scatter, moved, 0.0))
+        systematic = np.maximum(systematic, np.where(moved > SIGNIFICANT * scatter, moved, 0.0))
     return np.asarray(np.hypot(statistical, systematic) / scale)
 
 
@@ -408,7 +390,8 @@ def _model_error(fit: _Fit, is_command: bool) -> float:
     windows = [max(round(seconds / fit.sections.period), 2) for seconds in _NOISE_WINDOWS]
     short, long = (float(np.var(_mean_over(fit.residual, window))) for window in windows)
     expected = short * windows[0] / windows[1]
-    return count * (long - expected) if long > _MORE_THAN_NOISE * expected else 0.0
+    # A larger ratio of the variances of means is no noise.
+    return count * (long - expected) if long > 2.5 * expected else 0.0
 
 
 def _correlated(residual: FloatArray, jacobian: FloatArray) -> FloatArray:
@@ -434,7 +417,8 @@ def _autocovariance(residual: FloatArray) -> FloatArray:
 
 def _blocks(sections: _Sections) -> Indices:
     """Return the first samples of blocks: the sections, cut where they are few."""
-    pieces = max(1, math.ceil(_BLOCKS / len(sections.lengths)))
+    # Errors are independent from block to block: 40 blocks.
+    pieces = max(1, math.ceil(40 / len(sections.lengths)))
     cuts = [
         np.linspace(first, end, pieces, endpoint=False).astype(np.int64)
         for first, end in zip(sections.starts[:-1], sections.starts[1:], strict=True)
@@ -470,11 +454,12 @@ def _changing(sections: _Sections) -> BoolArray:
 def _is_better(new: _Fit, old: _Fit) -> bool:
     """Return whether a structure explains more than another on the same sections, beyond what noise would allow it."""
     gain = old.cost - new.cost
-    if gain <= _BETTER_SHARE * old.cost or not np.all(np.any(new.jacobian != 0.0, axis=0)):
+    # Better by 1 %, and by 20 times what one parameter does by chance.
+    if gain <= 0.01 * old.cost or not np.all(np.any(new.jacobian != 0.0, axis=0)):
         return False
     covariance = _autocovariance(new.residual)
     independent = covariance[0] + 2.0 * float(np.sum(covariance[1:]))
-    return bool(gain > _BETTER_GAIN * max(independent, float(covariance[0]), 1e-300))
+    return bool(gain > 20.0 * max(independent, float(covariance[0]), 1e-300))
 
 
 @dataclass(frozen=True)
@@ -630,7 +615,8 @@ def _search(runs: Sequence[AxisRun], settings: ControllerSettings) -> tuple[_Sou
         found = source, fit
         # What is left is noise of the torque, which no other source explains.
         is_noise = not source.is_command and _model_error(fit, False) == 0.0
-        is_explained = fit.residual_rms**2 < _EXPLAINED * float(np.var(sections.output))
+        # A residual within 1e-4 of the output's variance is explained: no more is looked for.
+        is_explained = fit.residual_rms**2 < 1e-4 * float(np.var(sections.output))
         if is_explained or (is_noise and fit.unexplained < settings.most_unexplained):
             break
     return found
@@ -665,7 +651,7 @@ def _starting_model(sections: _Sections, source: _Source, order: int) -> _Model:
 def _improved(fit: _Fit, source: _Source, settings: ControllerSettings) -> _Fit:
     """Return the fit with what explains most, one after another: another delay, limits."""
     while not fit.is_exact:
-        trials = [_OutputError(fit.sections, model).fit(_TRIAL, 1e-4) for model in _more(fit, source, settings)]
+        trials = [_OutputError(fit.sections, model).fit(10, 1e-4) for model in _more(fit, source, settings)]
         trials = [trial for trial in trials if not (source.is_command and _exceeds_its_limit(trial))]
         best = min(trials, key=lambda trial: trial.cost)
         if not _is_better(best, fit):
@@ -681,7 +667,7 @@ def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[
     # A delay or a limit that is not in the model looks like a filter, a limit also like a lag.
     filtered = {"speed_filter_hz": _FIRST_CORNER / period} if "speed_filter_hz" in model.free else {}
     lag = min(model.values["lag"], _LONGEST_FIRST_LAG * period)
-    first = {**filtered, "lag": lag, "anti_windup_rate": model.values["anti_windup_rate"] or _FIRST_ANTI_WINDUP}
+    first = {**filtered, "lag": lag, "anti_windup_rate": model.values["anti_windup_rate"] or 5.0}
     # Above this only noise is.
     largest = float(np.quantile(np.abs(fit.sections.output), 0.995))
     for name, candidates in (("slew_limit", _slopes(fit, source)), ("force_limit", [largest])):
@@ -698,7 +684,8 @@ def _more(fit: _Fit, source: _Source, settings: ControllerSettings) -> Iterator[
 
 def _exceeds_its_limit(fit: _Fit) -> bool:
     """Whether the logged command is larger than the force limit of the fit: then it has no such limit."""
-    return _largest(fit.sections.output) > _BEYOND_LIMIT * fit.model.values["force_limit"]
+    # By more than the log's rounding.
+    return _largest(fit.sections.output) > 1.005 * fit.model.values["force_limit"]
 
 
 def _slopes(fit: _Fit, source: _Source) -> list[float]:
@@ -734,7 +721,8 @@ def _slope_of_run(run: AxisRun, is_command: bool, lag: float) -> float:
         return math.nan
     if is_command:
         return float(np.fmax.reduce(np.abs(np.diff(values)), initial=math.nan)) / run.period
-    shortest = max(_FEWEST_AVERAGED, round(_SLOPE_LAGS * lag / run.period) if math.isfinite(lag) else 0)
+    # Averaged over at least four samples; after three lags the torque has followed the command.
+    shortest = max(4, round(3.0 * lag / run.period) if math.isfinite(lag) else 0)
     known = np.isfinite(values)
     # A long window has little noise, a short one sees a short rise: each is a bound, and the highest counts.
     slopes = [
@@ -754,8 +742,9 @@ def _rise(values: FloatArray, window: int) -> float:
     """
     means = np.convolve(values, np.full(window, 1.0 / window), mode="valid")
     changes = np.abs(means[window:] - means[:-window])
-    noise = float(np.median(changes)) / _MEDIAN_TO_DEVIATION
-    return max(float(np.max(changes)) - _NOISE_DEVIATIONS * noise, 0.0)
+    noise = MAD_TO_STD * float(np.median(changes))
+    # The largest of thousands of values of noise is four standard deviations.
+    return max(float(np.max(changes)) - 4.0 * noise, 0.0)
 
 
 def identify_controller(runs: Sequence[AxisRun], settings: ControllerSettings | None = None) -> ControllerFit:
@@ -805,7 +794,7 @@ def identify_controller(runs: Sequence[AxisRun], settings: ControllerSettings | 
     fit, errors = _with_unknown_rate(fit, errors, source.is_command)
     if not (source.is_command or source.from_position):
         errors = np.hypot(errors, _moved_by_noise(fit))
-    if fit.model.values["speed_gain"] < -_SIGNIFICANT * errors[fit.model.free.index("speed_gain")]:
+    if fit.model.values["speed_gain"] < -SIGNIFICANT * errors[fit.model.free.index("speed_gain")]:
         raise IdentificationError(
             f"{runs[0].name}: the controller's output falls where the speed error rises",
             "check the signs (scale) of torque, speed and references in [channels]",
@@ -831,7 +820,7 @@ def _without_zeros(fit: _Fit, is_command: bool) -> tuple[_Fit, FloatArray]:
     errors = _standard_errors(fit, is_command)
     for name in ("position_gain", "integral_gain"):
         free, value = fit.model.free, abs(fit.model.values[name])
-        if name in free and not value > _SIGNIFICANT * errors[free.index(name)]:
+        if name in free and not value > SIGNIFICANT * errors[free.index(name)]:
             fit = _OutputError(fit.sections, fit.model.without(name)).fit(_LAST, 1e-12)
             errors = _standard_errors(fit, is_command)
     return fit, errors
@@ -865,7 +854,7 @@ def _moved_by_noise(fit: _Fit) -> FloatArray:
     sections = fit.sections
     fourth = np.diff(sections.inputs[2], 4)
     # Median, as at the edges of sections the differences are large; 70 is the sum of the squared weights.
-    deviation = float(np.median(np.abs(fourth))) / (_MEDIAN_TO_DEVIATION * math.sqrt(70.0))
+    deviation = MAD_TO_STD * float(np.median(np.abs(fourth))) / math.sqrt(70.0)
     inputs = sections.inputs.copy()
     inputs[2] += deviation * np.random.default_rng(0).standard_normal(len(sections))
     noisier = _OutputError(replace(sections, inputs=inputs), fit.model).fit(_LAST, 1e-9)

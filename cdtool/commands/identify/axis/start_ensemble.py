@@ -17,12 +17,6 @@ from cdtool.machines.axis_model.axis_run import AxisRun
 BEFORE, AFTER = 0.3, 2.0
 # A joint is at rest below this share of its highest speed; a reference has no noise.
 _REST_SHARE = {"reference_speed": 0.005, "speed": 0.05}
-# A measured speed is averaged over this long to find rests [s].
-_SMOOTHED_OVER = 0.05
-# Runs are averaged if their speeds differ by less than this share of the highest speed (RMS).
-_ALIKE = 0.05
-# A window with more missing samples than this share is left out.
-_MOST_MISSING = 0.05
 
 CHANNELS = ("torque", "speed", "position", "acceleration", "reference_position", "reference_speed", "reference_torque")
 
@@ -83,7 +77,7 @@ def _starts(run: AxisRun, number: int, before: float, after: float) -> list[_Sta
     size = np.abs(np.nan_to_num(speed))
     if name == "speed":
         # Noise must neither end a rest nor begin a motion.
-        width = max(round(_SMOOTHED_OVER / run.period), 1)
+        width = max(round(0.05 / run.period), 1)
         size = np.abs(np.convolve(np.nan_to_num(speed), np.full(width, 1.0 / width), mode="same"))
     highest = float(np.quantile(size, 0.98))
     moves: BoolArray = size > _REST_SHARE[name] * highest
@@ -124,7 +118,7 @@ def _channels(run: AxisRun, part: slice, rest: int) -> dict[str, FloatArray]:
             continue
         values = values[part]
         known = np.isfinite(values)
-        if known.mean() < 1.0 - _MOST_MISSING:
+        if known.mean() < 0.95:
             if name in ("torque", "speed"):
                 return {}
             continue
@@ -143,7 +137,8 @@ def _alike(first: _Start, other: _Start) -> bool:
         return False
     name = "reference_speed" if "reference_speed" in first.channels else "speed"
     difference = first.channels[name] - other.channels[name]
-    return bool(np.sqrt(np.mean(difference**2)) < _ALIKE * first.speed)
+    # Runs are averaged if their speeds differ by less than 5 % of the highest speed (RMS).
+    return bool(np.sqrt(np.mean(difference**2)) < 0.05 * first.speed)
 
 
 def _averaged(group: Sequence[_Start], before: float) -> StartEnsemble:

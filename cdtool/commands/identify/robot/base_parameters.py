@@ -17,10 +17,6 @@ from cdtool.commands.identify.robot.robot_regressor import Regressor, RegressorC
 # A column whose rest, after the projection on the others, is below this share of it is dependent on them; a factor
 # below it is rounding.
 _DEPENDENT = 1e-9
-_FEWEST_STATES = 200
-# The rounding of columns that are equal, or zero, relative to the largest.
-_ROUNDING, _ZERO = 1e-8, 1e-10
-_SEED = 20_210
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +101,9 @@ def random_rows(
 ) -> FloatArray:
     """Return the regressor (n J, columns) of random motion, uniform within +-pi [rad, m] and the limits (J,)."""
     joints = len(highest_speed)
-    count = max(_FEWEST_STATES, 2 * len(columns))
-    position, speed, acceleration = np.random.default_rng(_SEED).uniform(-1.0, 1.0, (3, count, joints))
+    # States in any order and number give the same rank; these do so again in each call.
+    count = max(200, 2 * len(columns))
+    position, speed, acceleration = np.random.default_rng(20_210).uniform(-1.0, 1.0, (3, count, joints))
     position = np.pi * position
     motion = position, speed * highest_speed, acceleration * highest_acceleration
     return stacked_torque(regressor, list(columns), *motion).reshape(count * joints, len(columns))
@@ -125,7 +122,7 @@ def independent_norms(rows: FloatArray) -> FloatArray:
     upper: FloatArray = np.asarray(np.linalg.qr(rows[:, own] * scale[own], mode="r"))
     _, values, right = np.linalg.svd(upper)
     # The rounding of two equal columns must not pass for a part of a third one.
-    floor = _ROUNDING * values[0]
+    floor = 1e-8 * values[0]
     inflation = np.sum((right / np.maximum(values, floor)[:, np.newaxis]) ** 2, axis=0)
     parts[own] = 1.0 / (scale[own] * np.sqrt(inflation))
     return parts
@@ -134,7 +131,7 @@ def independent_norms(rows: FloatArray) -> FloatArray:
 def column_scale(rows: FloatArray) -> FloatArray:
     """Return 1 / length of each column (B,); 0 for one that is zero but for rounding."""
     norms = np.linalg.norm(rows, axis=0)
-    is_zero = norms <= _ZERO * max(float(norms.max(initial=0.0)), 1e-300)
+    is_zero = norms <= 1e-10 * max(float(norms.max(initial=0.0)), 1e-300)
     return np.where(is_zero, 0.0, 1.0 / np.where(is_zero, 1.0, norms))
 
 

@@ -28,14 +28,6 @@ from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_robot import UrdfRobot
 
 _PER_BODY = len(BODY_PARAMETERS)
-# The least eigenvalue of a scaled pseudo-inertia, as a share of the robot's mass: the solver ends within 1e-8.
-_MARGIN = 1e-7
-# A body is flat below this eigenvalue of its pseudo-inertia, scaled to a diagonal of 1.
-_FLAT = 1e-12
-# How much the distance to the machine's parameters counts beside the residual.
-_NEARNESS = 1e-8
-# Relative to the torques: a rise of the residual below it is the solver's.
-_ROUNDING = 1e-7
 _TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
 
 
@@ -79,7 +71,8 @@ def is_consistent(parameters: FloatArray) -> bool:
         return False
     # Scaled to a diagonal of 1: the eigenvalues of P have different units.
     scale = 1.0 / np.sqrt(diagonal)
-    return bool(np.linalg.eigvalsh(matrix * np.outer(scale, scale))[0] > _FLAT)
+    # Scaled to a diagonal of 1, below it the body is flat.
+    return bool(np.linalg.eigvalsh(matrix * np.outer(scale, scale))[0] > 1e-12)
 
 
 def consistent_fit(fit: RobotFit) -> ConsistentFit:
@@ -102,10 +95,12 @@ def consistent_fit(fit: RobotFit) -> ConsistentFit:
     pi = cvxpy.Variable(len(free))
     rest = (rows @ (fit.grouping.combination * scale) / size) @ pi - target / size
     basis = np.array([pseudo_inertia(row).ravel() for row in np.eye(_PER_BODY)]).T
-    constraints = [cvxpy.reshape(basis @ pi[own], (4, 4), order="C") >> _MARGIN * np.eye(4) for own in bodies]
+    # The least eigenvalue, as a share of the robot's mass: the solver ends within 1e-8.
+    constraints = [cvxpy.reshape(basis @ pi[own], (4, 4), order="C") >> 1e-7 * np.eye(4) for own in bodies]
     bounded = [i for i, group in enumerate(groups) if group in (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)]
     constraints.append(pi[bounded] >= 0.0)
-    objective = cvxpy.sum_squares(rest) + _NEARNESS * cvxpy.sum_squares(pi - prior / scale)
+    # The distance to the machine's parameters only decides what the residual leaves open.
+    objective = cvxpy.sum_squares(rest) + 1e-8 * cvxpy.sum_squares(pi - prior / scale)
     values = _solved(cvxpy, cvxpy.Problem(cvxpy.Minimize(objective), constraints), pi, scale)
     values[bounded] = np.maximum(values[bounded], 0.0)
     if not all(is_consistent(values[own]) for own in bodies):
@@ -114,7 +109,8 @@ def consistent_fit(fit: RobotFit) -> ConsistentFit:
         )
     least = float(np.linalg.norm(target - rows @ fit.base.values))
     now = float(np.linalg.norm(target - rows @ (fit.grouping.combination @ values)))
-    rise = max(0.0, now / max(least, _ROUNDING * size) - 1.0)
+    # A rise below 1e-7 of the torques is the solver's.
+    rise = max(0.0, now / max(least, 1e-7 * size) - 1.0)
     parameters = fit.parameters.copy()
     parameters[free] = values
     return ConsistentFit(replace(fit, parameters=parameters), with_bodies(machine.tree, values[bodies]), rise)

@@ -40,16 +40,6 @@ from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
 
-# Directions of the unloaded robot's parameters that are excited less than this, relative to the most, are not fitted.
-_UNSEEN = 1e-7
-# The payload's torque must have a part of at least this share that nothing else explains.
-_INDEPENDENT = 0.05
-# A joint that the payload loads by less than this share of the most loaded one is not loaded: that is rounding.
-_LOADED = 1e-6
-# A centre of mass from a drawing, or found by balancing, is this uncertain along each axis [m].
-_CENTRE_ERROR = 5e-3
-# A constant with a larger relative standard error says nothing.
-_WORST_ERROR = 0.2
 # Of these a joint has its own with the payload.
 _FRICTION = (ColumnGroup.VISCOUS, ColumnGroup.COULOMB)
 
@@ -138,12 +128,14 @@ class _JointWindows:
         """Return the torque constant; `most`: the norm of the load of the joint with the largest."""
         load, torques = self.load, self.equations.torques
         size = float(np.linalg.norm(load))
-        if size <= _LOADED * most:
+        # Less than 1e-6 of the most loaded joint's load is rounding.
+        if size <= 1e-6 * most:
             return self._refused(Missing.PAYLOAD, {"equations": float(len(load))})
         basis = _basis(self.rows)
         rest = load - basis @ (basis.T @ load)
         share = float(np.linalg.norm(rest)) / size
-        if share < _INDEPENDENT:
+        # The payload's torque must have a part of 5 % that nothing else explains.
+        if share < 0.05:
             missing = Missing.OTHER_MOTION if has_centre else Missing.PAYLOAD_CENTRE
             return self._refused(missing, {"independent_share": share})
         # With the part of the load that nothing else explains, 1 / k does not depend on the basis.
@@ -153,7 +145,7 @@ class _JointWindows:
         blocks = jackknife_blocks(whole, torques - whole.rows @ values)
         spread = math.sqrt(float(jackknife_covariance(whole, values, blocks)[-1, -1]))
         error = math.hypot(spread, inverse * float(np.linalg.norm(rest @ self.shifts / (rest @ rest))))
-        if not error < _WORST_ERROR * inverse:
+        if not error < 0.2 * inverse:  # a constant with a larger relative standard error says nothing
             return self._refused(Missing.PAYLOAD, {"inverse": inverse, "standard_error_of_inverse": error})
         value = present / inverse
         error *= abs(value) / inverse
@@ -168,7 +160,8 @@ def _basis(rows: FloatArray) -> FloatArray:
     norms = np.linalg.norm(rows, axis=0)
     seen = norms > 1e-12 * max(float(norms.max(initial=0.0)), 1e-300)
     left, values, _ = np.linalg.svd(rows[:, seen] / norms[seen], full_matrices=False)
-    return np.asarray(left[:, values > _UNSEEN * values[0]])
+    # Directions of the unloaded robot's parameters that are excited less, relative to the most, are not fitted.
+    return np.asarray(left[:, values > 1e-7 * values[0]])
 
 
 def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: LoadedRuns) -> _PayloadColumns:
@@ -199,5 +192,6 @@ def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Loa
         centre = None if payload.centre is None else np.array(payload.centre[:1])
     if centre is None:
         return _PayloadColumns(payload.mass * mass, np.zeros((0, len(unit))), np.concatenate((moments, inertias)))
-    shifts = payload.mass * _CENTRE_ERROR * moments
+    # A centre of mass from a drawing, or found by balancing, is uncertain by 5 mm along each axis.
+    shifts = payload.mass * 5e-3 * moments
     return _PayloadColumns(payload.mass * (mass + centre @ moments), shifts, inertias)

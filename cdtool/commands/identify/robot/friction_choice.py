@@ -23,9 +23,6 @@ from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
 
-# With a larger relative standard error viscous friction predicts faster motion wrong, however well that of the logs.
-_WORST_VISCOUS = 0.5
-
 
 class FrictionForm(Enum):
     """What of a joint's friction is new, the inertias of the links as they were unless stated."""
@@ -158,8 +155,8 @@ def _of_joint(
     missing = tuple(item for item in whole.identified.not_identifiable if item.joint == joint)
     # In one direction only the sum of constant force and Coulomb friction is identifiable.
     one_way = any(Missing.REVERSALS in item.missing for item in missing)
-    # Such a viscous friction describes nothing but the speeds of the logs.
-    vague = [item for item in known if item.key == ColumnGroup.VISCOUS.value and item.relative_error > _WORST_VISCOUS]
+    # Such a viscous friction describes nothing but the speeds of the logs, and predicts faster motion wrong.
+    vague = [item for item in known if item.key == ColumnGroup.VISCOUS.value and item.relative_error > 0.5]
     alone = tuple(item for item in known if not one_way and item not in vague)
     for item in () if one_way else vague:
         numbers = {"value": item.value, "standard_error": item.standard_error}

@@ -52,31 +52,20 @@ Index = npt.NDArray[np.int64]
 
 # A window reaches this far to either side of its centre [s]: it passes the motion of robots, up to about 5 Hz.
 HALF_WIDTH = 0.1
-# A window has at least this many samples on either side of its centre: else its sums are no integrals.
-_FEWEST_BESIDE = 10
 # Directions of the parameters that are excited less than this, relative to the most, keep the machine's values.
 _UNSEEN = 1e-9
-# A column of a joint, or an inertial one, that is independent of the others to less than this share of what it is in
-# random motion is not excited.
-_EXCITED, _EXCITED_INERTIAL = 0.1, 0.01
+# A column of a joint that is independent of the others to less than this share of what it is in random motion is not
+# excited.
+_EXCITED = 0.1
 # The standard error of an inertial parameter, or of all together, may make this share of a joint's torque in random
-# motion, that of a joint's friction or drive the other.
-_UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT = 0.1, 0.5
-# Columns are scaled to the same length: noise passes into a set with a larger condition number (Presse, Gautier, 1993).
-_WORST_CONDITION = 100.0
-# A block has at least this length [s] and this many correlation times of the residual; fewer blocks are no sample.
-_SHORTEST_BLOCK, _CORRELATION_TIMES, _FEWEST_BLOCKS = 0.5, 4.0, 8
+# motion.
+_UNCERTAIN_TORQUE = 0.1
+# Fewer blocks are no sample.
+_FEWEST_BLOCKS = 8
 # From this number on, the spread between runs is the error.
 FEWEST_RUNS = 3
-# The masses of a URDF are those of drawings, without cables and screws: they are wrong by about this share.
-_WRONG_LINKS = 0.02
+# Parts of a log of which each is predicted from the others: a fifth still holds some strokes.
 _FOLDS = 5
-_WEIGHT_PASSES = 3
-_BEST_SENSOR = 1e-3
-# Fewer equations of a joint than this are no motion of it.
-_FEWEST_EQUATIONS = 10
-# Of the samples in motion; below it, there is only one direction.
-_OTHER_DIRECTION = 0.05
 _UNITS = {
     ColumnGroup.DRIVE_INERTIA: ("kg m2", "kg"),
     ColumnGroup.VISCOUS: ("N m s/rad", "N s/m"),
@@ -241,7 +230,8 @@ class Window:
     @classmethod
     def of(cls, half_width: float, period: float) -> Window:
         """(1 - x^2)^4: its first three derivatives are continuous, so that sums are integrals to rounding."""
-        half = max(_FEWEST_BESIDE, round(half_width / period))
+        # With fewer samples on either side of its centre its sums are no integrals.
+        half = max(10, round(half_width / period))
         x = np.arange(-half, half + 1) / half
         shape = (1.0 - x**2) ** 4
         slope = -8.0 * x * (1.0 - x**2) ** 3 / (half * period)
@@ -332,11 +322,11 @@ def _joint_weights(equations: Equations, start: FloatArray, count: int) -> Float
     """Return 1 / RMS residual of each joint (J,), of at least a thousandth of its torque: no sensor is better."""
     joints = equations.joints.astype(np.int64)
     weights = np.ones(count)
-    for _ in range(_WEIGHT_PASSES):
+    for _ in range(3):  # passes of reweighting
         residual = equations.torques - equations.rows @ _solve(_weighted(equations, weights[joints]), start)
         for joint in np.unique(joints).tolist():
             own = joints == joint
-            least = _BEST_SENSOR * _rms(equations.torques[own])
+            least = 1e-3 * _rms(equations.torques[own])  # no torque sensor is better
             weights[joint] = 1.0 / max(_rms(residual[own]), least, 1e-300)
     return weights
 
@@ -423,8 +413,9 @@ def jackknife_blocks(equations: Equations, residual: FloatArray) -> Index:
         duration += float(np.ptp(equations.times[own]))
         for joint in np.unique(equations.joints[own]):
             chosen = own & (equations.joints == joint)
-            length = max(length, _CORRELATION_TIMES * _correlation_time(equations.times[chosen], residual[chosen]))
-    length = max(_SHORTEST_BLOCK, min(length, duration / _FEWEST_BLOCKS))
+            length = max(length, 4.0 * _correlation_time(equations.times[chosen], residual[chosen]))
+    # At least 0.5 s, and four correlation times of the residual.
+    length = max(0.5, min(length, duration / _FEWEST_BLOCKS))
     runs = np.unique(equations.runs, return_inverse=True)[1].ravel()
     first = np.full(int(runs.max()) + 1, np.inf)
     np.minimum.at(first, runs, equations.times)
@@ -462,7 +453,8 @@ def jackknife_covariance(equations: Equations, values: FloatArray, blocks: Index
         covariance = covariance * np.outer(wider, wider)
     # What the parameters take up of links that are heavier than they are said to be.
     whitening = _whitening(equations.rows)
-    heavier = _WRONG_LINKS * whitening @ (whitening.T @ (equations.rows.T @ equations.rigid))
+    # The masses of a URDF are those of drawings, without cables and screws: they are wrong by about 2 %.
+    heavier = 0.02 * whitening @ (whitening.T @ (equations.rows.T @ equations.rigid))
     return np.asarray(covariance + np.outer(heavier, heavier))
 
 
@@ -523,8 +515,9 @@ def _base_set(
     uncertainty = np.max(single, axis=0)
     variance = np.mean(np.einsum("njb,bc,njc->nj", random, covariance, random, optimize=True), axis=0)
     inertial = [regressor.columns[i].group is ColumnGroup.INERTIAL for i in grouping.base]
-    excited = excitation >= np.where(inertial, _EXCITED_INERTIAL, _EXCITED)
-    certain = uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT)
+    # Inertial columns are excited by less; friction and drive may be less certain.
+    excited = excitation >= np.where(inertial, 0.01, _EXCITED)
+    certain = uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, 0.5)
     trusted = excited & certain & (solution.block_count >= _FEWEST_BLOCKS)
     return BaseParameterSet(
         names=tuple(grouping.name(row, regressor.columns) for row in range(len(grouping.base))),
@@ -594,12 +587,13 @@ class _Judge:
             return (Missing.MORE_RECORDINGS,)
         speed = np.concatenate([run.speed[:, column.joint] for run in self.runs])
         moving = speed[np.abs(speed) > self.machine.stick_speed[column.joint]]
-        if len(moving) < _FEWEST_EQUATIONS:
+        if len(moving) < 10:  # no motion of it
             return (Missing.OTHER_MOTION,)
         forward = float(np.mean(moving > 0.0))
         if (
             column.group in (ColumnGroup.COULOMB, ColumnGroup.CONSTANT)
-            and min(forward, 1.0 - forward) < _OTHER_DIRECTION
+            # There is only one direction.
+            and min(forward, 1.0 - forward) < 0.05
         ):
             return (Missing.REVERSALS,)
         if column.group is ColumnGroup.DRIVE_INERTIA:
@@ -613,7 +607,8 @@ class _Judge:
             return []
         unexcited = [row for row in inertial if not self.base.identifiable[row]]
         is_certain = self.base.together <= _UNCERTAIN_TORQUE
-        if not unexcited and is_certain and self.condition <= _WORST_CONDITION:
+        # Columns have the same length: above it noise passes into a set (Presse, Gautier, 1993).
+        if not unexcited and is_certain and self.condition <= 100.0:
             return []
         few_blocks = self.solution.block_count < _FEWEST_BLOCKS
         numbers = {

@@ -10,14 +10,10 @@ import numpy as np
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.commands.identify.axis.excitation import Excitation, excitation_of
 from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, UnseenRun
-from cdtool.commands.identify.robot.robot_dynamics import RobotFit, folds_of
+from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, folds_of
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
-
-# A joint moves where this share of the samples within the window's half width [s] is above its stick speed: less is
-# noise of the speed at rest.
-_MOVING_SHARE, _HALF_WIDTH = 0.9, 0.1
 
 
 def joint_evidence(joint: int, fit: RobotFit, is_new: bool, runs: Sequence[RobotRun]) -> ForceEvidence | None:
@@ -72,8 +68,9 @@ def joint_excitations(runs: Sequence[RobotRun], machine: CoupledMachine) -> list
 def _moving(speed: FloatArray, stick: float, period: float) -> BoolArray:
     """Return where a joint moves (n,): above the stick speed, and nearly always so around it."""
     above = np.abs(np.nan_to_num(speed)) > stick
-    width = 2 * max(1, round(_HALF_WIDTH / period)) + 1
+    # The joint moves where it does so in 90 % of the window about a sample: less is noise of the speed at rest.
+    width = 2 * max(1, round(HALF_WIDTH / period)) + 1
     if len(above) < width:
         return np.zeros(len(above), dtype=np.bool_)
     share = np.convolve(above.astype(np.float64), np.full(width, 1.0 / width), mode="same")
-    return np.asarray(above & (share >= _MOVING_SHARE))
+    return np.asarray(above & (share >= 0.9))

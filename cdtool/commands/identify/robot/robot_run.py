@@ -17,13 +17,6 @@ from cdtool.base.errors import RecordingError
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.recordings.recording import Recording
 
-# A derivative is that of the cubic that fits best over this time to either side [s], or this number of samples.
-_HALF_WIDTH, _FEWEST_BESIDE = 0.05, 3
-# Noise of this many standard deviations changes the sign of a speed in one of a thousand samples.
-_NOISE_DEVIATIONS = 3.0
-# Below this share of its fastest motion, the friction of a joint rises towards rest (Stribeck) in many drives.
-_CREEPING = 0.02
-
 
 @dataclass(frozen=True, eq=False)
 class RobotRun:
@@ -81,7 +74,9 @@ class RobotRun:
                 # The third difference of noise has 1 + 9 + 9 + 1 times its variance.
                 noise = float(median_abs_deviation(changes, scale="normal")) / math.sqrt(20.0)
                 fastest = float(np.nanpercentile(np.abs(own), 99.0))
-                least[joint] = max(least[joint], _NOISE_DEVIATIONS * noise, _CREEPING * fastest)
+                # Noise of three standard deviations changes the sign of a speed in one of a thousand samples. Below 2 %
+                # of its fastest motion, the friction of a joint rises towards rest (Stribeck) in many drives.
+                least[joint] = max(least[joint], 3.0 * noise, 0.02 * fastest)
         return np.asarray(~(speed >= least) & np.isfinite(speed))
 
     def without(self, excluded: BoolArray) -> RobotRun:
@@ -116,7 +111,7 @@ def central_derivative(values: FloatArray, period: float) -> FloatArray:
 
     It has no delay (Savitzky and Golay, 1964). NaN where the window is not filled.
     """
-    half = max(_FEWEST_BESIDE, round(_HALF_WIDTH / period))
+    half = max(3, round(0.05 / period))  # over 0.05 s to either side, or three samples
     if len(values) <= 2 * half:
         return np.full(values.shape, np.nan)
     from scipy.signal import savgol_coeffs

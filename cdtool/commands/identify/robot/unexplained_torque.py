@@ -14,9 +14,7 @@ from cdtool.base.arrays import BoolArray
 from cdtool.commands.identify.robot.robot_dynamics import HALF_WIDTH, RobotFit, identify_robot
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
-
-# A residual beyond so many robust standard deviations is no friction and no noise.
-_BEYOND = 8.0
+from cdtool.statistics.spread import MAD_TO_STD
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,6 @@ def without_unexplained(runs: Sequence[RobotRun], machine: CoupledMachine) -> Ex
 
 def _outside(fit: RobotFit) -> BoolArray:
     """Return which equations (m,) are unexplained by the fit to all of them; one without a run may be a worse fit."""
-    from scipy.stats import norm
 
     equations, joints = fit.equations, fit.left_out.joints
     size = np.abs(equations.torques - equations.rows @ fit.base.values)
@@ -54,7 +51,8 @@ def _outside(fit: RobotFit) -> BoolArray:
         own = joints == joint
         # No sensor resolves 1e-9 of its range: less is rounding.
         least = 1e-9 * float(np.max(np.abs(equations.torques[own])))
-        outside[own] = size[own] > _BEYOND * max(float(np.median(size[own])), least) / norm.ppf(0.75)
+        # Beyond eight robust standard deviations it is no friction and no noise.
+        outside[own] = size[own] > 8.0 * MAD_TO_STD * max(float(np.median(size[own])), least)
     return outside
 
 

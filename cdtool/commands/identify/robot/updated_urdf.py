@@ -15,7 +15,6 @@ from cdtool.commands.identify.robot.robot_regressor import body_parameters
 from cdtool.machines.kinematic_tree import KinematicTree
 
 _ROTATIONAL = ("ixx", "ixy", "iyy", "ixz", "iyz", "izz")
-_LEAST_MASS = 1e-9
 
 
 def updated_urdf(text: str, tree: KinematicTree) -> str:
@@ -63,7 +62,7 @@ def _child(joint: Any) -> str:
 def _write(document: Any, link: Any, matrix: FloatArray, joint: str) -> None:
     """Write a pseudo-inertia in the link's frame as its origin, mass and inertia."""
     mass = float(matrix[3, 3])
-    if mass < _LEAST_MASS:
+    if mass < 1e-9:  # kg
         raise ConfigurationError(
             f"joint '{joint}' moves a mass of {mass:.3g} kg, for which a URDF has no form",
             "use consistent_fit, whose links are physical",

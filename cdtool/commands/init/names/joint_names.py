@@ -12,8 +12,7 @@ from cdtool.formats.column_names import split_unit
 # Words and what is between them; a word in mixed case consists of several: `LeftHipAngle`.
 _TOKENS = re.compile(r"[^\W_]+?(?:(?<=[a-z])(?=[A-Z][a-z])|(?<=[A-Z]{2})(?=[A-Z][a-z])|(?![^\W_]))|[\W_]+")
 _NUMBER = re.compile(r"\d+")
-# The name of a joint consists of at most this many words, with what is between them.
-_LONGEST = 5
+# More numbers are not those of joints but of samples or taxels.
 MOST_JOINTS = 64
 _QUANTITIES = ("position", "speed", "torque")
 Families = dict[str, tuple[tuple[str, ...], tuple[str, ...]]]
@@ -75,7 +74,8 @@ def _slots(name: str) -> list[tuple[str, str, str]]:
     tokens = _TOKENS.findall(name)
     found = []
     for first in range(len(tokens)):
-        for last in range(first + 1, min(first + _LONGEST, len(tokens)) + 1):
+        # The name of a joint has at most three words, and what is between them.
+        for last in range(first + 1, min(first + 5, len(tokens)) + 1):
             slot = "".join(tokens[first:last])
             if slot[0].isalpha() and slot[-1].isalnum() and last - first < len(tokens):
                 found.append(("".join(tokens[:first]), slot, "".join(tokens[last:])))

@@ -14,8 +14,6 @@ from cdtool.results.limits import ALL, LimitRule
 from cdtool.results.results import ContactResult
 
 _DETECTED, _MISSED = "detected", "missed"
-# Neighbouring speeds that differ by a larger factor belong to different classes.
-_CLEARLY_FASTER = 1.2
 # A limit of one of these is a limit of the latencies in a cell.
 _OF_LATENCY = ("mean_ms", "mean_ms_upper", "median_ms", "median_ms_upper", "p95_ms", "p95_ms_upper", "max_ms")
 
@@ -211,7 +209,8 @@ def speed_classes(speeds: Mapping[str, Sequence[float]]) -> dict[str, float | No
     typical = {log: float(np.median(np.abs(values))) for log, values in speeds.items()}
     classes: list[list[str]] = []
     for log in sorted(typical, key=typical.__getitem__):
-        if not classes or typical[log] > _CLEARLY_FASTER * typical[classes[-1][-1]]:
+        # Neighbouring speeds that differ by more than 20 % belong to different classes.
+        if not classes or typical[log] > 1.2 * typical[classes[-1][-1]]:
             classes.append([])
         classes[-1].append(log)
     if len(classes) < 2:

@@ -34,6 +34,7 @@ from cdtool.report.html.self_contained import content_policy, page_part, page_te
 from cdtool.report.html.traces import HEIGHTS, trace_data
 from cdtool.report.model import AXES, NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number, spoken
+from cdtool.report.plots.latency_axis import FLOOR_MS
 from cdtool.report.plots.style import look_of
 from cdtool.report.table import Cell, Heading, Table, count_cell, name_cell, number_cell, tabulate
 from cdtool.results.traces.trace import Trace
@@ -41,16 +42,8 @@ from cdtool.results.traces.trace import Trace
 _SCRIPTS = ("scales.js", "chart.js", "trace.js", "tables.js", "coverage.js")
 # Colours of the style sheet, pale for fast to dark for slow, on a logarithmic scale that all maps share.
 _LEVELS = 10
-# All trigger plots together [characters of JSON]; the page stays below 5 MB.
-_MOST_TRACE_TEXT = 4_200_000
-# Time before the contact at which a trigger plot begins [s]: the approach is the same in all recordings of a log.
-_BEFORE = 0.5
-# Rows of the lists.
-_MOST_TELLING, _FEW = 20, 12
 # A share of missed contacts to plan for, as `cdtool plan` takes it.
 _MISSED_TO_SHOW = "5%"
-# Latencies below this [ms] have the same colour.
-_FLOOR_MS = 1.0
 
 
 @dataclass(frozen=True)
@@ -82,14 +75,14 @@ class _Scale:
     @classmethod
     def of(cls, made: CoverageMap) -> _Scale:
         values = [cell.latency_ms for cells in made.cells.values() for cell in cells.values()]
-        known = [max(value, _FLOOR_MS) for value in values if math.isfinite(value)] or [_FLOOR_MS]
+        known = [max(value, FLOOR_MS) for value in values if math.isfinite(value)] or [FLOOR_MS]
         return cls(min(known), max(known))
 
     def level(self, latency: float) -> int:
         """Return the number of the colour of a latency."""
         if self.high <= self.low:
             return 0
-        share = math.log(max(latency, _FLOOR_MS) / self.low) / math.log(self.high / self.low)
+        share = math.log(max(latency, FLOOR_MS) / self.low) / math.log(self.high / self.low)
         return min(max(int(_LEVELS * share), 0), _LEVELS - 1)
 
     @property
@@ -109,7 +102,7 @@ def coverage_html(done: Coverage) -> str:
     scale, numbers = _Scale.of(made), _numbers(made)
     traces = _traces(done)
     style, script = page_part("report.css") + page_part("coverage.css"), "\n".join(page_part(name) for name in _SCRIPTS)
-    missed, telling = made.missed(), made.most_telling(_MOST_TELLING)
+    missed, telling = made.missed(), made.most_telling(20)
     return page_template("coverage.html.j2").render(
         policy=content_policy(style, script),
         style=Markup(style),
@@ -126,7 +119,7 @@ def coverage_html(done: Coverage) -> str:
         positions=[_short(item) for item in made.positions],
         unit=made.unit,
         missed=_missed_table(made, missed) if missed else None,
-        few=len(missed) <= _FEW,
+        few=len(missed) <= 12,
         telling=_telling_table(made, telling) if telling else None,
         left_out=left_out_sections(tuple(dict.fromkeys(done.skipped)), tuple(dict.fromkeys(done.findings)))[0].tables,
         classes=classes,
@@ -323,7 +316,7 @@ def _traces(done: Coverage) -> dict[str, dict[str, Any]]:
     for recording, trace in done.traces.items():
         values = trace_data(_around_contact(trace), detectors)
         size += len(json.dumps(values, ensure_ascii=False, separators=(",", ":")))
-        if size > _MOST_TRACE_TEXT:
+        if size > 4_200_000:  # characters of JSON: the page stays below 5 MB
             break
         found[recording] = values
     return found
@@ -334,7 +327,8 @@ def _around_contact(trace: Trace) -> Trace:
     contact = trace.shown
     if contact is None:
         return trace
-    start = max(trace.start, min(trace.view[0], contact.start - _BEFORE))
+    # Half a second before the contact: the approach is the same in all recordings of a log.
+    start = max(trace.start, min(trace.view[0], contact.start - 0.5))
     kept = trace.force_time >= start
     panels = tuple(replace(panel, course=panel.course.within((start, trace.end))) for panel in trace.panels)
     return replace(trace, start=start, force_time=trace.force_time[kept], force=trace.force[kept], panels=panels)

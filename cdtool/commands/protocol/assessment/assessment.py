@@ -63,19 +63,8 @@ def speed_reasons(point: MeasuringPoint, speeds: Sequence[tuple[str, float | Non
             yield Reason.of_point("speed_differs", point, **about, measured=speed, tolerance=tolerance)
 
 
-# Sample rates are alike within this share: a clock is not exact, and stamps jitter.
-_SAME_RATE = 0.02
-# A stated sample rate that differs by more than this share from the measured one is that of another instrument.
-_OTHER_RATE = 0.1
-_SAME_STIFFNESS = 0.02
 # So much of its last step is required [s] if a profile states no length of the record.
 LAST_STEP_S = 0.5
-# Equal readings from this share of the range on may be those of an amplifier at its stop.
-_NEAR_RANGE = 0.95
-# Below this share of a limit, the resolution of the cell is none that matters.
-_FINE = 0.005
-# Beside a single high reading of the force, a spike may be so many times as high.
-_ALONE = 10.0
 
 
 @dataclass(frozen=True)
@@ -355,7 +344,7 @@ def _of_profile(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason
         planned, needed = point.repetitions, profile.average_of
         yield Reason.of_point("too_few_planned", point, planned=planned, needed=needed, profile=profile.name)
     stiffness, required = point.obstacle_stiffness_n_per_mm, profile.obstacle_stiffness_n_per_mm
-    if stiffness and required and abs(stiffness - required) > _SAME_STIFFNESS * required:
+    if stiffness and required and abs(stiffness - required) > 0.02 * required:  # another spring, not its tolerance
         yield Reason.of_point("wrong_stiffness", point, stiffness=stiffness, needed=required, profile=profile.name)
 
 
@@ -397,7 +386,8 @@ def _of_resolution(
     cell = max(item.curve.resolution for item in repetitions)
     for step in verdict.steps:
         limit = step.step.at_most_n
-        if step.outcome == "pass" and cell > _FINE * limit and step.force + 0.5 * cell > limit:
+        # Below 0.5 % of a limit, the resolution of the cell is none that matters.
+        if step.outcome == "pass" and cell > 0.005 * limit and step.force + 0.5 * cell > limit:
             yield Reason.of_point("resolution_decides", point, **_compared(step, verdict, profile), cell=cell)
 
 
@@ -422,7 +412,8 @@ def _of_repetition(
     """Yield what is wrong with the data of a repetition."""
     about = _about(number, item)
     rate, least = item.sample_rate, profile.sample_rate_at_least_hz
-    if rate < (1.0 - _SAME_RATE) * least:
+    # Sample rates are alike within 2 %: a clock is not exact, and stamps jitter.
+    if rate < 0.98 * least:
         yield Reason.of_point("rate_too_low", point, **about, rate=rate, needed=least, profile=profile.name)
     end, needed = item.curve.end, required_record(profile)
     is_short = end < needed
@@ -467,7 +458,8 @@ def _of_steps(
         if _decides(moved, step, of_all, verdict.tests):
             yield Reason.of_point("drift_decides", point, **values, drift=item.drift)
         if not profile.sample_rate_at_least_hz and step.outcome != "not_assessable":
-            between = above_between_samples(item.curve, step, _ALONE)
+            # Beside a single high reading of the force, a spike may be ten times as high.
+            between = above_between_samples(item.curve, step, 10.0)
             if _decides(between, step, of_all, verdict.tests):
                 most, rate = step.peak + between, item.sample_rate
                 kind = "peak_between_samples"
@@ -485,13 +477,14 @@ def _of_instrument(point: MeasuringPoint, number: int, item: Repetition, instrum
     about, reading = _about(number, item), item.largest_reading
     if instrument.range_n and reading >= instrument.range_n:
         yield Reason.of_point("beyond_range", point, **about, reading=reading, range=instrument.range_n)
-    elif instrument.range_n and reading >= _NEAR_RANGE * instrument.range_n:
+    # Equal readings near the end of the range may be those of an amplifier at its stop.
+    elif instrument.range_n and reading >= 0.95 * instrument.range_n:
         equal = equal_readings_at_peak(item.curve)
         if equal > 1 and not item.curve.saturated:
             values = {"reading": reading, "range": instrument.range_n, "equal": equal}
             yield Reason.of_point("near_range", point, **about, **values)
     stated, rate = instrument.sample_rate_hz, item.sample_rate
-    if stated and math.isfinite(rate) and abs(rate - stated) > _OTHER_RATE * stated:
+    if stated and math.isfinite(rate) and abs(rate - stated) > 0.1 * stated:  # that of another instrument
         yield Reason.of_point("rate_differs", point, **about, rate=rate, stated=stated)
 
 

@@ -18,19 +18,17 @@ from cdtool.base.errors import RecordingError
 from cdtool.commands.protocol.assessment.sampling import sample_rate
 from cdtool.recordings.recording import CONTACT_PRESSURE, Contact, Recording, Series
 from cdtool.recordings.units import UNITS
-from cdtool.truth.force.curve import ForceTimeCurve, force_time_curve
+from cdtool.truth.force.curve import TAIL, ForceTimeCurve, force_time_curve
 from cdtool.truth.force.limits import ForceProfile, ForceStep, PressureLimit
 from cdtool.truth.force.verdict import ForceVerdict, Outcome, assess_force
 from cdtool.truth.missing_samples import cell_samples
 from cdtool.truth.rest_level import RunningRest
 
 _PA = UNITS["N/cm2"].factor
-# The rest of a pressure sensor is known if it was read between these times before a contact [s].
-_NEAR, _AT_REST = 1.0, 0.1
-# A record that begins within this time before a contact [s] may show no rest at all; its first readings last _FIRST.
-_EARLY, _FIRST = 0.6, 0.01
-# A sensor that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
-_TAIL = 0.1
+# A record that begins within this time [s] before a contact may show no rest at all: a slow contact begins with it.
+EARLY = 0.6
+# Its first readings, over this time [s], are those nearest to the rest.
+FIRST = 0.01
 # An entered peak that differs from the recorded one by more than this share of the larger is shown as a deviation.
 SAME_PEAK = 0.1
 
@@ -109,8 +107,9 @@ def pressure_record(
     samples = cell_samples(recording[CONTACT_PRESSURE])
     time, pressure = samples.time, samples.force / _PA
     before = (time >= since) & (time < contact.start)
-    near = before & (time >= contact.start - _NEAR)
-    if not near.any() or time[near][0] > contact.start - _AT_REST:
+    # The rest is known if the sensor was read between 1 s and 0.1 s before the contact.
+    near = before & (time >= contact.start - 1.0)
+    if not near.any() or time[near][0] > contact.start - 0.1:
         return None
     line = RunningRest(time[before], pressure[before]).line(contact.start)
     rest = line.value(contact.start)
@@ -120,13 +119,13 @@ def pressure_record(
         curve = force_time_curve(own, replace(contact, rest=rest, hole=0.0), until=until)
     except RecordingError:
         return None
-    if contact.end >= time[-1] and recording.end - time[-1] > _TAIL:
+    if contact.end >= time[-1] and recording.end - time[-1] > TAIL:
         # The sensor ends in the contact: the rest of it is a hole.
         curve = replace(curve, end=min(recording.end, until) - contact.start)
     noise = float(np.max(np.abs(pressure[near] - rest), initial=0.0))
     begin = time[before][0]
-    first = float(np.mean(pressure[before & (time <= begin + _FIRST)]))
-    rest_error = abs(rest - first) if contact.start - begin < _EARLY else 0.0
+    first = float(np.mean(pressure[before & (time <= begin + FIRST)]))
+    rest_error = abs(rest - first) if contact.start - begin < EARLY else 0.0
     return PressureRecord(curve, rest, line.drift, rest_error, rises=curve.peak > noise)
 
 

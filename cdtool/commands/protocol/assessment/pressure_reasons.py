@@ -12,10 +12,6 @@ from cdtool.commands.protocol.assessment.sampling import above_between_samples
 from cdtool.truth.force.limits import ForceProfile
 from cdtool.truth.force.verdict import StepVerdict
 
-# Beside a single high reading the pressure may have been higher by so many times as much: tissue and films are soft,
-# and have no spikes as a force has.
-_ALONE = 1.0
-
 
 def pressure_reasons(
     point: MeasuringPoint,
@@ -118,7 +114,9 @@ def _may_exceed(
     error = max(record.rest, 0.0) + record.rest_error + abs(record.drift) * min(end, record.curve.end)
     if step.peak + error > step.step.at_most_n:
         yield Reason.of_point("pressure_rest_decides", point, **about, step=step.step.name, **values, error=error)
-    most = step.peak + above_between_samples(record.curve, step, _ALONE)
+    # Beside a single high reading the pressure may have been twice as high: tissue and films are soft, and have no
+    # spikes as a force has.
+    most = step.peak + above_between_samples(record.curve, step, 1.0)
     if most > step.step.at_most_n:
         values |= {"rate": record.sample_rate, "most": most}
         yield Reason.of_point("pressure_between_samples", point, **about, step=step.step.name, **values)

@@ -15,14 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
+from cdtool.statistics.spread import MAD_TO_STD
 from cdtool.truth.force.curve import ForceTimeCurve
+from cdtool.truth.load_cell import ROUNDING
 from cdtool.truth.missing_samples import CellClock
 
-# One measurement agrees in this share of its samples, apart from those at which exports round the time.
-_AGREEING = 0.9
-_OF_NOISE = 0.5
-# The standard deviation of rounding, in steps of the cell: with less noise most readings are repeated.
-_ROUNDING = 0.29
+# The shift is first sought in steps of this length [s], within the rise of a contact.
+_COARSE = 2e-3
 # Resolutions, and sample rates, are the same within this share.
 _SAME = 0.02
 # Fewer samples at which a reading changes show nothing.
@@ -31,11 +30,6 @@ _ENOUGH = 20
 _SHIFT = 0.05
 # The shift is found in the first part of the contact: this time [s], at most so many samples.
 _FIRST, _MOST = 1.0, 1500
-# It is first sought in steps of this length [s], within the rise of a contact.
-_COARSE = 2e-3
-# An average over a longer period lowers a peak by less than this share.
-_PEAK = 0.05
-_NORMAL = 0.6745
 
 
 class _Curve(NamedTuple):
@@ -87,16 +81,18 @@ def hold_same_measurement(one: ForceTimeCurve, other: ForceTimeCurve) -> bool:
     cell, noise = max(finer.resolution, coarser.resolution), max(finer.noise, coarser.noise)
     if min(len(finer.time), len(coarser.time)) < _ENOUGH or finer.period <= 0.0:
         return False
-    if abs(highest[0] - highest[1]) > _PEAK * max(highest) + cell + 4.0 * noise:
+    # An average over a longer period lowers a peak by less than 5 %.
+    if abs(highest[0] - highest[1]) > 0.05 * max(highest) + cell + 4.0 * noise:
         return False
-    least = _OF_NOISE * min(finer.noise, coarser.noise)
+    least = 0.5 * min(finer.noise, coarser.noise)  # two measurements differ by the noise of both
     # Readings of one resolution, sample by sample, are equal; in every other comparison they are rounded.
     is_same = abs(finer.resolution - coarser.resolution) <= _SAME * cell
     by_number = _by_number(finer, coarser)
     if by_number and _agree(*by_number, max(least, (0.25 if is_same else 0.5) * cell)):
         return True
     # Of one quiet cell at one rate, all rounded readings of one force agree after interpolation: it shows nothing.
-    if by_number and is_same and min(finer.noise, coarser.noise) < _ROUNDING * cell:
+    # With less noise than the standard deviation of rounding most readings are repeated.
+    if by_number and is_same and min(finer.noise, coarser.noise) < ROUNDING * cell:
         return False
     return any(_agree(*pair, max(least, 0.51 * cell)) for pair in _resampled(finer, coarser))
 
@@ -104,7 +100,7 @@ def hold_same_measurement(one: ForceTimeCurve, other: ForceTimeCurve) -> bool:
 def _prepared(curve: ForceTimeCurve) -> _Curve:
     bent = np.diff(curve.force, 2)
     # Six times the variance of white noise is that of its second differences, which a smooth force has not.
-    noise = float(np.median(np.abs(bent))) / (_NORMAL * np.sqrt(6.0)) if len(bent) else 0.0
+    noise = MAD_TO_STD * float(np.median(np.abs(bent))) / np.sqrt(6.0) if len(bent) else 0.0
     return _Curve(curve.time, curve.force, CellClock(curve.time).period, curve.resolution, noise)
 
 
@@ -187,4 +183,5 @@ def _agree(one: FloatArray, other: FloatArray, tolerance: float) -> bool:
     if len(apart) < _ENOUGH:
         return False
     within = np.searchsorted(apart, apart + 2.0 * tolerance, side="right") - np.arange(len(apart))
-    return bool(within.max() >= _AGREEING * len(apart))
+    # One measurement agrees in 90 % of its samples, apart from those at which exports round the time.
+    return bool(within.max() >= 0.9 * len(apart))

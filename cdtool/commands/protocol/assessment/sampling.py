@@ -14,20 +14,14 @@ from cdtool.truth.force.curve import ForceTimeCurve
 from cdtool.truth.force.verdict import StepVerdict
 from cdtool.truth.missing_samples import CellClock
 
-# A steady force repeats, too: this share of the changes follows the one before as soon as the sensor can, and a curve
-# with fewer changes shows nothing.
-_SOONEST = 0.1
-_ENOUGH_CHANGES = 20
-# Readings from this share of a peak on, before and after it, show its shape; a single one may be that of a spike.
-_SHAPE = 0.5
-
 
 def repeats(curve: ForceTimeCurve) -> int:
     """Return how many samples of the log in a row have one reading of the sensor, at least 1."""
     changes = np.flatnonzero(np.diff(curve.force))
-    if len(changes) < _ENOUGH_CHANGES:
+    if len(changes) < 20:  # they show nothing
         return 1
-    return int(np.quantile(np.diff(changes), _SOONEST, method="lower"))
+    # A steady force repeats, too: a tenth of the changes follows the one before as soon as the sensor can.
+    return int(np.quantile(np.diff(changes), 0.1, method="lower"))
 
 
 def sample_rate(curve: ForceTimeCurve) -> float:
@@ -50,7 +44,8 @@ def above_between_samples(curve: ForceTimeCurve, step: StepVerdict, alone: float
     before = float(curve.force[highest - apart]) if highest >= apart else 0.0
     after = float(curve.force[min(highest + apart, len(curve.force) - 1)])
     before, after = min(before, step.peak), min(after, step.peak)
-    if not min(before, after) >= _SHAPE * step.peak > 0.0:
+    # Readings from half of a peak on, before and after it, show its shape; a single one may be that of a spike.
+    if not min(before, after) >= 0.5 * step.peak > 0.0:
         return alone * abs(step.peak)
     sine = math.sin(math.acos((before + after) / (2.0 * step.peak)))
     return math.hypot(step.peak, 0.5 * (after - before) / sine) - step.peak if after != before else 0.0

@@ -10,6 +10,7 @@ import numpy as np
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, Repetition
 from cdtool.commands.protocol.document.words import Words
 from cdtool.report.plots.figures import drawing, new_figure, svg_text
+from cdtool.report.plots.force_plot import WHOLE
 from cdtool.report.plots.style import FORCE, LIMIT
 from cdtool.results.traces.decimation import kept_samples
 from cdtool.truth.force.limits import ForceProfile
@@ -18,13 +19,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# Repetitions that fit on a page with their table.
 _IN_ONE = 4
 # Sizes [inch]: the drawing's width, the height of a panel and the distance to the next, the margins beside and below
 # the panels, the left panels' width. Given, not found by trial, which takes a second.
 _WIDTH, _PANEL, _APART, _BESIDE, _BELOW, _LEFT = 6.9, 1.2, 0.42, 0.62, 0.45, 3.3
-_PIXELS = 900
-# A record that covers this share of the axis is drawn as if it covered all of it.
-_WHOLE = 0.99
 NOT_RECORDED = "0.88"
 # The first part is so many times as long as the first peak is late, at least and at most [s].
 _PARTS, _SHORTEST, _LONGEST = 4.0, 0.2, 1.0
@@ -79,12 +78,12 @@ def _draw(axes: Axes, item: Repetition, profile: ForceProfile, end: float, words
     time, force = item.curve.time, item.curve.force
     inside = time <= end
     time, force = time[inside], force[inside]
-    kept = kept_samples(time, force, _PIXELS)
+    kept = kept_samples(time, force, 900)  # more than the panel has pixels
     axes.plot(time[kept], force[kept], color=FORCE, linewidth=0.9)
     begins = [step.from_s for step in profile.steps if step.from_s < end]
     forces = [step.at_most_n for step in profile.steps[: len(begins)]]
     axes.step([*begins, end], [*forces, forces[-1]], where="post", color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0)
-    if item.curve.end < _WHOLE * end:
+    if item.curve.end < WHOLE * end:
         axes.axvspan(item.curve.end, end, color=NOT_RECORDED, linewidth=0)
     axes.set_xlim(0.0, end)
     axes.set_ylim(min(0.0, 1.1 * float(force.min())), 1.15 * max(float(force.max()), *forces))

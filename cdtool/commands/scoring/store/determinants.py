@@ -1,7 +1,7 @@
-"""Everything that determines the outcome of a log, and of a detector on it, as the keys of a store.
+"""Everything that determines the outcome of a log, as the key of a store.
 
 A name is among it, since rows contain it, and so are the code and the content of every file read for the log; a path of
-the machine, the gains of other detectors and the rows that a label file has on other logs are not.
+the machine and the rows that a label file has on other logs are not.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from cdtool.execution.store.sources import SourceFile
 from cdtool.formats.channels.run_reading import split_run
 from cdtool.formats.labels.labels import Labels
 from cdtool.recordings.log_section import LogSection
-from cdtool.recordings.motion.applicable import GRACE
 from cdtool.recordings.plausible import PlausibleRanges
 from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
 
@@ -41,43 +40,33 @@ class Determinants:
     runs: Mapping[Path, Sources]
     factors: Mapping[str, FloatArray]
 
-    def log_key(self, group: str, path: Path, sources: Sources) -> str:
-        """Return the key of the rows of a log that do not depend on the detectors."""
-        own = json.dumps(self._of_log(path))
-        labels = "" if self.setup.labels is None else digest_of(labels_of_log(self.setup, path))
-        return combined("log", self._common, self._groups[group], own, labels, *(item.content for item in sources))
-
-    def detector_key(self, detector: str, path: Path, log_key: str) -> str:
-        """Return the key of the outcome of a detector on a log."""
-        return combined("detector", log_key, self._of_detector[detector], self._own_part(path, (detector,)))
-
-    def trace_key(self, path: Path, number: int, detector_keys: Sequence[str]) -> str:
-        """Return the key of the trace of an operation of a log, which explains alarms by what was learned."""
-        return combined("trace", str(number), *detector_keys, self.normals, self._own_part(path, ()))
-
-    def name(self, path: Path) -> str:
-        """Return the name of a log in results."""
-        found = self._names.get(path)
-        if found is None:
-            found = self._names[path] = shown_path(path, self._base)
-        return found
-
-    @cached_property
-    def _names(self) -> dict[Path, str]:
-        return {}
-
-    @cached_property
-    def _base(self) -> Path:
-        return self.setup.path.parent
+    def key(self, group: str, path: Path, sources: Sources) -> str:
+        """Return the key of the outcome of a log."""
+        setup, name = self.setup, shown_path(path, self.setup.path.parent)
+        section = str(setup.sections.get(path, "")) if setup.sections else ""
+        own = json.dumps([name, section, setup.campaigns.get(path), setup.points.get(path), self._ranges(name)])
+        labels = "" if setup.labels is None else digest_of(labels_of_log(setup, path))
+        taught = self._taught if self._is_learned_from(path) else ""
+        content = (item.content for item in sources)
+        return combined("log", self._common, self._groups[group], own, labels, taught, *content)
 
     @cached_property
     def _common(self) -> str:
-        return digest_of(code_version(), how_logs_are_read(self.setup), self.setup.watched)
-
-    def _of_log(self, path: Path) -> list[str | None]:
-        setup, name = self.setup, self.name(path)
-        section = str(setup.sections.get(path, "")) if setup.sections else ""
-        return [name, section, setup.campaigns.get(path), setup.points.get(path), self._ranges(name)]
+        """Return what is the same for all logs: how they are read, and the detectors with what these have learned."""
+        setup, learned = self.setup, self.learned
+        detectors = [
+            [
+                name,
+                setup.machine_file.detector(name),
+                [fitted_to_dict(setup.rule, item) for item in learned.thresholds.get(name, ())],
+                learned.about.unusable.get(name),
+                self.factors.get(name),
+            ]
+            for name in setup.detectors
+        ]
+        normals = [[item.to_dict() for item in learned.normals.motions], str(learned.normals.absent)]
+        rules = [rule_to_dict(setup.rule), setup.activation, setup.watched, setup.grace]
+        return digest_of(code_version(), how_logs_are_read(setup), rules, detectors, normals)
 
     @cached_property
     def _groups(self) -> dict[str, str]:
@@ -100,44 +89,20 @@ class Determinants:
             self._range_digests[id(ranges)] = digest_of(ranges)
         return self._range_digests[id(ranges)]
 
-    @cached_property
-    def _of_detector(self) -> dict[str, str]:
-        setup = self.setup
-        grace = max(GRACE, *(group.window for group in setup.impacts.values()))
-        common = [setup.activation, setup.watched, grace]
-        return {
-            name: digest_of(
-                rule_to_dict(setup.rule),
-                common,
-                setup.machine_file.detector(name),
-                [fitted_to_dict(setup.rule, item) for item in self.learned.thresholds.get(name, ())],
-                self.learned.about.unusable.get(name),
-                self.factors.get(name),
-            )
-            for name in setup.detectors
-        }
+    def _is_learned_from(self, path: Path) -> bool:
+        if not self.setup.has_runs:
+            return path in self.setup.both
+        return split_run(path)[0] in {split_run(log)[0] for log in self.setup.both}
 
     @cached_property
-    def normals(self) -> str:
-        """Return the digest of the normal motion, by which alarms are explained."""
-        return digest_of([item.to_dict() for item in self.learned.normals.motions], str(self.learned.normals.absent))
+    def _taught(self) -> str:
+        """Return what determines the thresholds of a log that is learned from, too: all others."""
+        return learned_key(self.setup, self.runs, self.setup.detectors)
 
-    def _own_part(self, path: Path, detectors: tuple[str, ...]) -> str:
-        """Return what determines the thresholds of a log that is learned from, too: all others; else empty."""
-        both = self.setup.both
-        if not both:
-            return ""
-        files = {split_run(log)[0] for log in both} if self.setup.has_runs else set(both)
-        own = split_run(path)[0] if self.setup.has_runs else path
-        if own not in files:
-            return ""
-        if detectors not in self._taught:
-            self._taught[detectors] = learned_key(self.setup, self.runs, detectors)
-        return self._taught[detectors]
 
-    @cached_property
-    def _taught(self) -> dict[tuple[str, ...], str]:
-        return {}
+def trace_key(log_key: str, number: int) -> str:
+    """Return the key of the trace of an operation of a log."""
+    return combined("trace", str(number), log_key)
 
 
 def _own_channels(group: ImpactGroup) -> list[Any]:

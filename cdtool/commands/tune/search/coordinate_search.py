@@ -10,11 +10,10 @@ from cdtool.commands.tune.search.candidate import Candidate
 
 # The first factor; the last one is the smallest that is tried. The number of evaluations is limited.
 _FIRST, _LAST = 2.0, 2.0**0.5
+# The number of evaluations of one search is limited: each of them runs on all recordings.
 EVALUATIONS = 40
 # A gain is not moved further from where it began than by this factor.
 FARTHEST = 32.0
-# An improvement below this [log cost] is none.
-_LEAST_GAIN = 1e-2
 
 
 @dataclass
@@ -54,7 +53,7 @@ class CoordinateSearch:
         """Move to the best neighbour, or reduce the step if none is better."""
         around = min(self._around(), key=lambda item: self._scores.get(item.key, math.inf), default=None)
         found = math.inf if around is None else self._scores.get(around.key, math.inf)
-        if around is not None and found < self.score - _LEAST_GAIN:
+        if around is not None and found < self.score - 1e-2:  # 1 % of the cost: less is none
             self.best, self.score = around, found
         else:
             self.step = math.sqrt(self.step)

@@ -10,8 +10,9 @@ from typing import Any
 from cdtool.base.errors import CdtoolError
 from cdtool.thresholds.base import Threshold
 
-# Consecutive samples that raise an alarm, and the shortest time that they take [s] unless another one is asked for.
+# Consecutive samples that raise an alarm.
 DEBOUNCES = (1, 3, 5, 9)
+# The shortest time that they take [s] unless another one is asked for: a spike of two samples at 1 kHz is no alarm.
 SHORTEST_DEBOUNCE = 3e-3
 
 

@@ -22,7 +22,6 @@ from cdtool.commands.tune.search.objective import Objective
 _RULES, _RULES_WITHOUT_FOLD = 3, 1
 # Measures candidates, in their order.
 Measure = Callable[[Sequence[Candidate]], Sequence[Measured]]
-# Called after each round with the candidates measured so far, and the best one of all recordings.
 
 
 @dataclass(frozen=True)
@@ -84,15 +83,11 @@ class SubsetSearch:
 
 @dataclass(frozen=True)
 class Searched:
-    """The searches of one detector by subset, everything that was measured, and the default.
-
-    `default_debounce` is the number of the debounce of the default.
-    """
+    """The searches of one detector by subset, everything that was measured, and the default."""
 
     subsets: tuple[SubsetSearch, ...]
     measured: dict[str, Measured]
     default: Candidate
-    default_debounce: int
 
     @property
     def best(self) -> Scored:
@@ -102,7 +97,6 @@ class Searched:
 
 def search(
     default: Candidate,
-    default_debounce: int,
     rules: Sequence[Candidate],
     gains: tuple[str, ...],
     objective: Objective,
@@ -113,9 +107,7 @@ def search(
     Parameters
     ----------
     default : Candidate
-        What the benchmark file has; with the number of its debounce.
-    default_debounce : int
-        The number of the default's debounce.
+        What the benchmark file has, with the first of the debounces.
     rules : sequence of Candidate
         The first part of the search, with the default gains.
     gains : tuple of str
@@ -144,7 +136,7 @@ def search(
     measured([default, *rules])
     subsets = []
     for subset in range(objective.recordings.subsets):
-        made = SubsetSearch(subset, objective, _scored(default, default_debounce, known, objective, subset))
+        made = SubsetSearch(subset, objective, _scored(default, known, objective, subset))
         for candidate in (default, *rules):
             made.take(candidate, known[candidate.key])
         subsets.append(made)
@@ -163,14 +155,12 @@ def search(
                 scores = {one.key: item.best_of(one.key) for one in wanted}
                 own.tell({key: math.inf if made is None else made.score for key, made in scores.items()})
         running = [(item, own) for item, own, wanted in asked if wanted]
-    return Searched(tuple(subsets), known, default, default_debounce)
+    return Searched(tuple(subsets), known, default)
 
 
-def _scored(
-    candidate: Candidate, debounce: int, known: dict[str, Measured], objective: Objective, subset: int
-) -> Scored:
+def _scored(candidate: Candidate, known: dict[str, Measured], objective: Objective, subset: int) -> Scored:
     made = known[candidate.key]
     if made.reason:
-        return Scored(candidate, debounce, np.full(len(objective.recordings.groups), np.nan), math.inf)
-    costs = objective.costs(made, debounce, subset)
-    return Scored(candidate, debounce, costs, objective.score(costs))
+        return Scored(candidate, 0, np.full(len(objective.recordings.groups), np.nan), math.inf)
+    costs = objective.costs(made, 0, subset)
+    return Scored(candidate, 0, costs, objective.score(costs))

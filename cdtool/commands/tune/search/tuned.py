@@ -20,8 +20,6 @@ from cdtool.statistics.spread import mean_interval
 
 # An optimum is flat where the cost is at most this share above the best.
 FLAT = 0.05
-# The neighbour of an optimum at an edge must be worse by this share for the edge to matter.
-_EDGE = 0.01
 
 
 @dataclass(frozen=True)
@@ -43,18 +41,17 @@ class GroupResults:
 
 @dataclass(frozen=True)
 class ChoiceResults:
-    """What a choice gives: by group, and the number of impact-free operations that alarm."""
+    """What a choice gives: by group, and the number of impact-free operations that alarm.
+
+    `alarm_share`: their share, with its exact 95 % interval.
+    """
 
     groups: dict[str, GroupResults]
     alarming: int
     free: int
+    alarm_share: Interval
     score: float
     costs: FloatArray
-
-    @property
-    def alarm_share(self) -> Interval:
-        """Return the share of impact-free operations that alarm, with its exact 95 % interval."""
-        return binomial_share(self.alarming, self.free)
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,8 @@ class Sensitivity:
         if len(values) < 2 or self.chosen not in (values[0].value, values[-1].value):
             return False
         neighbour = values[1] if self.chosen == values[0].value else values[-2]
-        return neighbour.cost_ratio > 1.0 + _EDGE
+        # Where the neighbour is hardly worse, the edge does not matter.
+        return neighbour.cost_ratio > 1.01
 
     @property
     def _flat(self) -> list[TriedValue]:
@@ -187,7 +185,7 @@ def results_of(
             float(np.mean(known)) if len(known) else math.nan,
         )
     costs = objective.costs_of(latency, force, everything)
-    return ChoiceResults(found, *counts, objective.score(costs), costs)
+    return ChoiceResults(found, *counts, binomial_share(*counts), objective.score(costs), costs)
 
 
 def held_out_results(objective: Objective, made: Pooled | None) -> ChoiceResults | None:

@@ -17,9 +17,9 @@ from cdtool.commands.identify.axis.rigid_axis import (
 )
 from cdtool.commands.identify.estimate import IdentificationError, Method, Missing, NotIdentifiable
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from tests.data_folder import data, needs_data
+from tests.synthetic.gate_as_recording import as_recording
 
 # Janot, Gautier and Brunot, "Data set and reference models of EMPS", 2019: kg, N s/m, N, N.
 PUBLISHED = {

@@ -18,11 +18,11 @@ from cdtool.commands.identify.axis.speed_controller import (
 )
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Missing, NotIdentifiable
 from cdtool.commands.simulate.gate_model import GateParameters, simulate_gate_run
-from cdtool.commands.simulate.gate_recordings import as_recording
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.recordings.recording import Recording
 from tests.data_folder import DATA, needs_data
+from tests.synthetic.gate_as_recording import as_recording
 
 GATE = GateParameters()
 TRUE = {

@@ -30,7 +30,7 @@ def run(latency_of, recordings=RECORDINGS):
         return [latency_of(item) for item in candidates]
 
     objective = Objective(Goal.LATENCY, recordings)
-    return search(DEFAULT, 0, GRID, ("bandwidth",), objective, measure), asked
+    return search(DEFAULT, GRID, ("bandwidth",), objective, measure), asked
 
 
 def by_rule(values, bandwidth=10.0):

@@ -1,51 +1,19 @@
-"""A clock without faults is cleaned without the search for faults, with the same result; so is the rest of its use."""
+"""Samples that are held until the next, rows that are samples of a lower rate, and the usual step of a clock."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from hypothesis import given, settings
+import pytest
+from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.base.errors import RecordingError
-from cdtool.recordings.clock import THREE_YEARS, clean_time, previous_value, stamps
-from cdtool.recordings.clock.coarse_clock import recent_medians
+from cdtool.recordings.clock import previous_value
 from cdtool.recordings.clock.held_samples import hold_last
+from cdtool.recordings.clock.lower_rate import sampled_rows
+from cdtool.recordings.clock.recent_steps import RECENT_STEPS, recent_medians
 from cdtool.recordings.recording import Series
-
-STEP = st.sampled_from(
-    [1e-3, 1e-3, 1e-3, 0.02, 1.0, 0.0, -1e-3, -5.0, 2e8, THREE_YEARS, 1e9, math.nan, math.inf, -math.inf]
-)
-USUAL = st.sampled_from([1e-3, 2e-3, 0.5, 2e8, THREE_YEARS])
-
-
-@st.composite
-def clocks(draw):
-    steps = draw(st.lists(draw(st.sampled_from([STEP, USUAL])), max_size=30))
-    times = draw(st.sampled_from([0.0, -3.0, 1.6e9])) + np.cumsum([0.0, *np.nan_to_num(steps, posinf=0, neginf=0)])
-    odd = ~np.isfinite([0.0, *steps])
-    times[odd] = np.array([0.0, *steps])[odd]
-    return times[: draw(st.sampled_from([len(times), 1, 0]))]
-
-
-def outcome(times):
-    try:
-        clean = clean_time(times, 2, counted=times)
-    except RecordingError as fault:
-        return str(fault)
-    return clean.time.tobytes(), clean.keep.tolist(), repr(clean.findings)
-
-
-@settings(max_examples=400)
-@given(clocks())
-def test_a_clock_without_faults_is_cleaned_as_by_the_search_for_faults(times):
-    quick, is_clean = outcome(times), stamps._is_clean
-    stamps._is_clean = lambda _: False
-    try:
-        assert outcome(times) == quick
-    finally:
-        stamps._is_clean = is_clean
 
 
 @st.composite
@@ -80,3 +48,34 @@ def test_what_is_missing_is_held(marks):
     for k, held in enumerate(hold_last(values, missing)):
         last = np.where(missing[k], last, values[k])
         assert held.tolist() == last.tolist()
+
+
+STEPS = st.lists(st.sampled_from([0.0, 0.001, 0.00101, 0.002, 0.5, 1e9, np.inf, np.nan]), max_size=40)
+
+
+@given(STEPS, st.sampled_from([0.001, 0.5, np.nan]))
+def test_medians_are_the_bits_of_sliding_windows(steps, before):
+    values = np.array(steps, dtype=np.float64)
+    padded = np.concatenate((np.full(RECENT_STEPS - 1, before), values))
+    windows = [padded[k : k + RECENT_STEPS] for k in range(len(values))]
+    expected = [np.median(window) for window in windows]
+    np.testing.assert_array_equal(recent_medians(values, before), expected)
+
+
+def every(count, step, start=0):
+    values = np.full(count, np.nan)
+    values[start::step] = np.arange(len(values[start::step]))
+    return values
+
+
+@pytest.mark.parametrize("step", [2, 3, 4, 10])
+@pytest.mark.parametrize("start", [0, 1])
+def test_the_rows_with_a_value_are_the_samples_of_a_lower_rate(step, start):
+    values = every(100, step, start)
+    assert np.flatnonzero(sampled_rows(values)).tolist() == list(range(start, 100, step))
+
+
+def test_a_lost_sample_of_a_lower_rate_stays_a_pause():
+    values = every(100, 4)
+    values[40] = np.nan
+    assert np.flatnonzero(sampled_rows(values)).tolist() == [i for i in range(0, 100, 4) if i != 40]
