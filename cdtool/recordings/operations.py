@@ -167,5 +167,5 @@ def _directions(speed: FloatArray) -> npt.NDArray[np.int8]:
     It is at rest up to a share of the magnitude that 99 % of the samples do not exceed.
     """
     size = np.minimum(np.abs(np.where(np.isnan(speed), 0.0, speed)), _LARGEST)
-    rest = 0.05 * np.quantile(size, 0.99)  # of the peak speed
+    rest = 0.05 * np.quantile(size, 0.99)  # 5 % of that magnitude
     return np.asarray((speed > rest).astype(np.int8) - (-speed > rest).astype(np.int8))
