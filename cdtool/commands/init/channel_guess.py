@@ -81,7 +81,7 @@ def _strong(quantity: str, stream: Stream) -> bool:
 def _without_names(streams: list[Stream]) -> Channels:
     """Return the channels of a table without a header: an angle and its drive by a circle, or blocks of columns."""
     blocks, circle = of_blocks(streams), on_circle(streams)
-    # From three joints on related blocks are better evidence than the circle of a tool.
+    # With three joints or more related blocks are better evidence than the circle of a tool.
     if circle is None or (blocks and blocks[0].width >= 3):
         channels = Channels(blocks[0].width if blocks else 1, streams)
         channels.free = blocks or channels.free
