@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
-from cdtool.formats.columns import Categories
 from cdtool.formats.csv import Csv
 
 TEXTS = [
@@ -67,20 +66,6 @@ def test_texts_are_those_that_a_csv_reader_finds(tmp_path_factory, texts, separa
     assert source.columns["torque"].values.tolist() == [-float(i) for i in range(len(texts))]
 
 
-@pytest.mark.parametrize("separator", [" ", "   ", "\t"])
-@pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_words_between_blanks_comments_and_repeated_headers_are_no_obstacle(tmp_path, separator, end):
-    rows = [separator.join((f"{i / 100}", word, f"{i}", f"{-i}")) for i, word in enumerate(["on", "off"] * 10)]
-    head = separator.join(("t", "phase", "speed", "torque"))
-    rows.insert(10, "# made by hand at lunch")
-    rows.insert(5, head)
-    path = tmp_path / "log.txt"
-    path.write_bytes(end.join([head, *rows, ""]).encode())
-    source = Csv().columns(path, wanted("phase"))
-    assert ids(source, "phase") == ["on", "off"] * 10
-    assert source.columns["speed"].values.tolist() == list(range(20))
-
-
 def test_a_text_has_the_same_code_in_every_block_of_a_long_table(tmp_path):
     count = 60_000
     words = [f"run {i // 20_000}" for i in range(count)]
@@ -94,12 +79,3 @@ def test_a_number_beside_words_stays_a_number_with_a_decimal_comma(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("t;phase;speed;torque\n" + "".join(f"0,{i:02d};{['1,5', 'x'][i % 2]};{i},5;1\n" for i in range(20)))
     assert ids(Csv().columns(path, wanted("phase")), "phase") == [1.5, "x"] * 10
-
-
-def test_codes_are_exact_and_depend_on_the_text_alone():
-    first, second = Categories(), Categories()
-    texts = ["a", "b", "c", "\ud800"]
-    codes = [first.code(text) for text in texts]
-    assert codes == [second.code(text) for text in reversed(texts)][::-1]
-    assert all(-(2.0**53) < code <= -(2.0**52) and code == int(code) for code in codes) and len(set(codes)) == 4
-    assert first.words == dict(zip(codes, texts, strict=True))
