@@ -112,14 +112,6 @@ def test_a_message_longer_than_its_definition_is_not_read(tmp_path, every):
     assert fact.kind == "undecodable_messages" and (fact.numbers["count"], fact.numbers["messages"]) == (10, 30)
 
 
-@pytest.mark.parametrize("head", ["0101", "8001", "0003", "0007"])
-def test_other_encapsulations_are_refused(tmp_path, head):
-    payload = bytes.fromhex(head) + cdr(1.0, 2.0)[2:]
-    path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i in range(3)])
-    with pytest.raises(RecordingError, match=f"not plain CDR .starts with {head}"):
-        Mcap().columns(path, wanted(("/a", "force")))
-
-
 def test_names_also_select_a_single_joint(tmp_path):
     payloads = [json_state(["grip"], [-99.0]) if i % 2 else json_state(["arm"], [float(i)]) for i in range(10)]
     path = write(tmp_path / "log.mcap", [(0, i * MS, each) for i, each in enumerate(payloads)], encoding="json")
