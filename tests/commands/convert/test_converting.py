@@ -277,3 +277,35 @@ def test_all_columns_of_several_clocks_keep_the_start_without_a_machine_file(suf
         again = convert(path, tmp_path / "again.csv", force=True)
         for name in (path, again.files[0]):
             assert ColumnRows(Path(name)).origin == ColumnRows(log).origin > 1.6e9
+
+
+def test_the_kinds_of_a_label_are_kept(tmp_path):
+    text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\ntime = { column = "t", unit = "s" }\n'
+    text += (
+        'speed = { column = "v", unit = "m/s" }\nlabel = { column = "k", kinds = { 1 = "hard", "2.5" = "so\\"ft" } }\n'
+    )
+    (tmp_path / "machine.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "log.csv").write_text(
+        "t,v,k\n" + "".join(f"{i / 10},0.{i},{i % 3}\n" for i in range(9)), encoding="utf-8"
+    )
+    machine = read_machine_file(tmp_path / "machine.toml")
+    convert(tmp_path / "log.csv", tmp_path / "new.parquet", machine=machine)
+    again = read_machine_file(tmp_path / "new.parquet.machine.toml")
+    assert {item.channel: item.kinds for item in again.columns.sources}["label"] == ((1.0, "hard"), (2.5, 'so"ft'))
+
+
+@pytest.mark.parametrize(
+    ("head", "origin"),
+    [
+        ("# cdtool.source: a\n# cdtool.origin_s: 12.5\n", 12.5),
+        ("# cdtool.origin_s: noon\n", 0.0),
+        ("# cdtool.origin_s: nan\n", 0.0),
+        ("# a note\n# cdtool.origin_s: 12.5\n", 0.0),
+        ("", 0.0),
+    ],
+    ids=["written", "edited", "no number", "in a comment of another's", "none"],
+)
+def test_only_a_header_written_by_convert_states_the_start(head, origin, tmp_path):
+    (tmp_path / "log.csv").write_text(head + "t [s],v\n" + "".join(f"{k / 10},{k % 7}\n" for k in range(50)))
+    assert ColumnRows(tmp_path / "log.csv").origin == origin
+    assert list(survey(tmp_path / "log.csv").columns) == ["t [s]", "v"]

@@ -273,3 +273,17 @@ def test_a_label_may_be_about_a_run_of_a_file_that_is_only_learned_from(folder):
     )
     done = cdtool.benchmark(path).results
     assert [item.recording for item in done.skipped if "shows a contact" in item.reason] == ["learned.csv#free_03"]
+
+
+def test_a_load_cell_in_a_file_of_its_own_cannot_be_divided_into_runs(folder):
+    machine = (folder / "machine.toml").read_text().splitlines()
+    own = 'force = { file = "cell_{stem}.csv", column = "F", unit = "N", time_offset = 0.0, '
+    own += 'time = { column = "t", unit = "s" } }'
+    lines = [own if line.startswith("force = { column") else line for line in machine]
+    (folder / "own.toml").write_text("\n".join(lines))
+    path = changed(folder, "own_cell", 'operations = "column:run_id"', "all.csv#{}", ("machine.toml", "own.toml"))
+    with pytest.raises(ConfigurationError, match="operations: cannot divide a channel that is in a file of its own"):
+        cdtool.benchmark(path)
+    arguments = ("-m", folder / "own.toml", "--set=operations=column:run_id", "-d", "gm", "--set=threshold.limits=200")
+    done = command("detect", f"{folder / 'all.csv'}#stiff_03", *arguments)
+    assert done.status == 2 and "cannot be divided into the runs of" in one_line(done.err)

@@ -247,3 +247,36 @@ def test_a_threshold_that_needs_the_logs_own_part_leaves_it_not_assessable_with_
         "nothing can be learned from the other recordings: a limit needs at least 2" in str(item.reason)
         for item in done.findings
     )
+
+
+def changed(log, rows, factor, column="i_motor"):
+    """Multiply a column of a log in some of its rows."""
+    header, *lines = log.read_text(encoding="utf-8").splitlines()
+    at = header.split(",").index(column)
+    for i in rows:
+        cells = lines[i].split(",")
+        cells[at] = repr(float(cells[at]) * factor)
+        lines[i] = ",".join(cells)
+    log.write_text("\n".join([header, *lines]), encoding="utf-8")
+
+
+def test_plausible_ranges_of_a_log_are_those_of_the_others(gate):
+    folder = gate.parent / "own"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    for name in ("01", "02"):
+        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 3.0)
+    own, _ = learned_of(setup_of(folder, HEAD, LEARN, ONSET, GROUPS))
+    alone, _ = learned_of(setup_of(folder, HEAD, LEARN.replace("stiff/*", "stiff/0[2-4]"), ONSET, GROUPS))
+    assert own.ranges.without("stiff/01.csv") == alone.ranges.all != own.ranges.all
+    assert own.ranges.without("free/01.csv") == own.ranges.all
+
+
+def test_a_value_far_from_those_of_the_other_logs_is_masked_whatever_its_own_log_has(gate):
+    """Two of six logs have fill values before their contacts; in the range of all, such values would be usual."""
+    folder = gate.parent / "fill"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    for name in ("01", "02"):
+        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 1e6)
+    parts = HEAD, LEARN.replace("soft/*", "soft/0[12]"), ONSET, GROUPS
+    found = [item.recording for item in benchmark(setup_of(folder, *parts)).results.findings if item.is_loss]
+    assert sorted(found) == ["stiff/01.csv", "stiff/02.csv"]

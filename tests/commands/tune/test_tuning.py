@@ -14,10 +14,11 @@ from cdtool import simulate_gate
 from cdtool.base.errors import UsageError
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.tune.command import _show
-from cdtool.commands.tune.files import open_folder
+from cdtool.commands.tune.files import open_folder, write_tuning
 from cdtool.commands.tune.options import TuningOptions
 from cdtool.commands.tune.page import tuning_html
 from cdtool.commands.tune.recordings_to_tune import read_recordings
+from cdtool.commands.tune.search.objective import Goal
 from cdtool.commands.tune.tuned_files import tuning_summary
 from cdtool.commands.tune.tuning import tune_detectors
 from cdtool.execution.workers import Workers
@@ -209,3 +210,29 @@ def test_every_surface_opens_with_the_worst_fact_of_a_tuning(name, done, capsys)
     _show(made, quiet=True)
     assert " ".join(capsys.readouterr().out.split()).startswith(made.verdict[1])
     assert made.verdict[1] in tuning_html(made) and tuning_summary(made)["verdict"] == made.verdict[1]
+
+
+def test_the_force_is_not_minimised_where_none_is_known(quick, tmp_path):
+    text = "recording,start_s,end_s\n" + "".join(
+        f"{group}/{path.name},6.0,6.2\n" for group in ("stiff", "soft") for path in quick.impacts[group].logs
+    )
+    (quick.path.parent / "labels.csv").write_text(text, encoding="utf-8")
+    machine = "\n".join(
+        line
+        for line in quick.machine_file.path.read_text(encoding="utf-8").splitlines()
+        if not line.startswith("force")
+    )
+    (quick.path.parent / "no_cell.toml").write_text(machine, encoding="utf-8")
+    written = quick.path.read_text(encoding="utf-8").replace('"machine.toml"', '"no_cell.toml"')
+    written = written.replace("[onset]", '[onset]\nlabels = "labels.csv"')
+    (quick.path.parent / "labelled.toml").write_text(written, encoding="utf-8")
+    setup = read_benchmark_file(quick.path.parent / "labelled.toml")
+    setup = replace(setup, learn=setup.learn[:12], rule=Limit())
+    with pytest.raises(UsageError, match="no log has the force of its contact"):
+        tune(setup, QUICK, objective=Goal.FORCE)
+    made = tune(setup, QUICK)
+    folder = tmp_path / "a [b] c" / "out"
+    open_folder(folder, ())
+    write_tuning(made, folder)
+    again = read_benchmark_file(folder / "benchmark.toml")
+    assert again.labels is not None and len(again.labels.contacts) == 8
