@@ -93,12 +93,6 @@ def test_the_contacts_of_the_arm_are_found_in_the_torques_of_two_joints():
     assert outside == pytest.approx([4.208], abs=0.02)
 
 
-def test_a_missing_inertia_is_reported_by_the_detector_that_needs_it():
-    log = UR10E_LOGS / "link4.csv.gz"
-    done = run("detect", log, "-m", EXAMPLES / "ur10e.toml", "-d", "gm", "--set=threshold.limits=30")
-    assert done.status == 2 and "load_inertia" in done.err
-
-
 @needs_data("ur_collisions/onsets.csv")
 @pytest.mark.parametrize("stated", [True, False], ids=["uncertainty stated", "uncertainty not stated"])
 def test_all_collisions_of_a_jittering_arm_are_found_with_three_edits_of_a_draft(tmp_path, stated):
