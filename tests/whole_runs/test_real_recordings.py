@@ -13,13 +13,13 @@ import pytest
 import cdtool
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import detect_operation
+from cdtool.commands.learning.fitting import fit_operations
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.signature import Signature
 from tests.command import FEW
 from tests.command import cdtool as run
 from tests.data_folder import DATA, UR10E_LOGS, needs_data
-from tests.fitted_runs import fit_operations
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 CONTACTS = ((3.46, 4.14), (9.67, 9.96), (16.63, 17.08))
