@@ -15,7 +15,7 @@ from cdtool.statistics.spread import MAD_TO_STD
 
 #: Readings are pooled over this long [s]: noise and the hum of the mains average out, drift does not.
 INTERVAL = 0.05
-#: The rest before a time ends so long before it [s]: a soft contact must not be mistaken for drift of the cell.
+#: Time between the rest and the force that it is for [s]: a soft contact must not be mistaken for drift of the cell.
 GAP = 0.3
 #: Intervals that a line is fitted to: 1 s, over which drift is straight.
 WINDOW = 20

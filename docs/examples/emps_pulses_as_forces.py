@@ -22,7 +22,7 @@ import cdtool
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import Detection, detect_operation
 from cdtool.base.arrays import FloatArray
-from cdtool.commands.learning.fitting import fitting, for_machine, signals_of
+from cdtool.commands.learning.fitting import fit_operations
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording
@@ -69,8 +69,7 @@ def main(folder: Path) -> int:
         detector: Any = machine.detector(name)
 
         def verdict(stroke: Operation, runs: list[Operation], detector: Any = detector) -> Detection:
-            pairs, _ = signals_of(runs, machine.machine, detector)
-            fitted = fitting(for_machine(RULE, machine.machine))(pairs).thresholds
+            fitted = fit_operations(runs, machine.machine, detector, RULE).thresholds
             return detect_operation(stroke, machine.machine, detector, fitted, Activation(debounce=3))
 
         quiet = [verdict(stroke, [other for other in free if other is not stroke]) for stroke in free]

@@ -241,51 +241,33 @@ def _(table: Table) -> Content:
     return _with_cell(table, "(1.5)", 0), truth
 
 
+def _numbered(texts: list[str], values: list[float], separator: str = ";") -> Content:
+    """A counter and these numbers as these texts."""
+    rows = "".join(f"{i}{separator}{text}\n" for i, text in enumerate(texts))
+    return f"n{separator}v\n{rows}", {"n": [float(i) for i in range(len(texts))], "v": values}
+
+
+def _decimals(table: Table, at_3: str = "") -> Content:
+    values = [f"{a}.{b}" for a, b in table.rng.integers(100, 999, (table.count, 2))]
+    values[3] = at_3 or values[3]
+    return _numbered([value.replace(".", ",") for value in values], [float(value) for value in values])
+
+
 @_case("1,234 pinned as thousands", pins='thousands = ","\ndecimal = "."')
 def _(table: Table) -> Content:
-    values = [int(x) for x in table.rng.integers(1000, 999999, table.count)]
-    return "n;v\n" + "".join(f"{i};{x:,}\n" for i, x in enumerate(values)), {
-        "n": [float(i) for i in range(table.count)],
-        "v": [float(x) for x in values],
-    }
+    values = table.rng.integers(1000, 999999, table.count).tolist()
+    return _numbered([f"{value:,}" for value in values], [float(value) for value in values])
 
 
-@_case("1,234 pinned as decimals", pins='decimal = ","')
-def _(table: Table) -> Content:
-    values = [f"{a}.{b}" for a, b in table.rng.integers(100, 999, (table.count, 2))]
-    return "n;v\n" + "".join(f"{i};{x.replace('.', ',')}\n" for i, x in enumerate(values)), {
-        "n": [float(i) for i in range(table.count)],
-        "v": [float(x) for x in values],
-    }
-
-
-@_case("0,125 can only be a decimal")
-def _(table: Table) -> Content:
-    values = [f"{a}.{b}" for a, b in table.rng.integers(100, 999, (table.count, 2))]
-    values[3] = "0.125"
-    return "n;v\n" + "".join(f"{i};{x.replace('.', ',')}\n" for i, x in enumerate(values)), {
-        "n": [float(i) for i in range(table.count)],
-        "v": [float(x) for x in values],
-    }
+_MAKERS.append(("1,234 pinned as decimals", _decimals, {"pins": 'decimal = ","'}))
+_MAKERS.append(("0,125 can only be a decimal", lambda table: _decimals(table, "0.125"), {}))
 
 
 @_case("infinite, nan, empty, Microsoft's")
 def _(table: Table) -> Content:
-    words = {
-        "inf": math.inf,
-        "-Inf": -math.inf,
-        "nan": math.nan,
-        "": math.nan,
-        "1.#QNAN": math.nan,
-        "-1.#IND": math.nan,
-        "TRUE": 1.0,
-    }
-    texts = [*table.a, *words]
-    truth = [*(float(x) for x in table.a), *words.values()]
-    return "n,v\n" + "".join(f"{i},{x}\n" for i, x in enumerate(texts)), {
-        "n": [float(i) for i in range(len(texts))],
-        "v": truth,
-    }
+    words = {"inf": math.inf, "-Inf": -math.inf, "TRUE": 1.0}
+    words |= dict.fromkeys(("nan", "", "1.#QNAN", "-1.#IND"), math.nan)
+    return _numbered([*table.a, *words], [*(float(x) for x in table.a), *words.values()], ",")
 
 
 _refused("a text for a missing value", lambda table: _with_cell(table, "N/A"), "'N/A'", "header = 1")

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.channels.channel_map import TablePins
-from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.text import SAMPLE_BYTES
 from cdtool.formats.csv_dialect import find_dialect as finding
@@ -126,33 +125,3 @@ def test_a_case_with_its_last_rows_repeated_has_the_same_dialect_by_some_rows(tm
     if content.startswith((b"\xff\xfe", b"\xfe\xff")) or not lines or not lines[-1].endswith(b"\n"):
         pytest.skip("not of whole lines of single bytes")
     assert_alike(tmp_path / "table.csv", b"".join([*lines, *lines[-2:] * 80]))
-
-
-def plain(rows=2000, head="t;a;b\n", row="{0}.5;{0};0.25\n"):
-    return (head + "".join(row.format(i) for i in range(rows))).encode()
-
-
-def shorter(tmp_path, content):
-    path = tmp_path / "plain.csv"
-    path.write_bytes(content)
-    text, stream = detect_text(path, content[:SAMPLE_BYTES])
-    return shorter_sample(text, stream, TablePins())
-
-
-def test_of_a_plain_table_few_rows_are_read(tmp_path):
-    found = shorter(tmp_path, plain())
-    assert found is not None
-    assert found.stream.count(b"\n") < 20 < found.left_out
-    assert found.stream.startswith(b"t;a;b\n")
-
-
-def test_rows_whose_marks_may_separate_thousands_are_all_read(tmp_path):
-    assert shorter(tmp_path, plain(row="9.123;{0};1.234\n")) is None
-    assert shorter(tmp_path, plain(row="{0}.5;{0};1,5\n")) is None
-
-
-def test_a_column_with_empty_cells_is_read_in_all_rows(tmp_path):
-    assert shorter(tmp_path, plain(row="{0};{0};\n")) is not None  # never filled
-    assert shorter(tmp_path, plain(row="{0};;{0}\n")) is None
-    once = plain(row="{0};{0};\n").replace(b"\n700;700;", b"\n700;700;1")
-    assert shorter(tmp_path, once) is None

@@ -57,17 +57,6 @@ def test_the_first_number_with_a_mark_after_the_sample_decides(log, cell, value,
     assert Csv().columns(log(table)).columns["x"].values[-1] == value
 
 
-@pytest.mark.parametrize("other", ["0.125", "1.5", "12.25", "1.5e3", "-0.250"])
-def test_one_decimal_number_makes_all_points_decimal(log, other):
-    table = "t;a;b\n" + "".join(f"{i};{value};7\n" for i, value in enumerate(THOUSANDS)) + f"9;1;{other}\n"
-    assert Csv().columns(log(table)).columns["a"].values.tolist()[:5] == [997, 998, 999, 1.0, 1.001]
-
-
-def test_a_sum_below_whole_numbers_does_not_make_them_ambiguous(log):
-    source = Csv().columns(log("t;a\n" + rows(range(400, 430)) + "Sum;12.435\n"))
-    assert source.columns["a"].values.tolist() == list(range(400, 430))
-
-
 @pytest.mark.parametrize(
     "head",
     ["", "# force\n", "force\n", "force\nN\n", "rig 4\nforce\n"],
@@ -91,12 +80,6 @@ def test_one_column_of_numbers_with_commas_is_never_read_as_two(log, head, cells
         Csv().columns(log(head + "\n".join(cells) + "\n"))
 
 
-def test_one_column_of_decimal_commas_is_read_with_the_pins_of_its_error(log):
-    path = log("force\n" + "\n".join(["1,5", "-2,25", "7,0"]) + "\n")
-    assert pinned(path, column=0, decimal=",", separator=";").tolist() == [1.5, -2.25, 7.0]
-    assert pinned(path, column=1, separator=",").tolist() == [5, 25, 0]
-
-
 @pytest.mark.parametrize("above", ["990.000\n997.700", "997.700", "-1", "nan"])
 def test_a_number_above_rows_of_two_cells_is_a_row_of_the_same_column(log, above):
     with pytest.raises(RecordingError, match=r"line [34]: '1,005\.400' may be one number .* or two cells"):
@@ -111,24 +94,11 @@ def test_commas_between_whole_numbers_without_names_need_a_pin(log, cells):
     assert pinned(path, separator=",", decimal=".").tolist() == [float(cell.split(",")[1]) for cell in cells]
 
 
-@pytest.mark.parametrize("blank", ["\u00a0", "\u202f"])
-def test_a_non_breaking_space_does_not_separate_cells(log, blank):
-    source = Csv().columns(log("".join(f"1{blank}00{i},5 {i}\n" for i in range(5))))
-    assert source.columns["0"].values.tolist() == [1000.5 + i for i in range(5)]
-    assert list(source.columns) == ["0", "1"]
-
-
 @pytest.mark.parametrize("mark", [":", "."])
 def test_milliseconds_without_zeros_are_refused_where_they_would_run_backward(log, mark):
     stamps = [f"12:00:00{mark}{ms}" for ms in (8, 9, 10, 99, 100)]
     with pytest.raises(RecordingError, match=rf"column 't': '10' after '12:00:00{mark}9' may be 0\.10 s or 10 ms"):
         Csv().columns(log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps)))
-
-
-def test_fractions_of_a_second_without_trailing_zeros_are_read(log):
-    stamps = [f"2025-04-03T12:00:00.{part}+02:00" for part in ("1", "15", "2", "25", "3")]
-    source = Csv().columns(log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps)))
-    assert source.columns["t"].values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
 
 
 def test_two_pairs_of_digits_are_refused_unless_a_cell_shows_whether_they_are_minutes(log, machine):

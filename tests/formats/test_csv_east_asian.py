@@ -55,20 +55,6 @@ def test_names_are_read_and_the_encoding_is_reported(log, names, encoding, shown
     assert source.findings[0] == Finding("other_encoding", "", {"encoding": shown})
 
 
-@pytest.mark.parametrize("names", [*JAPANESE, *CHINESE])
-def test_utf_8_is_not_reported(log, names):
-    findings = Csv().columns(log(table(names, "utf-8"))).findings
-    assert not [finding for finding in findings if finding.kind == "other_encoding"]
-
-
-@pytest.mark.parametrize("encoding", ["cp1252", "latin-1", "cp850"])
-@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "_"])
-def test_every_latin_word_is_latin_alone_and_repeated(encoding, separator):
-    for word in LATIN:
-        for count in (1, 3, 30):
-            assert east_asian(separator.join([word] * count).encode(encoding, "ignore")) is None, word
-
-
 @given(
     st.lists(st.sampled_from(LATIN), min_size=1, max_size=40),
     st.sampled_from([",", ";", "\t", " ", "_", "\n"]),
@@ -108,11 +94,6 @@ def test_an_encoding_in_the_machine_file_decides(log, machine):
     assert list(Csv().columns(path, wanted).columns) == ["時間", "電流"]
 
 
-def test_a_sample_that_ends_within_a_character_is_recognised():
-    content = table(JAPANESE[3], "cp932")[: len("帰還パルス累積,サーボ".encode("cp932")) - 1]
-    assert east_asian(content) == "cp932"
-
-
 def test_words_in_cells_do_not_change_the_decision(log):
     rows = "".join(f"{i},門が閉じた\n" for i in range(50))
     source = Csv().columns(log(("t,状態\n" + rows).encode("cp932")))
@@ -121,3 +102,9 @@ def test_words_in_cells_do_not_change_the_decision(log):
 
 def test_words_behind_many_rows_of_numbers_are_recognised():
     assert east_asian(b"1,2\n" * 8000 + table(JAPANESE[3], "cp932")) == "cp932"
+
+
+@pytest.mark.parametrize("names", [*JAPANESE, *CHINESE])
+def test_utf_8_is_not_reported(log, names):
+    findings = Csv().columns(log(table(names, "utf-8"))).findings
+    assert not [finding for finding in findings if finding.kind == "other_encoding"]

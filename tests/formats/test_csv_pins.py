@@ -13,7 +13,6 @@ from cdtool.base.settings import Place
 from cdtool.formats.channels.channel_map import ChannelMap, ChannelSource, TimeSource
 from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.rows import is_complete
 from cdtool.formats.csv_dialect.pins import read_pins
 from tests.formats.conftest import COLUMNS
 from tests.formats.csv_cases import cases
@@ -109,28 +108,6 @@ def test_the_dialect_of_a_table_with_names_in_a_comment_can_be_pasted(log, machi
     assert Csv().columns(path, wanted).columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
 
 
-def test_info_with_a_machine_file_needs_its_pins_only(log, machine):
-    assert cdtool.info(log(ROWS), machine=machine(pinned('decimal = ","'))).channels[0].samples == 20
-
-
-def test_a_counter_with_a_rate_is_a_clock_with_its_gaps(log, machine):
-    rows = "n,i_motor,n_motor\n" + "".join(f"{i if i < 10 else i + 5},1,{i}\n" for i in range(20))
-    clock = COLUMNS.replace('time = { column = "t", unit = "ms" }', 'time = { column = "n", rate_hz = 500 }')
-    recording = read_recording(log(rows), machine(clock))
-    assert np.allclose(recording["speed"].time, [0.002 * (i if i < 10 else i + 5) for i in range(20)])
-    assert any(finding.kind == "sample_gaps" and finding.numbers["count"] == 1 for finding in recording.findings)
-
-
-def test_days_of_excel_are_refused_as_seconds_and_read_if_pinned(log, machine):
-    rows = "t,i_motor,n_motor\n" + "".join(f"{45750.5 + i * 0.001 / 86400:.12f},1,{i}\n" for i in range(20))
-    seconds = COLUMNS.replace('"ms"', '"s"')
-    with pytest.raises(RecordingError, match=r"days of Excel \(2025-04-03 12:00:00, 1000 Hz\), or 45750\.5 s at 86"):
-        read_recording(log(rows), machine(seconds))
-    recording = read_recording(log(rows), machine(seconds + '[csv]\ntime_format = "excel"\n'))
-    assert recording["speed"].time == pytest.approx(np.arange(20) * 0.001, abs=1e-6)
-    assert np.datetime64(int(recording.origin), "s") == np.datetime64("2025-04-03T12:00:00")
-
-
 def test_dates_are_a_clock_in_seconds_with_an_origin(log, machine):
     rows = "t,i_motor,n_motor\n" + "".join(f"2025-04-03T12:00:00.{i:03d}Z,1,{i}\n" for i in range(20))
     recording = read_recording(log(rows), machine(COLUMNS.replace('"ms"', '"s"')))
@@ -140,22 +117,9 @@ def test_dates_are_a_clock_in_seconds_with_an_origin(log, machine):
         read_recording(log(rows), machine())
 
 
-@pytest.mark.parametrize(
-    ("cell", "above", "expected"),
-    [
-        ("1.250", ["3.125", "-0.500"], (True, True)),
-        ("1.25", ["3.125", "-0.500"], (False, False)),
-        ("12", ["8.5", "7.25"], (False, False)),
-        ("1.25", ["3.125", "0.5"], (True, False)),
-        ("123", ["121", "122"], (True, True)),
-        ("12", ["121", "122"], (False, False)),
-        ("12", ["121", "9"], (True, False)),
-        ("1.5e-0", ["1.5e-03", "2.5e-03"], (False, False)),
-        ("1.5", ["1.5e-03", "2.5e-03"], (False, False)),
-        ("", ["1", "2"], (False, False)),
-        ('"', ["1", "22"], (True, True)),
-        ("1", [], (True, False)),
-    ],
-)
-def test_the_digits_of_the_cells_above_decide_whether_a_last_number_is_complete(cell, above, expected):
-    assert is_complete(cell, above) == expected
+def test_a_counter_with_a_rate_is_a_clock_with_its_gaps(log, machine):
+    rows = "n,i_motor,n_motor\n" + "".join(f"{i if i < 10 else i + 5},1,{i}\n" for i in range(20))
+    clock = COLUMNS.replace('time = { column = "t", unit = "ms" }', 'time = { column = "n", rate_hz = 500 }')
+    recording = read_recording(log(rows), machine(clock))
+    assert np.allclose(recording["speed"].time, [0.002 * (i if i < 10 else i + 5) for i in range(20)])
+    assert any(finding.kind == "sample_gaps" and finding.numbers["count"] == 1 for finding in recording.findings)

@@ -128,26 +128,10 @@ def test_a_second_clock_with_the_same_times_is_not_reported(log, machine, header
     assert not clock_warnings(Csv().columns(path))
 
 
-def test_adjacent_clocks_belong_to_the_same_rows(log, machine):
-    rows = "".join(f"{i / 100},{i / 100 + (i % 7) * 0.002},{i},{10 * i},{100 * i}\n" for i in range(60))
-    path = log("time,stamp_s,force,torque,speed\n".replace("stamp_s", "timestamp") + rows)
-    assert read_recording(path, machine(named("time")))["torque"].time[-1] == 0.59
-    assert not clock_warnings(Csv().columns(path))
-
-
 def test_clocks_after_their_channels_are_recognised_by_the_last_column(log, machine):
     rows = "".join(f"{i},{i / 2000},{10 * i},{100 * i},{i / 1000}\n" for i in range(50))
     recording = read_recording(log("force,time1,torque,speed,time2\n" + rows), machine(OWN))
     assert recording["force"].time[-1] == 49 / 2000 and recording["torque"].time[-1] == 49 / 1000
-
-
-def test_units_and_epoch_are_read_from_each_clocks_header(log, machine):
-    header = "time1 [ms],force,time2 [s],torque,speed"
-    path = log(table(header, 1.7e12 + 1e3 * CELL, 1.7e9 + 0.125 + DRIVE))
-    recording = read_recording(path, machine(OWN))
-    assert recording.origin == 1.7e9
-    assert recording["force"].time == pytest.approx(CELL, abs=1e-6)
-    assert recording["torque"].time == pytest.approx(0.125 + DRIVE, abs=1e-6)
 
 
 def test_a_channel_without_a_clock_is_refused(log, machine):
@@ -196,12 +180,6 @@ def test_a_second_clock_without_channels_of_its_own_is_reported_and_changes_noth
     for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
         assert [item.channel for item in clock_warnings(source)] == ["timestamp"]
         assert all(column.time is None for column in source.columns.values())
-
-
-def test_a_clock_of_the_same_rate_that_ends_early_is_that_of_its_channels(log):
-    path = log(table(HEADERS[0], CELL, CELL[:30]))
-    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
-        assert len(source.columns["torque"].values) == 30 and len(source.columns["force"].values) == 50
 
 
 def test_a_long_table_is_read_in_pieces_with_the_times_of_the_whole(log, monkeypatch):

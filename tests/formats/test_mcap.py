@@ -64,13 +64,6 @@ def test_joint_names_missing_from_the_messages_are_an_error_and_never_a_silent_p
         Mcap().columns(written(), requested)
 
 
-def test_a_name_array_whose_order_changes_between_messages_is_followed(by_hand):
-    names = (["a", "b"], ["b", "a"])
-    messages = [(i, i, {"name": names[i % 2], "q": [1.0, 2.0] if i % 2 == 0 else [2.0, 1.0]}) for i in range(4)]
-    column = Mcap().columns(by_hand(messages), wanted(("/a", "q[:]"), joints=("a", "b"))).columns["/a q[:]"]
-    assert column.values.tolist() == [[1.0, 2.0]] * 4
-
-
 @pytest.mark.parametrize("clock", ["log", "publish", "header"])
 def test_the_clock_is_chosen_and_messages_are_sorted_by_it(by_hand, clock):
     stamps = {"log": [10, 20, 30], "publish": [9, 7, 8], "header": [3, 1, 2]}
@@ -83,16 +76,6 @@ def test_the_clock_is_chosen_and_messages_are_sorted_by_it(by_hand, clock):
     assert column.values.tolist() == order.tolist()
     unit = 1.0 if clock == "header" else 1e-9
     assert np.allclose(np.diff(column.time), np.diff(np.sort(stamps[clock])) * unit, rtol=1e-12)
-
-
-def test_messages_with_equal_times_keep_their_order(by_hand):
-    column = Mcap().columns(by_hand([(5, 5, {"x": i}) for i in range(4)]), wanted(("/a", "x"))).columns["/a x"]
-    assert column.values.tolist() == [0, 1, 2, 3]
-
-
-def test_nanoseconds_of_an_epoch_are_kept(by_hand):
-    path = by_hand([(START + i, START + i, {"x": i}) for i in range(4)])
-    assert Mcap().columns(path).columns["/a x"].time.tolist() == [0.0, 1e-9, 2e-9, 3e-9]
 
 
 def test_a_header_clock_without_a_header_is_a_clear_error(by_hand):

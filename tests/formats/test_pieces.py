@@ -99,16 +99,6 @@ def test_a_table_read_in_many_blocks_has_the_same_columns(end, tmp_path, monkeyp
     assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
 
-def test_midnight_between_two_blocks_is_detected(tmp_path, monkeypatch):
-    monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
-    seconds = np.arange(0, 200_000, 20) + 80_000
-    path = tmp_path / "a.csv"
-    path.write_text("clock,v\n" + "".join(f"{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d},1\n" for s in seconds))
-    source = join_pieces(read_pieces(choose_format(path), path), sort=False)
-    assert np.array_equal(source.columns["clock"].values, seconds)
-    assert any(finding.kind == "written_times" and finding.numbers["wrapped"] == 3 for finding in source.findings)
-
-
 @pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cell")])
 def test_words_are_a_footer_only_if_no_row_follows_in_any_block(row, fault, tmp_path, monkeypatch):
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)

@@ -9,13 +9,13 @@ import pytest
 
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import detect_operation
+from cdtool.commands.learning.fitting import fit_operations
 from cdtool.detectors.detection import Signal, Status
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import Operation, operations_of
 from cdtool.recordings.recording import Recording, Series
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.signature import Signature
-from tests.fitted_runs import fit_operations
 from tests.thresholds.strokes import TIME, N, stroke
 
 JOINTS = ("shoulder", "elbow")

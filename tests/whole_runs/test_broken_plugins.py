@@ -10,8 +10,6 @@ from pathlib import Path
 import pytest
 
 from cdtool.detectors import DETECTORS
-from cdtool.detectors.look import Look
-from cdtool.report.plots.style import look_of
 from tests.command import Outcome, cdtool
 
 GATE = Path(__file__).parents[2] / "sample_logs" / "gate"
@@ -111,15 +109,6 @@ def test_a_package_that_cannot_be_used_is_one_line_that_names_it(install, old, n
     assert done.status == 2 and done.out == "" and done.err.count("\n") == 1, done.err
     assert f"detector plug-in 'odd' of package 'odd-things' {words}" in done.err
     assert done.err.endswith("(repair or uninstall 'odd-things')\n")
-
-
-def test_a_plugin_has_the_look_of_its_class_or_one_derived_from_its_name(install):
-    absent = look_of("odd")
-    install(DETECTOR)
-    assert look_of("odd") == absent
-    given = DETECTOR.replace("    signed", "    look = Look('#123456', 's')\n    signed")
-    install(given.replace('"odd"', '"even"'), "even", package="even-things")
-    assert look_of("even") == Look("#123456", "s")
 
 
 def test_the_others_are_listed_despite_an_unusable_package(install):

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cdtool
-from cdtool.alarms.activation import Activation
 from cdtool.base.errors import SignatureError
-from cdtool.commands.detecting.prepared import prepared
 from cdtool.formats.signature_store import write_signature
-from cdtool.thresholds.signature import Signature
 from tests.command import cdtool as run
 from tests.synthetic.door import MACHINE, write_log
 
@@ -77,15 +73,6 @@ def test_a_benchmark_scores_every_operation_of_a_long_log(folder):
     assert results.contacts[0].force_at_alarm_n > 10.0
 
 
-def test_labels_are_the_ground_truth_without_a_load_cell(folder):
-    text = "\n".join(line for line in MACHINE.splitlines() if not line.startswith("force"))
-    (folder / "labels.toml").write_text(text)
-    (folder / "label_benchmark.toml").write_text(BENCHMARK.replace("machine.toml", "labels.toml"))
-    results = cdtool.benchmark(folder / "label_benchmark.toml").results
-    assert [row.outcome for row in results.contacts] == ["detected"] * 6
-    assert all(row.peak_force_n is None and row.force_at_alarm_n is None for row in results.contacts)
-
-
 def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_path):
     path = tmp_path / "door.json"
     machine, cut = ("-m", folder / "machine.toml"), "--set=operations=motion"
@@ -97,40 +84,6 @@ def test_forgetting_updates_follow_and_the_first_signature_stays(folder, tmp_pat
     assert second["first"] == first["first"] and len(second["runs"]) == 30
     assert second["current"][0]["by_position"]["count"] == first["current"][0]["by_position"]["count"]
     assert second["current"][0]["by_position"]["mean"] != first["current"][0]["by_position"]["mean"]
-
-
-def test_the_signature_rule_is_stored_in_the_file(folder):
-    rule = Signature(sides="two", safety_factor=7.0, alignment="position")
-    settings = MOTION | {"activation.debounce": 4}
-    learned = cdtool.learn_signature([folder / "free.csv"], folder / "machine.toml", "pt", rule=rule, settings=settings)
-    fitted = learned.signature.current[0]
-    assert (fitted.sides, fitted.safety_factor, fitted.alignment) == ("two", 7.0, "position")
-    assert learned.signature.activation == Activation(4)
-    latched = prepared(folder / "machine.toml", signature=learned, settings={"activation.latch": True})
-    assert latched.activation == Activation(4, latch=True), "a key changes only what it names"
-
-
-def test_unassessable_sections_are_shown_with_their_share(folder):
-    (folder / "benchmark.toml").write_text(BENCHMARK)
-    results = cdtool.benchmark(folder / "benchmark.toml").results
-    momentum = next(item for item in results.exposure if (item.group, item.detector) == ("holdout", "momentum"))
-    assert set(momentum.not_judged) == {"start-up", "no limit known here"}
-    assert 0.05 < sum(momentum.not_judged.values()) < 0.5
-    done = run(
-        "detect",
-        folder / "quiet.csv",
-        "-m",
-        folder / "machine.toml",
-        "-d",
-        "gm",
-        "--set=threshold.limits=40",
-        "--set=operations=motion",
-    )
-    assert done.status == 0
-    told = " ".join(done.out.split())  # lines wrap at the terminal's width
-    assert re.search(
-        r"not assessable in \S*quiet\.csv#1: \d+ %; \d\.\d\d to \d\.\d\d s \(\S+ to \S+ m\) start-up", told
-    )
 
 
 def test_a_contact_outside_all_operations_is_reported(folder):

@@ -139,24 +139,6 @@ def test_a_benchmark_runs_both_and_its_reports_name_the_package(command, tmp_pat
         assert "cdtool-plugin-example" in (tmp_path / report).read_text(encoding="utf-8"), report
 
 
-def test_all_detectors_include_those_of_plugins(command, tmp_path):
-    machine = ("--machine", GATE / "machine.toml")
-    text = f'machine = "{GATE}/machine.toml"\ndetectors = ["gm"]\nthreshold = "limit"\n'
-    text += f'[learn]\nlogs = ["{GATE}/free/03.csv", "{GATE}/free/04.csv"]\n'
-    text += f'[impacts.stiff]\nlogs = ["{GATE}/stiff/03.csv"]\n[limits]\n"gm.contacts" = {{ min = 1 }}\n'
-    (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
-    done = command("benchmark", "benchmark.toml", "--detectors", "all", "--json")
-    assert done.status == 0, done.err
-    results = json.loads(done.out)
-    assert results["detectors"] == [*DETECTORS.names(), "torque_rate"]
-    (one,) = json.loads(
-        command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--set=threshold.limits=9e9", "--json").out
-    )
-    assert one["detector"] == "torque_rate"
-    only = command("benchmark", "benchmark.toml", "--detectors", "tr")
-    assert only.status == 0 and "1 of 1 limits not checked" in only.err
-
-
 def test_the_examples_in_its_docstrings_run(site):
     modules = [site / "cdtool_plugin_example" / f"{name}.py" for name in ("torque_rate", "robust_limit")]
     done = python("-m", "doctest", "-v", *modules, site=site)

@@ -13,13 +13,13 @@ import pytest
 import cdtool
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import detect_operation
+from cdtool.commands.learning.fitting import fit_operations
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.signature import Signature
 from tests.command import FEW
 from tests.command import cdtool as run
 from tests.data_folder import DATA, UR10E_LOGS, needs_data
-from tests.fitted_runs import fit_operations
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 CONTACTS = ((3.46, 4.14), (9.67, 9.96), (16.63, 17.08))
@@ -91,12 +91,6 @@ def test_the_contacts_of_the_arm_are_found_in_the_torques_of_two_joints():
     assert {joint for _, joint in alarms} == {"shoulder_pan", "elbow"}
     outside = [time for time, _ in alarms if not any(start - 0.02 <= time <= end for start, end in CONTACTS)]
     assert outside == pytest.approx([4.208], abs=0.02)
-
-
-def test_a_missing_inertia_is_reported_by_the_detector_that_needs_it():
-    log = UR10E_LOGS / "link4.csv.gz"
-    done = run("detect", log, "-m", EXAMPLES / "ur10e.toml", "-d", "gm", "--set=threshold.limits=30")
-    assert done.status == 2 and "load_inertia" in done.err
 
 
 @needs_data("ur_collisions/onsets.csv")

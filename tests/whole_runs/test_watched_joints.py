@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import cdtool as api
-from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.base.errors import UsageError
 from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.detectors import DETECTORS
 from tests.command import cdtool
@@ -67,37 +67,6 @@ def test_a_robot_signature_monitors_every_joint_on_both_sides_by_default(forearm
     learn(forearm, tmp_path / "all.json")
     stored = json.loads((tmp_path / "all.json").read_text())["current"][0]
     assert stored["joints"] == ["arm", "forearm"] and stored["sides"] == "two"
-
-
-def test_limits_set_by_hand_monitor_the_chosen_joints(forearm):
-    machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
-    found = api.detect(log, machine, detector="gm", settings={"threshold.limits": 0.6, "joints": "forearm"})
-    assert found.joints == ("forearm",) and found.detections[0].statistic.values.shape[1] == 1
-    both = api.detect(log, machine, detector="gm", settings={"threshold.limits": [3.9, 0.6]})
-    assert both.joints == ("arm", "forearm")
-    with pytest.raises(ConfigurationError, match="did you mean forearm"):
-        api.detect(log, machine, detector="gm", settings={"threshold.limits": 0.6, "joints": "forarm"})
-
-
-def test_a_joint_that_the_machine_does_not_have_is_refused_by_name(forearm, tmp_path):
-    text = (forearm / "benchmark.toml").read_text().replace('joints = ["forearm"]', 'joints = ["wrist"]')
-    (forearm / "wrong.toml").write_text(text)
-    with pytest.raises(ConfigurationError, match=r"joints: contains 'wrist'"):
-        api.benchmark(forearm / "wrong.toml")
-    free = sorted((forearm / "free").iterdir())
-    command = ("learn-signature", *free, "-m", forearm / "machine.toml", "-d", "gm", "-o", tmp_path / "s.json")
-    done = cdtool(*command, "--set=joints=wrist")
-    assert (
-        done.status == 2 and "contains 'wrist', which is not a joint" in done.err and not (tmp_path / "s.json").exists()
-    )
-
-
-def test_an_energy_signal_belongs_to_the_whole_machine(forearm):
-    machine, log = forearm / "machine.toml", forearm / "stiff" / "01.csv"
-    found = api.detect(log, machine, detector="energy", settings={"threshold.limits": 0.01, "joints": "arm"})
-    assert found.joints == ("whole machine",)
-    done = cdtool("detect", log, "-m", machine, "-d", "energy", "--set=threshold.limits=0.01")
-    assert done.status == 0 and "whole machine" in done.out
 
 
 def test_a_benchmark_runs_the_given_detectors_or_all_that_the_logs_allow(forearm, tmp_path):

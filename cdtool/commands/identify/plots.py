@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Inches, as the other figures of a page.
+#: Inches, as the other plots of a page.
 _WIDTH = 9.0
 _MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RED, "0.85"
 

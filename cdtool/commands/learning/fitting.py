@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
 
@@ -148,6 +148,20 @@ def with_left_out(fit: Fit, skipped: Sequence[Skipped]) -> Fit:
             raise
 
     return told
+
+
+def fit_operations(
+    operations: Sequence[Operation],
+    machine: Machine,
+    detector: Any,
+    rule: Threshold,
+    unread: Sequence[Skipped] = (),
+    watched: Sequence[str] = (),
+) -> Fitted:
+    """Learn the rule from impact-free operations of a machine with a detector; raises SignatureError."""
+    pairs, skipped = signals_of(operations, machine, detector, watched, unread)
+    fitted = fitting(for_machine(rule, machine))(pairs)
+    return replace(fitted, skipped=(*skipped, *fitted.skipped))
 
 
 def for_machine(rule: Threshold, machine: Machine) -> Threshold:

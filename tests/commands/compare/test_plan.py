@@ -38,37 +38,21 @@ def source(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "amounts"),
     [
-        (
-            ("--missed-at-most", "5%"),
-            "to show that at most 5 % are missed: 59 impacts without a miss; 93 with one miss allowed",
-        ),
-        (
-            ("--false-alarms-at-most", "1/1000op"),
-            "a budget of 1/1000op false alarms: to set a safety factor for it, 999 impact-free operations to learn "
-            "from; to show that it is met, 2996 others without a false alarm; 4744 with one false alarm allowed",
-        ),
-        (
-            ("--false-alarms-at-most", "0.1/h"),
-            "a budget of 1/10h false alarms: to set a safety factor for it, 10 impact-free hours to learn from; "
-            "to show that it is met, 30 others without a false alarm; 47.5 with one false alarm allowed",
-        ),
-        (
-            ("--difference-ms", "5", "--std-ms", "8"),
-            "to detect a difference of 5 ms with 80 % power (standard deviation of the differences 8 ms): 23 impacts, "
-            "each scored for both",
-        ),
-        (
-            ("--difference-ms", "5", "--std-ms", "8", "--unpaired", "--power", "0.9"),
-            "to detect a difference of 5 ms with 90 % power (standard deviation within a set 8 ms): 55 impacts in "
-            "each of two sets",
-        ),
+        (("--missed-at-most", "5%"), [59, 93]),
+        (("--false-alarms-at-most", "1/1000op"), [999, 2996, 4744]),
+        (("--false-alarms-at-most", "0.1/h"), [10, 30, 47.5]),
+        (("--difference-ms", "5", "--std-ms", "8"), [23]),
+        (("--difference-ms", "5", "--std-ms", "8", "--unpaired", "--power", "0.9"), [55]),
     ],
 )
-def test_each_question_is_answered_in_one_sentence(arguments, words):
+def test_each_question_is_answered_in_one_sentence_with_its_amounts(arguments, amounts):
     done = cdtool("plan", *arguments)
-    assert (done.status, done.out, done.err) == (0, f"{words}\n", "")
+    assert (done.status, done.out.count("\n"), done.err) == (0, 1, "")
+    (answer,) = json.loads(cdtool("plan", *arguments, "--json").out)["answers"]
+    assert [need["amount"] for need in answer["needs"]] == pytest.approx(amounts, rel=1e-2)
+    assert all(f"{amount:g}" in done.out for amount in amounts) and answer["words"] == done.out.rstrip()
 
 
 def test_the_amounts_are_never_too_small():
@@ -120,20 +104,14 @@ def test_contacts_of_one_campaign_count_as_one():
         ((), "there is no question (give --difference-ms 5 --std-ms 8, --missed-at-most 5% or --false-alarms-at-most"),
         (("--difference-ms", 5), "a difference of 5 ms without a standard deviation"),
         (("--difference-ms", 0, "--std-ms", 8), "difference is 0"),
-        (("--difference-ms", 5, "--std-ms", 8, "--power", 1), "power is 1"),
         (("--difference-ms", 5, "--std-ms", 8, "--level", 0), "significance level is 0"),
         (("--std-ms", 8), "--std-ms has no effect (use it with --difference-ms)"),
         (("--missed-at-most", "5%", "--unpaired"), "--unpaired has no effect"),
         (("--missed-at-most", "5%", "--group", "stiff"), "--group has no effect (use it with --std-ms results.json)"),
-        (("--missed-at-most", "5%", "--detectors", "gm"), "--detectors has no effect"),
-        (("--missed-at-most", "5%", "--std-ms", "r.json"), "--std-ms has no effect"),
         (("--missed-at-most", "5"), "missed share is '5' (give 5% or 0.05"),
-        (("--missed-at-most", "five"), "missed share is 'five'"),
-        (("--missed-at-most", "5%x"), "missed share is '5%x'"),
         (("--false-alarms-at-most", "often"), "false-alarm budget is 'often'"),
         (("--difference-ms", 5, "--std-ms", "absent.json"), "absent.json: no such file"),
         (("--difference-ms", 5, "--std-ms", "results.json"), "0 detectors are given (give two detectors of momentum"),
-        (("--difference-ms", 5, "--std-ms", "results.json", "--detectors", "gm"), "1 detectors are given"),
         (("--difference-ms", 5, "--std-ms", "results.json", "--detectors", "gm,momentum"), "1 detectors are given"),
         (
             ("--difference-ms", 5, "--std-ms", "results.json", "--detectors", "gm,ptt"),

@@ -47,18 +47,17 @@ def test_on_other_contacts_the_probability_is_that_of_one_division_in_all(n_old,
     assert question.complete_change_p == pytest.approx(1.0 / divisions, rel=1e-12) and question.outcome == "worse"
 
 
-def test_on_other_contacts_two_against_two_are_too_few_to_call_it_complete():
-    question = asked(compare(single(latencies(2)), single([MISSED] * 2, **OTHERS)), "missed")
-    assert math.isnan(question.complete_change_p) and question.outcome == "inconclusive"
-
-
-def test_a_detector_that_detected_hardly_anything_has_no_complete_change():
-    question = asked(compare(single([40.0, *[MISSED] * 9]), single([MISSED] * 10)), "missed")
-    assert math.isnan(question.complete_change_p) and question.outcome == "inconclusive"
-
-
-def test_one_contact_that_is_still_detected_is_no_complete_change():
-    question = asked(compare(single(latencies(4)), single([40.0, *[MISSED] * 3])), "missed")
+@pytest.mark.parametrize(
+    ("old", "new", "others"),
+    [
+        (latencies(2), [MISSED] * 2, OTHERS),
+        ([40.0, *[MISSED] * 9], [MISSED] * 10, {}),
+        (latencies(4), [40.0, *[MISSED] * 3], {}),
+    ],
+    ids=["two against two others", "hardly anything was detected", "one is still detected"],
+)
+def test_what_is_no_complete_change_is_inconclusive(old, new, others):
+    question = asked(compare(single(old), single(new, **others)), "missed")
     assert math.isnan(question.complete_change_p) and question.outcome == "inconclusive"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import Outcome, cdtool, keys
+from tests.command import Outcome, cdtool
 
 HEADER = "t,i_motor,n_motor,phi,acc_x,load_cell,n_ref,i_ref"
 
@@ -62,19 +62,6 @@ def test_a_bad_file_is_one_line_with_its_name_and_a_next_step(detect, tmp_path, 
     assert done.err.rstrip().endswith(")"), done.err  # the next step is in brackets
 
 
-def test_other_files_are_processed_and_the_last_line_counts_those_left_out(detect, tmp_path, gate_folder):
-    bad = written(tmp_path / "bad.csv", "")
-    done = detect(bad, gate_folder / "stiff" / "01.csv", tmp_path / "none.csv")
-    assert done.status == 3
-    assert "alarm" in done.out
-    assert "bad.csv" in done.err and "none.csv" in done.err and "2 items were left out" in done.err
-
-
-def test_a_folder_instead_of_a_file_is_named(detect, gate_folder):
-    done = detect(gate_folder)
-    assert done.status == 2 and "folder" in done.err
-
-
 def test_backward_and_repeated_time_is_reported_and_the_rest_used(detect, tmp_path, good, gate_folder):
     lines = [*good[:3001], good[2500], *good[3001:4001], good[4000], *good[4001:]]
     path = written(tmp_path / "time.csv", "\n".join(lines) + "\n")
@@ -83,42 +70,6 @@ def test_backward_and_repeated_time_is_reported_and_the_rest_used(detect, tmp_pa
     assert "3002" in told
     done = detect(path)
     assert done.status == 0 and "alarm" in done.out
-
-
-def test_missing_values_are_reported_and_the_detector_continues(detect, tmp_path, good, gate_folder):
-    lines = list(good)
-    for k in range(1000, 7000, 20):
-        cells = lines[k].split(",")
-        cells[2] = "nan" if k % 40 else ""
-        lines[k] = ",".join(cells)
-    path = written(tmp_path / "nan.csv", "\n".join(lines) + "\n")
-    assert "300 of 7200 values are missing" in cdtool("info", path, "-m", gate_folder / "machine.toml").out
-    done = detect(path)
-    assert done.status == 0 and "alarm" in done.out
-
-
-def test_a_channel_without_values_is_not_assessable(detect, tmp_path, good):
-    lines = [good[0], *(",".join([*line.split(",")[:4], "nan", *line.split(",")[5:]]) for line in good[1:])]
-    done = detect(written(tmp_path / "blind.csv", "\n".join(lines) + "\n"))
-    assert done.status == 3 and "not assessable" in done.out and "missing samples" in done.out
-
-
-def test_an_incomplete_last_line_is_dropped_and_reported(detect, tmp_path, good, gate_folder):
-    path = written(tmp_path / "half.csv", "\n".join(good)[:-20])
-    told = cdtool("info", path, "-m", gate_folder / "machine.toml")
-    assert told.status == 3 and "loss: the last line" in told.out
-    done = detect(path)
-    assert done.status == 3 and "alarm" in done.out and "last line" in done.err
-
-
-def test_a_truncated_mcap_file_is_read_up_to_the_cut_with_status_3(detect, tmp_path):
-    arguments = ("simulate", "gate", *keys(free=0, holdout=0, stiff=1, soft=0), "--seed", 5)
-    assert cdtool(*arguments, *keys(format="mcap"), "-o", tmp_path / "m").status == 0
-    whole = (tmp_path / "m" / "stiff" / "01.mcap").read_bytes()
-    path = written(tmp_path / "cut.mcap", whole[: int(0.95 * len(whole))])
-    done = detect(path)
-    assert done.status == 3
-    assert "alarm" in done.out and "damaged at byte" in done.err and "only the part before it was read" in done.err
 
 
 def test_an_unknown_unit_in_the_machine_file_lists_the_known_ones(gate_folder, tmp_path):

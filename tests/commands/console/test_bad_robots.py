@@ -58,9 +58,30 @@ def test_the_unchanged_robot_runs_without_its_meshes(log, tmp_path):
     assert done.status == 0 and "no alarm" in done.out
 
 
-def test_a_joint_missing_from_the_urdf_is_named_with_the_nearest(log, tmp_path):
-    told = refused(log, described(tmp_path, joints=("pan", "lift", "elbo", "reach", "wrist", "tool")))
-    assert "'elbo'" in told and "did you mean elbow" in told and "joint_map" in told
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            {"joints": ("pan", "lift", "elbo", "reach", "wrist", "tool")},
+            ("'elbo'", "did you mean elbow", "joint_map"),
+        ),
+        ({"torque": '"f0", "f1", "f2"'}, ("channels.torque.columns: names 3 columns (give 6: one per joint)",)),
+        ({"urdf": six_joint_urdf().replace('<mass value="4.0"/>', '<mass value="-4.0"/>')}, ("link3", "mass")),
+        ({"urdf": "<robot name='x'><link"}, ("six.urdf",)),
+        ({"more": "drive_inertias = 1.0\n"}, ("did you mean drive_inertia",)),
+        ({"more": 'joint_map = { shoulder = "pan" }\n'}, ("machine.joint_map.shoulder: is not a joint of the log",)),
+    ],
+    ids=["joint", "columns", "mass", "broken XML", "key", "joint_map"],
+)
+def test_what_is_wrong_is_named_with_its_place(log, tmp_path, change, words):
+    told = refused(log, described(tmp_path, **change))
+    assert all(word in told for word in words), told
+
+
+def test_an_absent_urdf_is_named(log, tmp_path):
+    machine = described(tmp_path)
+    (tmp_path / "six.urdf").unlink()
+    assert "six.urdf" in refused(log, machine)
 
 
 def test_joints_of_the_urdf_that_are_not_logged_must_be_locked(log, tmp_path):
@@ -71,29 +92,6 @@ def test_joints_of_the_urdf_that_are_not_logged_must_be_locked(log, tmp_path):
     path.write_text(text)
     told = refused(log, path)
     assert "tool" in told and "locked" in told
-
-
-def test_a_wrong_number_of_columns_names_the_key(log, tmp_path):
-    told = refused(log, described(tmp_path, torque='"f0", "f1", "f2"'))
-    assert "channels.torque.columns: names 3 columns (give 6: one per joint)" in told
-
-
-def test_a_negative_mass_names_the_link(log, tmp_path):
-    told = refused(log, described(tmp_path, six_joint_urdf().replace('<mass value="4.0"/>', '<mass value="-4.0"/>')))
-    assert "link3" in told and "mass" in told
-
-
-def test_an_invalid_urdf_is_reported_with_its_file(log, tmp_path):
-    assert "six.urdf" in refused(log, described(tmp_path, "<robot name='x'><link"))
-    machine = described(tmp_path)
-    (tmp_path / "six.urdf").unlink()
-    assert "six.urdf" in refused(log, machine)
-
-
-def test_an_unknown_key_and_a_name_that_no_joint_has_are_named(log, tmp_path):
-    assert "did you mean drive_inertia" in refused(log, described(tmp_path, more="drive_inertias = 1.0\n"))
-    told = refused(log, described(tmp_path, more='joint_map = { shoulder = "pan" }\n'))
-    assert "machine.joint_map.shoulder: is not a joint of the log" in told
 
 
 def states(folder: Path, names: tuple[str, ...], order: list[int]) -> Path:

@@ -8,7 +8,6 @@ import pytest
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.report.model import onset_words
 from tests.command import cdtool
 
 PROFILE = '[force]\nprofile = "en_12453_reducing_gap"\n'
@@ -49,37 +48,12 @@ def test_a_label_may_be_about_a_log_that_is_learned_from_by_its_whole_path(read)
     assert labels is not None and labels.name_of("free/01.csv") == "free/01.csv"
 
 
-def test_the_onset_rule_of_a_report_names_the_label_file(read):
-    labelled = read(LEARN, STIFF, ONSET, labels="02.csv,5.0,5.2\n").scoring
-    assert onset_words(labelled) == f"{onset_words(read(LEARN, STIFF).scoring)}; label file labels.csv"
-
-
 def test_a_label_outside_the_recording_is_left_out_with_its_line(read):
     read(LEARN, STIFF, ONSET, labels="stiff/01.csv,1.0,1.2\nstiff/02.csv,999.0,999.5\n")
     (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")
     done = cdtool("score", read.folder / "triggers.csv", "-b", read.folder / "b.toml")
     assert done.status == 3 and "labels.csv line 3: the contact begins at 999 s" in done.err
     assert "onset:" in done.out and "label file labels.csv" in done.out
-
-
-def test_the_first_reason_is_whole_and_its_next_step_the_only_one(read):
-    read(LEARN, STIFF, ONSET, labels="stiff/01.csv,1764394765.253,\nstiff/02.csv,1764394795.253,\n")
-    (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")
-    done = cdtool("score", read.folder / "triggers.csv", "-b", read.folder / "b.toml")
-    (line,) = done.err.splitlines()
-    assert done.status == 2 and "no recording could be scored; first reason: stiff/01.csv: " in line
-    assert "labels.csv line 2: the contact begins at 1764394765 s, outside 0.000 to " in line
-    assert line.endswith(
-        " s on the recording's clock (give seconds on the recording's own clock, as cdtool shows them)"
-    )
-
-
-def test_a_recording_labelled_without_a_contact_gets_a_hint_where_to_add_one(read):
-    read(LEARN, STIFF, ONSET, labels="stiff/01.csv,,\nstiff/02.csv,5.0,5.2\n")
-    (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")
-    done = cdtool("score", read.folder / "triggers.csv", "-b", read.folder / "b.toml")
-    (line,) = [line for line in done.err.splitlines() if "no contact found" in line]
-    assert "labels.csv line 2 does not list one" in line and "start_s" in line and "above_n" not in line
 
 
 @pytest.mark.parametrize("table", ["points", "campaigns"])

@@ -1,9 +1,10 @@
-"""Colours in the terminal: what is missed, violated or a false alarm; never where the environment says no."""
+"""Results on screen: colours where the environment wants them, and the table of a benchmark."""
 
 from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import pytest
@@ -11,9 +12,11 @@ import pytest
 from cdtool.commands.console.colour import Toned, shows_colour
 from cdtool.commands.console.console import say, table
 from cdtool.commands.console.summary_table import show_conclusion, show_table
+from cdtool.results.evaluated import evaluate
+from cdtool.results.results import ContactResult, ExposureResult, Results
 from tests.report.html.html_case import case
 
-RED, YELLOW = "\x1b[31m", "\x1b[33m"
+RED = "\x1b[31m"
 
 
 @pytest.fixture
@@ -82,20 +85,38 @@ def test_colours_repeat_what_the_words_say(terminal, capsys, monkeypatch):
     assert coloured == re.sub(r"\x1b\[[0-9;]*m", "", printed())
 
 
-@pytest.mark.parametrize("columns", [60, 80])
-def test_detectors_have_short_names_where_the_table_is_too_wide(terminal, capsys, columns):
-    terminal(columns)
-    names = {"inertial_momentum_observer_of_all": "igm", "friction_ekf": "feekf"}
-    evaluated, _ = case(
-        lambda name: {"quick": "inertial_momentum_observer_of_all", "slow": "friction_ekf"}.get(name, name)
-    )
-    provenance = {**evaluated.results.provenance, "short_names": names}
-    show_table(replace(evaluated, results=replace(evaluated.results, provenance=provenance)))
-    lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
-    assert max(map(len, lines)) <= columns
-    assert any(line.split()[:2] == ["stiff", "igm"] for line in lines)
-    assert "igm: inertial_momentum_observer_of_all; feekf: friction_ekf" in " ".join(" ".join(lines).split())
-    terminal(200)
-    show_table(replace(evaluated, results=replace(evaluated.results, provenance=provenance)))
-    out = capsys.readouterr().out
-    assert "igm" not in out and "inertial_momentum_observer_of_all" in out
+def shown(capsys: pytest.CaptureFixture[str], latencies: Mapping[str, Sequence[float | None]]) -> list[str]:
+    base = ContactResult("", "stiff", "", "gate", 5.0, 0.001, 5.0, None, "missed", None, None, watched_ms=1000.0)
+    rows = [
+        replace(
+            base, recording=f"{i}.csv", detector=name, latency_ms=late, outcome="missed" if late is None else "detected"
+        )
+        for name, values in latencies.items()
+        for i, late in enumerate(values)
+    ]
+    exposure = tuple(ExposureResult("stiff", name, 4, 4, 0.5) for name in latencies)
+    show_table(evaluate(Results({"onset": "x"}, tuple(latencies), ("stiff",), tuple(rows), (), exposure)))
+    return [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_four_contacts_show_median_and_range_and_no_mean(capsys):
+    lines = shown(capsys, {"momentum": [25.0, 27.0, 28.0, 28.5]})
+    assert "stiff momentum 27.5 25 to 28.5 4 0 0 0 4" in lines
+    assert not any("mean ms" in line or "P95 ms" in line for line in lines[:2])
+    assert any(line.startswith("Fewer than 10 contacts detected: median and range") for line in lines)
+
+
+def test_a_missed_contact_counts_as_later_than_the_range(capsys):
+    lines = shown(capsys, {"momentum": [25.0, 27.0, 28.0, None], "direct": [None, None]})
+    assert "stiff momentum 27.5 25 to not reached 3 1 0 0 4" in lines
+    assert "stiff direct not reached not reached 0 2 0 0 4" in lines
+
+
+def test_ten_contacts_show_the_mean_with_its_interval_next_to_a_small_group(capsys):
+    lines = shown(capsys, {"momentum": [25.0 + i for i in range(10)], "direct": [25.0, 27.0]})
+    many = next(line for line in lines if line.startswith("stiff momentum"))
+    assert many.startswith("stiff momentum 29.5 (") and "25 to 34" in many
+    assert "stiff direct - - 26 25 to 27 - 2 0 0 0 4" in lines
+    alone = shown(capsys, {"momentum": [25.0 + i for i in range(10)]})
+    assert not any("range" in line and "ms" in line for line in alone[:2])
+    assert not any(line.startswith("Fewer than 10") for line in alone)

@@ -38,17 +38,6 @@ def test_a_shell_completes_commands_options_and_values():
         assert done.stdout.split() == [expected]
 
 
-@pytest.mark.parametrize("command", ["detect", "explain", "learn-signature"])
-def test_detectors_are_completed_by_name_and_short_name(command):
-    assert completed(command, "--detectors", "f") == ["friction_ekf", "feekf"]
-    assert set(completed(command, "-d", "p")) == {"pure_torque", "pure_inertia", "pt", "pi"}
-
-
-def test_a_list_of_detectors_is_completed_at_its_last_name():
-    assert completed("benchmark", "--detectors", "gm,k") == ["gm,kalman_momentum", "gm,kmo"]
-    assert completions.detector_list("gm,g") == [], "each once"
-
-
 def test_every_registered_name_is_a_completion():
     assert completions.detectors("") == [*DETECTORS.names(), *DETECTORS.short_names]
     assert completions.thresholds("") == THRESHOLDS.names()

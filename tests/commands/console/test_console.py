@@ -1,16 +1,17 @@
-"""Common terminal output of the commands: lines that fit, and a message for Ctrl-C."""
+"""What every command says: a line for Ctrl-C and missing memory, whole reasons, and no warnings of libraries."""
 
 from __future__ import annotations
 
 import gzip
+import warnings
 from unittest import mock
 
+import numpy as np
 import pytest
 
-from cdtool.base.errors import UsageError, nearest
+from cdtool.commands.app import _show_note
 from cdtool.commands.console import console
 from cdtool.results.results import Skipped
-from cdtool.truth.force.limits import read_force_limits
 from tests.command import cdtool
 
 
@@ -20,6 +21,12 @@ def test_ctrl_c_exits_with_130_and_one_line(gate_folder, place):
     with mock.patch(place, side_effect=KeyboardInterrupt):
         done = cdtool("detect", log, "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
     assert (done.status, done.out, done.err) == (130, "", "interrupted\n")
+
+
+def test_missing_memory_is_one_line(gate_folder):
+    with mock.patch("cdtool.commands.detecting.prepared.prepared", side_effect=MemoryError):
+        done = cdtool("detect", gate_folder / "stiff" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "gm")
+    assert done.status == 2 and done.err.startswith("error: not enough memory (") and done.err.count("\n") == 1
 
 
 @pytest.mark.parametrize("folder", ["logs", "a/very/long/folder" * 20])
@@ -52,11 +59,19 @@ def test_a_packed_log_or_a_workbook_gets_a_hint_how_to_convert_it(gate_folder, t
     assert done.status == 2 and step in done.err
 
 
-def test_a_long_list_of_known_names_is_cut_between_names(capsys):
-    known = read_force_limits()
-    console.print_error(UsageError("a" * 200, nearest("yard", known)))
-    line = capsys.readouterr().err.strip()
-    listed, _, more = line.partition("known: ")[2].removesuffix(")").partition(" and ")
-    shown = listed.split(", ")
-    assert len(line) <= 300 and set(shown) < set(known) and len(shown) >= 2
-    assert more == f"{len(known) - len(shown)} more"
+@pytest.fixture
+def shown(capsys, monkeypatch):
+    monkeypatch.setattr(warnings, "showwarning", _show_note)
+    return lambda: capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("always")
+def test_a_warning_of_numpy_is_not_shown(shown):
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        warnings.showwarning = _show_note
+        assert np.isnan(np.float64(0.0) / np.float64(0.0))
+        warnings.warn("old name", DeprecationWarning, stacklevel=1)
+        assert shown() == ""
+        warnings.warn("kernels are recompiled", stacklevel=1)
+        assert shown() == "note: kernels are recompiled\n"

@@ -1,13 +1,15 @@
-"""A partly lost log is not left out: its intact part is used, and it is reported as damaged."""
+"""A partly lost log is used and reported as damaged; a left-out log is counted once, with its reason."""
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.command import cdtool
+from tests.commands.console.changed_logs import damaged
 
 
 @pytest.fixture
@@ -22,13 +24,6 @@ def cut(gate_folder: Path, tmp_path: Path):
         return tmp_path / name
 
     return make
-
-
-def test_detect_reports_a_truncated_log_as_damaged_and_used(cut, gate_folder):
-    done = cdtool("detect", cut(1e9), "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400")
-    assert done.status == 3 and " alarm " in done.out
-    assert "loss: " in done.err and "cut.csv: the last line" in done.err
-    assert "left out" not in done.err and done.err.endswith("done, but 1 log is damaged\n")
 
 
 def test_left_out_and_damaged_logs_are_counted_separately(cut, gate_folder, tmp_path):
@@ -56,13 +51,6 @@ def test_an_alarm_after_the_load_cell_s_last_sample_has_a_reason_for_no_latency(
     setup = benchmark_of(tmp_path, gate_folder, "short.csv")
     (line,) = [line for line in cdtool("benchmark", setup).err.splitlines() if "short.csv" in line]
     assert f"the load cell ends at {last:.3f} s, the log at " in line and "holdout" not in line
-
-
-def test_a_false_alarm_is_shown_with_no_contact(gate_folder):
-    log, machine = gate_folder / "holdout" / "01.csv", gate_folder / "machine.toml"
-    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--set=threshold.limits=20")
-    rows = [line.rstrip() for line in done.out.splitlines() if " alarm " in line]
-    assert rows and all(row.endswith("-  no contact") for row in rows)
 
 
 def test_a_benchmark_does_not_advise_to_move_a_cut_impact_log_to_the_hold_out(cut, gate_folder, tmp_path):
@@ -99,3 +87,54 @@ def benchmark_of(tmp_path: Path, gate_folder: Path, log: str) -> Path:
         encoding="utf-8",
     )
     return tmp_path / "benchmark.toml"
+
+
+def test_a_benchmark_names_each_run_that_is_left_out_once(gate_folder, tmp_path):
+    free = gate_folder / "free"
+    (tmp_path / "twin.csv").write_bytes((free / "01.csv").read_bytes())
+    speeds = [line.split(",")[2] for line in (free / "02.csv").read_text(encoding="utf-8").splitlines()[1:]]
+    cells = {("n_motor", row): f"{1.4 * float(speed):.3f}" for row, speed in enumerate(speeds)}
+    fast = damaged(free / "02.csv", tmp_path / "fast.csv", cells)
+    text = (
+        (gate_folder / "benchmark.toml")
+        .read_text(encoding="utf-8")
+        .replace("machine.toml", f"{gate_folder}/machine.toml")
+    )
+    for group in ("free", "holdout", "stiff", "soft"):
+        text = text.replace(f'["{group}/*.csv"]', f'["{gate_folder}/{group}/*.csv"]')
+    logs = f'["{free}/*.csv", "{tmp_path}/twin.csv", "{fast}"]'
+    text = text.replace(f'["{free}/*.csv"]', logs)
+    (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
+    target = tmp_path / "results.json"
+    done = cdtool("benchmark", tmp_path / "benchmark.toml", "--detectors", "pi,gm,pt", "-o", target)
+    assert done.status == 3 and done.err.endswith("done, but 2 items were left out\n")
+    reasons = [(item["recording"], item["reason"]) for item in json.loads(target.read_text())["skipped"]]
+    assert [name for name, _ in reasons] == ["twin.csv", "fast.csv"]
+    assert "has the same content as" in reasons[0][1] and "runs forward at" in reasons[1][1]
+
+
+def test_a_file_named_twice_is_not_reported_as_a_copy(gate_folder, tmp_path):
+    free = sorted((gate_folder / "free").glob("*.csv"))
+    again = free[0].parent / ".." / "free" / free[0].name
+    machine = ("-m", gate_folder / "machine.toml")
+    signature = tmp_path / "pi.json"
+    done = cdtool("learn-signature", *free, free[0], again, *machine, "-d", "pi", "-o", signature)
+    assert done.status == 3 and "same content" not in done.err
+    assert f"left out: {free[0].as_posix()}: given more than once, used once" in done.err
+    new = gate_folder / "holdout" / "01.csv"
+    done = cdtool("signature", "update", signature, new, new, *machine)
+    assert "1 run added" in done.out and "already in the signature" not in done.err
+    assert "given more than once, used once" in done.err
+    done = cdtool("signature", "update", signature, new, *machine)
+    assert "this run is already in the signature" in done.err
+
+
+def test_too_few_runs_count_those_left_out_before(gate_folder, tmp_path):
+    source = (gate_folder / "free" / "01.csv").read_bytes()
+    copies = [tmp_path / f"copy_{number}.csv" for number in range(10)]
+    for copy in copies:
+        copy.write_bytes(source)
+    machine = ("-m", gate_folder / "machine.toml")
+    done = cdtool("learn-signature", *copies, *machine, "-d", "pi", "-o", tmp_path / "pi.json")
+    assert done.status == 2 and "1 impact-free run of one class" in done.err
+    assert "left out before: 9 runs (add runs; " in done.err and "used once" in done.err

@@ -6,8 +6,6 @@ import gzip
 import json
 import os
 import re
-import resource
-import stat
 import struct
 import subprocess
 import sys
@@ -76,14 +74,6 @@ def written(path: Path, content: str | bytes) -> Path:
     return path
 
 
-def machine_of(folder: Path, **replaced: str) -> Path:
-    text = MACHINE
-    for old, new in replaced.items():
-        assert old in text
-        text = text.replace(old, new)
-    return written(folder / "machine.toml", text)
-
-
 LOG = GATE / "stiff" / "03.csv"
 
 
@@ -113,22 +103,6 @@ TOML_BOMBS = {
 def test_a_toml_bomb_is_refused_in_one_line(refused, tmp_path, name):
     content, words = TOML_BOMBS[name]
     refused("info", LOG, "-m", written(tmp_path / "machine.toml", content), words=words)
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [("benchmark", "{}"), ("study", "sensors", "-m", GATE / "machine.toml", "--study", "{}")],
-    ids=["benchmark file", "study file"],
-)
-def test_every_toml_file_is_loaded_within_the_same_bounds(refused, tmp_path, arguments):
-    path = written(tmp_path / "given.toml", "a = " + "[" * 100_000)
-    refused(*(path if item == "{}" else item for item in arguments), words=("given.toml", "nested too deeply"))
-
-
-@pytest.mark.parametrize("scale", ["7" * 400, "1e400", "nan", "-inf"], ids=["400 digits", "1e400", "nan", "-inf"])
-def test_a_scale_out_of_range_is_reported_with_its_key(refused, tmp_path, scale):
-    machine = machine_of(tmp_path, **{'"g", scale = -1': f'"g", scale = {scale}'})
-    refused("info", LOG, "-m", machine, words=("channels.acceleration.scale",))
 
 
 @pytest.mark.parametrize("key", ["machine", "logs", "limits", "labels"])
@@ -317,14 +291,6 @@ def test_devices_and_pipes_are_refused_before_reading(tmp_path, kind, arguments)
     assert str(path) in done.err
 
 
-@pytest.mark.parametrize("name", ["/dev/zero", "/dev/stdin"])
-def test_a_device_as_urdf_is_refused(refused, tmp_path, name):
-    pytest.importorskip("pinocchio")
-    machine = robot(tmp_path, six_joint_urdf())
-    machine.write_text(machine.read_text().replace("six.urdf", name))
-    refused("info", LOG, "-m", machine, words=(name, "is not a regular file"))
-
-
 def test_devices_named_in_a_benchmark_file_are_refused(refused, tmp_path):
     text = benchmark_text()
     with_labels = text.replace("[onset]", '[onset]\nlabels = "/dev/zero"')
@@ -384,18 +350,6 @@ def test_a_debounce_with_many_digits_is_one_line(value):
     assert "debounce" in done.err and len(done.err) <= LONGEST_LINE + 1 and "Traceback" not in done.err
 
 
-def test_an_unknown_option_and_a_missing_argument_are_one_line_with_the_help_that_explains():
-    cases = (
-        (("detect", "--nope"), "--nope", "--help)"),
-        (("compare",), "OLD", "--help)"),
-        (("benchmar",), "benchmar", "did you mean benchmark"),
-    )
-    for arguments, word, next_step in cases:
-        done = cdtool(*arguments)
-        assert done.status == 2 and done.out == "" and done.err.count("\n") == 1, done.err
-        assert done.err.startswith("error: ") and word in done.err and next_step in done.err
-
-
 def test_names_that_are_no_utf_8_are_shown_and_refused_in_one_line(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", "from cdtool.commands.app import main; main()", "info", b"/tmp/\xff\xfe\x1b[2J.csv"],
@@ -414,14 +368,6 @@ def test_an_error_line_is_cut_at_300_characters_and_the_cut_is_marked(tmp_path):
     assert done.status == 2 and done.err.count("\n") == 1
     assert len(done.err) == LONGEST_LINE + 1 and "…" in done.err and "\x1b" not in done.err
     assert "no column" in done.err and "known: " in done.err  # names the problem and the next step
-
-
-def test_left_out_lines_are_cut_as_well(tmp_path):
-    logs = [written(tmp_path / f"{'n' * 200}{i}.csv", "") for i in range(2)]
-    arguments = ("-m", GATE / "machine.toml", "-d", "gm", "--set=threshold.limits=40")
-    done = cdtool("detect", LOG, *logs, *arguments)
-    assert done.status == 3
-    assert all(len(line) <= LONGEST_LINE for line in done.err.splitlines()), done.err
 
 
 # --- Standard output
@@ -445,12 +391,9 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
     "arguments",
     [
         "list detectors",
-        "--help",
         "detect --help",
-        f"info {LOG}",
         f"detect {LOG} -m {GATE}/machine.toml -d gm --set threshold.limits=1000",
         f"detect {LOG} -m {GATE}/machine.toml -d gm --set threshold.limits=1000 --json",
-        "plan --difference-ms 5 --std-ms 3",
     ],
 )
 def test_a_closed_pipe_causes_no_traceback_and_keeps_the_status(arguments):
@@ -508,34 +451,3 @@ def test_json_on_a_terminal_without_its_characters_is_the_same_json(tmp_path):
         shell(f"cdtool info '{log}' --json", PYTHONIOENCODING=encoding).stdout for encoding in ("utf-8", "ascii")
     )
     assert narrow.isascii() and json.loads(narrow) == json.loads(plain) and "☃" in plain
-
-
-def test_missing_memory_is_one_line(tmp_path):
-    def limited() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (1_200 * 2**20,) * 2)
-
-    log = tmp_path / "a.csv"
-    with log.open("w") as file:
-        file.write("t,a,b,c,d\n")
-        for block in range(40):
-            file.write("".join(f"{block * 50_000 + i},1.5,2.5,3.5,4.5\n" for i in range(50_000)))
-    code = "from cdtool.commands.app import main; main()"
-    machine = (
-        '[machine]\ntype = "linear_axis"\nname = "a"\nmotor_inertia = 1.0\nload_mass = 1.0\ntransmission_ratio = 1.0\n'
-    )
-    columns = "".join(
-        f'{name} = {{ column = "{key}", unit = "SI" }}\n'
-        for name, key in zip(("torque", "speed", "position"), "abc", strict=True)
-    )
-    path = written(tmp_path / "m.toml", f'{machine}[channels]\ntime = {{ column = "t", unit = "ms" }}\n{columns}')
-    done = subprocess.run(
-        [sys.executable, "-c", code, "detect", str(log), "-m", str(path), "-d", "gm", "--set=threshold.limits=1"],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        preexec_fn=limited,
-        check=False,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
-    )
-    assert "Traceback" not in done.stderr, done.stderr
-    assert stat.S_ISREG(log.stat().st_mode)

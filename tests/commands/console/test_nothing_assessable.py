@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.command import cdtool, keys
+from tests.commands.console.changed_logs import damaged
 
 SAMPLES = Path(__file__).parents[3] / "sample_logs" / "gate"
 COLUMNS = ["t", "i_motor", "n_motor", "phi", "acc_x", "load_cell"]
@@ -104,19 +105,58 @@ def test_an_alarm_after_the_cut_at_a_rebound_is_scored_and_explained(rebounding)
     assert "of a contact in another operation" in explained.out and "false alarm at" not in explained.out
 
 
-def test_strokes_at_creep_speed_are_a_note_where_faster_ones_are_learned(tmp_path):
-    """The friction EKF is not applicable to half of them, and the others are too few to learn from."""
-    benchmark_of(tmp_path, rows_of("stiff/04.csv"))
-    logs = [tmp_path / f"{number}.csv" for number in range(10)]
-    for number, log in enumerate(logs):
-        rows = rows_of(f"free/{number % 8 + 3:02}.csv")
-        speed = 100.0 if number % 2 else 400.0
-        rows += [[0.0, 1.0 + 1e-3 * number, speed * (2000 < k < 5000), 0.0, 0.0, 0.0] for k in range(6000)]
-        angle = np.cumsum([row[2] for row in rows]) * 0.10472e-3
-        lines = [",".join(f"{v:.9g}" for v in (k, *rows[k][1:3], angle[k], rows[k][4], 0.0)) for k in range(len(rows))]
-        log.write_text("\n".join([",".join(COLUMNS), *lines]) + "\n", encoding="utf-8")
-    options = ("-m", tmp_path / "machine.toml", "-d", "feekf", "--set=operations=motion")
-    learned = cdtool("learn-signature", *logs, *options, "-o", tmp_path / "signature.json")
-    assert learned.status == 0
-    told = "friction_ekf: 5 strokes at creep speed not learned, and not assessed: runs forward at"
-    assert learned.err.count(told) == 2
+MEASURED = re.compile(r"measured forward at ([\d.]+) m/s, learned forward at 0\.20\d* m/s")
+
+
+@pytest.fixture
+def at_speed(gate_folder: Path, tmp_path: Path):
+    """at_speed(factor, rows): an impact-free log with its speed multiplied by a factor in these rows."""
+    log = gate_folder / "holdout" / "01.csv"
+    head, *lines = log.read_text(encoding="utf-8").splitlines()
+    names, columns = head.split(","), list(zip(*(line.split(",") for line in lines), strict=True))
+
+    def make(factor: float, rows: range) -> Path:
+        cells = {
+            (name, row): f"{factor * float(columns[names.index(name)][row]):.3f}"
+            for name in ("n_motor", "n_ref")
+            for row in rows
+        }
+        return damaged(log, tmp_path / "other.csv", cells)
+
+    return make
+
+
+def test_not_assessable_names_the_speed_measured_and_the_classes_learned(at_speed, gate_folder, feekf_signature):
+    log = at_speed(1.4, range(8200))
+    machine = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)
+    (row,) = json.loads(cdtool("detect", log, *machine, "--json").out)
+    assert row["verdict"] == "not_assessable" and row["reason"].startswith("other speed ")
+    found = MEASURED.search(row["reason"])
+    assert found and float(found[1]) == pytest.approx(0.28, abs=0.005)
+    for command in ("detect", "explain"):
+        done = cdtool(command, log, *machine)
+        assert done.status == 3 and MEASURED.search(done.err) and MEASURED.search(" ".join(done.out.split()))
+
+
+@pytest.mark.parametrize("verdict", ["alarm", "no alarm"])
+def test_a_partly_matching_speed_is_named_with_and_without_an_alarm(at_speed, gate_folder, tmp_path, verdict):
+    log = at_speed(0.5, range(4000, 6000))
+    signature = tmp_path / "pi.json"
+    free = sorted((gate_folder / "free").glob("*.csv"))
+    factor = f"--set=signature.safety_factor={0.5 if verdict == 'alarm' else 50}"
+    machine = ("-m", gate_folder / "machine.toml")
+    done = cdtool("learn-signature", *free, *machine, "-d", "pi", factor, "-o", signature)
+    assert done.status == 0, done.err
+    (row,) = json.loads(cdtool("detect", log, *machine, "--signature", signature, "--json").out)
+    assert row["verdict"] == verdict and 0.0 < row["not_judged"]["other speed"] < 0.5
+    found = MEASURED.fullmatch(row["other_speed"])
+    assert found and float(found[1]) == pytest.approx(0.1, abs=0.002)
+    for command in ("detect", "explain"):
+        shown = " ".join(cdtool(command, log, *machine, "--signature", signature).out.split())
+        assert MEASURED.search(shown)
+
+
+def test_a_log_at_the_learned_speed_causes_no_note_on_speeds(gate_folder, feekf_signature):
+    machine = ("-m", gate_folder / "machine.toml", "--signature", feekf_signature)
+    done = cdtool("detect", gate_folder / "stiff" / "01.csv", *machine, "--json")
+    assert json.loads(done.out)[0]["other_speed"] is None

@@ -53,14 +53,6 @@ def test_a_json_link_to_a_recording_is_refused(folder, way):
     assert bytes_of(folder) == before
 
 
-def test_a_signature_replaces_a_signature(folder):
-    output = folder / "gate.json"
-    assert learn(folder, output).status == 0
-    output.write_text(output.read_text(encoding="utf-8").replace("whole", "motion"), encoding="utf-8")
-    assert learn(folder, output).status == 0
-    assert '"operations": "whole"' in output.read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
@@ -183,15 +175,6 @@ def test_force_never_overwrites_an_input(folder):
         done = cdtool("benchmark", folder / "benchmark.toml", "-o", target, "--force")
         assert done.status == 2 and "is read by this command" in done.err
     assert bytes_of(folder) == before
-
-
-def test_a_dead_link_is_refused_before_any_work(folder):
-    (folder / "link.json").symlink_to("nowhere.json")
-    for words in (("benchmark", folder / "benchmark.toml"), ("learn-signature", folder / "free" / "01.csv")):
-        more = ("-m", folder / "machine.toml", "-d", "gm", FEW) if words[0] == "learn-signature" else ()
-        done = cdtool(*words, *more, "-o", folder / "link.json")
-        assert done.status == 2 and "is a link to a missing file" in done.err and done.out == ""
-    assert not (folder / "nowhere.json").exists()
 
 
 def test_dotfiles_are_never_logs(folder):

@@ -50,22 +50,6 @@ def test_a_benchmark_needs_no_runs_to_learn_from_and_ignores_them_for_the_limits
     assert bool(results["provenance"]["learned_runs"]) is False
 
 
-def test_a_budget_needs_runs_even_so(gate_folder):
-    file = gate_folder / "budget.toml"
-    file.write_text(f'false_alarm_budget = "1/10op"\n{BENCHMARK.format(learn="")}', encoding="utf-8")
-    done = cdtool("benchmark", file)
-    assert done.status == 2 and "budget of 1/10op is set on runs (add impact-free logs: [learn] logs)" in one_line(
-        done.err
-    )
-
-
-def test_another_threshold_still_needs_runs(gate_folder):
-    file = gate_folder / "needs.toml"
-    file.write_text(BENCHMARK.format(learn="").replace('name = "baseline", warm_up = 0.8', 'name = "limit"'))
-    done = cdtool("benchmark", file)
-    assert done.status == 2 and "learn" in done.err and "is missing" in done.err
-
-
 def test_detect_and_explain_use_the_first_seconds_with_warm_up(gate_folder):
     log, machine = gate_folder / "stiff" / "01.csv", gate_folder / "machine.toml"
     done = cdtool("detect", log, "-m", machine, "-d", "gm", *own(0.8))
@@ -117,6 +101,19 @@ def test_each_stroke_of_a_log_that_is_cut_has_limits_of_its_own():
     assert Status.OTHER_SPEED not in np.unique(back.statistic.status)
 
 
+@pytest.mark.parametrize("limits", ["15", "[15]"])
+def test_a_limit_set_by_hand_needs_no_runs_to_learn_from(gate_folder, tmp_path, limits):
+    file = gate_folder / "by_hand.toml"
+    text = BENCHMARK.format(learn="").replace('name = "baseline", warm_up = 0.8', f'name = "limit", limits = {limits}')
+    file.write_text(text.replace('["gm", "feekf"]', '["gm"]'), encoding="utf-8")
+    done = cdtool("benchmark", file, "-o", tmp_path / "r.json")
+    assert done.status == 0, done.err
+    rows = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))["contacts"]
+    assert {(row["outcome"], row["limit"]) for row in rows} == {("detected", -15.0)}
+    done = cdtool("detect", gate_folder / rows[0]["recording"], "--benchmark", file)
+    assert done.status == 0 and "set by hand" in one_line(done.out), done.err
+
+
 def test_a_contact_that_halts_the_axis_is_judged_by_the_limits_of_its_stroke():
     recording, signal = there_and_back()
     time = signal.time
@@ -134,16 +131,3 @@ def test_a_log_that_is_not_cut_keeps_the_limits_of_its_first_seconds_and_monitor
     assert 10.0 <= whole.verdict.alarms[0].time < 10.2, "unknown friction changes sign"
     (both,) = detections("whole", "two")
     assert 9.0 <= both.verdict.alarms[0].time < 9.2, "unknown friction ends with the motion"
-
-
-@pytest.mark.parametrize("limits", ["15", "[15]"])
-def test_a_limit_set_by_hand_needs_no_runs_to_learn_from(gate_folder, tmp_path, limits):
-    file = gate_folder / "by_hand.toml"
-    text = BENCHMARK.format(learn="").replace('name = "baseline", warm_up = 0.8', f'name = "limit", limits = {limits}')
-    file.write_text(text.replace('["gm", "feekf"]', '["gm"]'), encoding="utf-8")
-    done = cdtool("benchmark", file, "-o", tmp_path / "r.json")
-    assert done.status == 0, done.err
-    rows = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))["contacts"]
-    assert {(row["outcome"], row["limit"]) for row in rows} == {("detected", -15.0)}
-    done = cdtool("detect", gate_folder / rows[0]["recording"], "--benchmark", file)
-    assert done.status == 0 and "set by hand" in one_line(done.out), done.err

@@ -1,8 +1,9 @@
-"""Progress of convert, recover and init: only on a terminal."""
+"""Progress bars: only on a terminal, removed at the end, without threads that keep processes from being forked."""
 
 from __future__ import annotations
 
 import sys
+import threading
 from time import sleep
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from cdtool.commands.console.console import progress
 from cdtool.commands.convert.converting import convert
 from cdtool.commands.convert.recovering import recover
+from cdtool.execution.workers import Workers, in_order
 from tests.commands.convert.bags import write_part
 from tests.commands.convert.kinds import table
 
@@ -75,3 +77,12 @@ def test_convert_counts_its_rows_and_recover_its_messages_up_to_all_of_them(tmp_
     part = write_part(tmp_path / "part.mcap", 0.0)
     recover(part, tmp_path / "out.mcap", progress=lambda done, total: steps.append((done, total)))
     assert steps[-1] == (192, 192)
+
+
+def test_the_bar_starts_no_thread_that_would_keep_processes_from_being_forked(monkeypatch):
+    stderr = terminal(monkeypatch)
+    threads = set(threading.enumerate())
+    with progress("benchmark") as advance:
+        assert set(threading.enumerate()) <= threads, "other tests may have left threads, the bar adds none"
+        assert list(in_order(abs, range(6), 6, Workers(2, progress=advance))) == list(range(6))
+    assert "6/6" in stderr.text

@@ -2,55 +2,22 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 import sys
-from importlib import import_module
+from dataclasses import replace
 
 import pytest
-import typer
 
-from cdtool.commands.app import COMMANDS
+from cdtool.commands.console.written_reports import show_results
+from cdtool.report.outputs import write_outputs
+from cdtool.report.plots.folder_figures import FOLDER_FIGURES
+from cdtool.report.writers.base import Report
 from cdtool.results.files.results_file import to_json
 from tests.command import Outcome, cdtool
+from tests.report.html.html_case import case
 from tests.synthetic.builds import build_results
 
-# What these print is what they are asked for: nothing would be left of it.
-ONLY_A_TABLE = {"info", "explain", "list", "plan", "schema", "store", "study", "signature show", "protocol"}
-# These print what they wrote or drafted, and a bar on a terminal.
-ONLY_A_BAR = {"convert", "init", "simulate"}
 _HEADINGS = re.compile(r"^ *(detector|group|recording|stiffness|key|class|run) {2,}\w", re.MULTILINE)
-
-
-def functions() -> dict[str, object]:
-    """Return the function of each command and subcommand by name."""
-    found: dict[str, object] = {}
-    for name, place in COMMANDS.items():
-        module, _, attribute = place.partition(":")
-        command = getattr(import_module(module), attribute)
-        if isinstance(command, typer.Typer):
-            found |= {f"{name} {item.callback.__name__}": item.callback for item in command.registered_commands}
-        else:
-            found[name] = command
-    return found
-
-
-def source_of(function: object) -> str:
-    """Return the text of the module of a command."""
-    return inspect.getsource(sys.modules[inspect.unwrap(function).__module__])  # type: ignore[arg-type, attr-defined]
-
-
-@pytest.mark.parametrize("name", sorted(functions()))
-def test_a_command_that_prints_a_table_can_be_quiet(name):
-    function = functions()[name]
-    can_be_quiet = "quiet" in inspect.signature(function).parameters
-    if name in ONLY_A_BAR:
-        assert not can_be_quiet and "table(" not in source_of(function)
-    elif name in ONLY_A_TABLE or name.split()[0] in ONLY_A_TABLE:
-        assert not can_be_quiet
-        assert "progress(" not in source_of(function) or name.startswith("signature")
-    else:
-        assert can_be_quiet, f"cdtool {name} has no --quiet"
 
 
 def both(*arguments: object) -> tuple[Outcome, Outcome]:
@@ -67,13 +34,6 @@ def test_quiet_compare_prints_the_verdict_and_what_is_worse_without_the_table(tm
     lines = quiet.out.splitlines()
     assert lines[-1] == whole.out.splitlines()[-1] and "worse" in lines[-1]
     assert len(lines) < 0.5 * len(whole.out.splitlines()) and any("slower by" in line for line in lines[:-1])
-
-
-def test_quiet_compare_of_equal_builds_is_one_sentence(tmp_path):
-    old = tmp_path / "old.json"
-    old.write_text(to_json(build_results({("gm", "stiff"): [40.0 + 0.1 * i for i in range(30)]})), encoding="utf-8")
-    quiet = cdtool("compare", old, old, "--quiet")
-    assert quiet.status == 0 and len(quiet.out.splitlines()) <= 2 and not _HEADINGS.search(quiet.out)
 
 
 def test_quiet_detect_counts_verdicts_and_contacts(gate_folder, feekf_signature):
@@ -114,3 +74,31 @@ def test_quiet_leaves_out_the_table_and_draws_no_bar(arguments, gate_folder, fee
     done = cdtool(*given, "--quiet")
     assert done.status in (0, 1), done.err
     assert not any(drawn) and not _HEADINGS.search(done.out)
+
+
+def report() -> Report:
+    """Return a report without forces, whose figures need a complete profile."""
+    evaluated, traces = case()
+    provenance = {key: value for key, value in evaluated.results.provenance.items() if key != "force_profiles"}
+    return Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance, forces=())), traces)
+
+
+def test_progress_counts_every_file_and_figure_up_to_the_last_one(tmp_path):
+    seen: list[tuple[int, int]] = []
+    targets = [tmp_path / "summary.md", tmp_path / "report"]
+    write_outputs(report(), targets, progress=lambda done, total: seen.append((done, total)))
+    total = seen[-1][1]
+    assert seen == [(done, total) for done in range(1, total + 1)]
+    in_folder = {path.name for path in (tmp_path / "report").iterdir() if path.suffix not in (".png", ".gz")}
+    assert total == 1 + len(FOLDER_FIGURES) + len(in_folder)
+
+
+def test_quiet_prints_the_verdict_and_what_is_not_met_only(tmp_path, capsys):
+    evaluated, _ = case()
+    show_results(evaluated, [tmp_path / "report.html"], quiet=True)
+    quiet = capsys.readouterr().out
+    assert " ".join(quiet.split()).startswith(evaluated.results.conclusion.headline) and "limit violated" in quiet
+    show_results(evaluated, [tmp_path / "report.html"], quiet=False, more=["store: 1 recording computed"])
+    whole = capsys.readouterr().out
+    assert whole.startswith(quiet)
+    assert all(part in whole and part not in quiet for part in ("written: ", "store: 1", "latency from contact onset"))

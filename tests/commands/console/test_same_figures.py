@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -178,19 +177,6 @@ def test_what_a_benchmark_file_or_a_signature_has_of_its_own_is_refused(options,
     assert done.status == 2 and done.err.startswith(f"error: {words}"), done.err
 
 
-def test_a_key_takes_the_place_of_that_of_the_file(tmp_path):
-    gate, debounce = SAMPLES / "gate", "--set=activation.debounce=1"
-    rows = {}
-    for options in ((), (debounce,)):
-        done = cdtool("benchmark", gate / "benchmark.toml", "-d", "pi", *options, "--json")
-        found = cdtool("detect", gate / "soft/03.csv", "-b", gate / "benchmark.toml", "-d", "pi", *options, "--json")
-        truth = rows_of(json.loads(done.out)["contacts"])
-        ((key, row),) = rows_of(json.loads(found.out)[0]["contacts"]).items()
-        assert truth["soft/03.csv", key[1]] == row
-        rows[options] = row["latency_ms"]
-    assert rows[(debounce,)] < rows[()]
-
-
 def test_a_detector_is_required_if_the_file_has_several():
     file = SAMPLES / "gate" / "benchmark.toml"
     done = cdtool("explain", SAMPLES / "gate" / "stiff" / "03.csv", "--benchmark", file)
@@ -199,42 +185,3 @@ def test_a_detector_is_required_if_the_file_has_several():
     assert done.status == 2 and "does not name detector 'vo'" in done.err
     done = cdtool("detect", SAMPLES / "gate" / "stiff" / "03.csv", "-d", "pi")
     assert done.status == 2 and "no machine file is given (give --machine FILE or --benchmark FILE)" in done.err
-
-
-def test_a_signature_of_all_joints_fits_a_benchmark_file_without_joints(tmp_path):
-    gate = Path(__file__).parents[3] / "sample_logs" / "gate"
-    logs = sorted((gate / "free").iterdir())
-    made = cdtool("learn-signature", *logs, "-m", gate / "machine.toml", "-d", "feekf", "-o", tmp_path / "s.json")
-    assert made.status == 0, made.err
-    done = cdtool("detect", gate / "stiff" / "03.csv", "-b", gate / "benchmark.toml", "-s", tmp_path / "s.json")
-    assert done.status == 0 and "alarm" in done.out, done.err
-
-
-def test_detect_and_explain_count_the_same_runs_and_name_those_left_out(tmp_path):
-    gate = Path(__file__).parents[3] / "sample_logs" / "gate"
-    shutil.copy(gate / "machine.toml", tmp_path)
-    (tmp_path / "free").mkdir()
-    for i in range(3, 8):
-        shutil.copy(gate / "free" / f"0{i}.csv", tmp_path / "free")
-    # A stray run at half the speed and a copy of another run: neither is learned from.
-    lines = (gate / "free" / "08.csv").read_text(encoding="utf-8").splitlines()
-    rows = [line.split(",") for line in lines]
-    slow = [rows[0], *([str(2 * int(row[0])), row[1], str(0.5 * float(row[2])), *row[3:]] for row in rows[1:])]
-    (tmp_path / "free" / "stray.csv").write_text("\n".join(map(",".join, slow)) + "\n", encoding="utf-8")
-    shutil.copy(gate / "free" / "03.csv", tmp_path / "free" / "twin.csv")
-    file = tmp_path / "benchmark.toml"
-    file.write_text(
-        f'machine = "machine.toml"\ndetectors = ["gm"]\n[learn]\nlogs = ["free/*.csv"]\n[signature]\nforce = true\n'
-        f'[impacts.stiff]\nlogs = ["{gate}/stiff/03.csv"]\n[onset]\nabove_n = 20.0\nback_to_n = 8.0\n',
-        encoding="utf-8",
-    )
-    scored = cdtool("benchmark", file, "-o", tmp_path / "results.json")
-    names = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))["provenance"]["learned_runs"]
-    assert len(names) == 5
-    for command in ("detect", "explain"):
-        done = cdtool(command, gate / "stiff" / "03.csv", "-b", file)
-        words = " ".join(done.out.split())
-        assert f"{'learned from' if command == 'detect' else 'Compared with'} 5 impact-free runs" in words
-        for name in ("free/stray.csv", "free/twin.csv"):
-            assert f"left out: {name}: " in done.err and f"left out: {name}: " in scored.err
-        assert done.status == scored.status == 3

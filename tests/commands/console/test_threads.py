@@ -1,13 +1,16 @@
-"""A command starts no threads of linear algebra: NumPy would start one per core as it is imported."""
+"""What a command starts and imports: one thread, and no pandas where no log is read; both would double its start-up."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests.fuzz.hostile_commands import make_bench
 
 THREADS = Path("/proc/self/task")
 # Count the threads after a command that imports NumPy.
@@ -39,3 +42,38 @@ def test_a_command_runs_in_one_thread_unless_the_environment_says_otherwise():
     assert _threads() == 1
     if len(os.sched_getaffinity(0)) > 1:
         assert _threads(OPENBLAS_NUM_THREADS="2") == 2
+
+
+ROOT = Path(__file__).parents[3]
+# Run commands and print, as JSON, the status of each and whether pandas was imported by then.
+READS_NO_LOG = """
+import json, sys
+from pathlib import Path
+from tests.command import cdtool
+folder = Path(sys.argv[1])
+commands = [
+    ("--help",),
+    ("list", "detectors"),
+    ("plan", "--difference-ms", "5", "--std-ms", "3"),
+    ("protocol", "check", folder / "plan.toml"),
+    ("signature", "show", folder / "gate.json"),
+    ("report", folder / "results.json", "-o", folder / "again.html"),
+    ("compare", folder / "results.json", folder / "other.json", "-o", folder / "compared.md"),
+]
+print(json.dumps([(" ".join(map(str, item[:2])), cdtool(*item).status, "pandas" in sys.modules) for item in commands]))
+"""
+
+
+def test_a_command_that_reads_no_log_imports_no_pandas(tmp_path):
+    make_bench(tmp_path / "bench")
+    done = subprocess.run(
+        [sys.executable, "-c", READS_NO_LOG, str(tmp_path / "bench")],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    ran = json.loads(done.stdout.splitlines()[-1])
+    assert not [name for name, _, imported in ran if imported]
+    assert {name: status for name, status, _ in ran if status not in (0, 1, 3, 4)} == {}

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cdtool as api
-from cdtool.base.errors import SignatureError
 from cdtool.formats.mcap.write import Stream, write_mcap
 from tests.base.findings.facts import fact_of
 from tests.command import FEW, cdtool
@@ -58,22 +56,6 @@ def test_a_signature_is_learned_with_a_note_that_contacts_cannot_be_checked(bare
     assert checked.status == 0 and "3 logs" in checked.err
 
 
-def test_the_rule_of_the_load_cell_is_not_printed_without_one(bare, gate_folder, tmp_path):
-    shutil.copytree(bare, tmp_path, dirs_exist_ok=True)
-    lines = (gate_folder / "machine.toml").read_text(encoding="utf-8").splitlines()
-    machine = tmp_path / "machine.toml"
-    machine.write_text("\n".join(line for line in lines if not line.startswith("force")), encoding="utf-8")
-    (tmp_path / "contacts.csv").write_text(
-        "recording,start_s,end_s,kind,uncertainty_s\nstiff/01.csv,6.0,6.5,,0.001\n", encoding="utf-8"
-    )
-    file = benchmark_of(tmp_path, tmp_path, Path("stiff/01.csv"))
-    with file.open("a", encoding="utf-8") as more:
-        more.write('[onset]\nlabels = "contacts.csv"\n')
-    done = cdtool("benchmark", file)
-    assert "onset: as labelled; label file contacts.csv" in " ".join(done.out.split()), done.err
-    assert "load cell above" not in done.out
-
-
 def test_a_benchmark_learns_from_them_and_counts_false_alarms_in_them(bare, gate_folder):
     found = api.benchmark(benchmark_of(bare, gate_folder, gate_folder / "stiff" / "01.csv"))
     assert not found.results.skipped
@@ -109,23 +91,6 @@ def test_a_misspelt_column_is_reported_with_the_nearest(gate_folder, tmp_path):
         "absent_truth",
         {"what": "column", "name": "loadcell", "similar": CELL},
     )
-
-
-def test_a_repeated_column_is_not_reported_as_missing(gate_folder, tmp_path):
-    lines = (gate_folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
-    twice = [f"{line},{line.split(',')[lines[0].split(',').index(CELL)]}" for line in lines]
-    (tmp_path / "twice.csv").write_text("\n".join(twice) + "\n", encoding="utf-8")
-    done = cdtool(
-        "detect", tmp_path / "twice.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--set=threshold.limits=400"
-    )
-    assert done.status == 2 and "2 columns have the name" in done.err
-
-
-def test_any_other_channel_is_still_required(gate_folder, tmp_path):
-    text = (gate_folder / "machine.toml").read_text(encoding="utf-8")
-    (tmp_path / "machine.toml").write_text(text.replace('"i_motor"', '"i_motors"'), encoding="utf-8")
-    with pytest.raises(SignatureError, match="no column 'i_motors'"):
-        api.learn_signature([gate_folder / "free" / "01.csv"], tmp_path / "machine.toml", "gm")
 
 
 MACHINE = """

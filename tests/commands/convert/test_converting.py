@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+import json
 import tomllib
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cdtool.base.errors import UsageError
 from cdtool.commands.convert.converting import convert
+from cdtool.commands.convert.log_rows import ColumnRows
 from cdtool.commands.judging.runs import read
 from cdtool.formats.channels.channel_assembly import file_digest
 from cdtool.formats.channels.reading import survey
@@ -212,6 +215,70 @@ def test_names_that_are_equal_for_a_container_are_made_unique(suffix, tmp_path):
     assert {(0.0, 19.0), (0.0, -19.0)} <= ends
 
 
+LOGS = Path(__file__).parents[3] / "sample_logs"
+
+
+def test_a_converted_log_is_read_with_its_new_machine_file(tmp_path):
+    machine = LOGS / "gate/machine.toml"
+    out = tmp_path / "run.mcap"
+    done = cdtool("convert", LOGS / "gate/stiff/03.csv", out, "-m", machine)
+    assert done.status == 0 and "7 columns on 1 clock" in done.out
+    arguments = ("-d", "gm", "--set=threshold.limits=400", "--json")
+    before = cdtool("detect", LOGS / "gate/stiff/03.csv", "-m", machine, *arguments)
+    after = cdtool("detect", out, "-m", f"{out}.machine.toml", *arguments)
+    assert before.status == after.status == 0
+    alarms = [json.loads(text.out)[0]["alarms"] for text in (before, after)]
+    assert alarms[0] and [item["time_s"] for item in alarms[0]] == pytest.approx([item["time_s"] for item in alarms[1]])
+
+
+def test_a_truncated_log_is_converted_up_to_the_cut_with_status_3(tmp_path):
+    data = (LOGS / "gate/stiff/01.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) * 2 // 3])
+    done = cdtool("convert", tmp_path / "cut.mcap", tmp_path / "out.mcap", "-m", LOGS / "gate/machine.toml")
+    assert done.status == 3 and "loss:" in done.err and (tmp_path / "out.mcap").exists()
+
+
+EPOCH = 1_700_000_000.25
+
+
+def dated(path: Path) -> Path:
+    """A table whose clock counts from 1970, in ms, and begins at a quarter of a second."""
+    rows = "\n".join(f"{EPOCH * 1e3 + k * 2.5!r},{float(np.sin(k))!r},{float(np.cos(k))!r}" for k in range(200))
+    path.write_text(f"time [ms],torque [N m],speed [rad/s]\n{rows}\n")
+    return path
+
+
+def known(folder: Path) -> Path:
+    path = machine_file(folder)
+    path.write_text(path.read_text().replace('"time", unit = "s"', '"time", unit = "ms"'))
+    return path
+
+
+@pytest.mark.parametrize("suffix", KINDS)
+def test_a_table_on_an_epoch_keeps_its_start_through_a_container_and_back(suffix, tmp_path):
+    needs(suffix)
+    log, machine = dated(tmp_path / "run.csv"), known(tmp_path)
+    original = logged(log, machine)
+    assert original.origin == EPOCH and original.start == 0.0
+    first = convert(log, tmp_path / f"out{suffix}", machine=machine)
+    second = convert(first.files[0], tmp_path / "back.csv", machine=first.machine_files[0])
+    for done in (first, second):
+        found = logged(done.files[0], done.machine_files[0])
+        assert found.origin == EPOCH
+        assert_same(original, found, exact_time=done is first and suffix != ".mcap")
+
+
+@pytest.mark.parametrize("suffix", KINDS)
+def test_all_columns_of_several_clocks_keep_the_start_without_a_machine_file(suffix, tmp_path):
+    needs(suffix)
+    log = two_clocks(tmp_path / "run.mcap", start_ns=1_700_000_000_250_000_000)
+    first = convert(log, tmp_path / f"out{suffix}")
+    for path in first.files:
+        again = convert(path, tmp_path / "again.csv", force=True)
+        for name in (path, again.files[0]):
+            assert ColumnRows(Path(name)).origin == ColumnRows(log).origin > 1.6e9
+
+
 def test_the_kinds_of_a_label_are_kept(tmp_path):
     text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\ntime = { column = "t", unit = "s" }\n'
     text += (
@@ -225,3 +292,20 @@ def test_the_kinds_of_a_label_are_kept(tmp_path):
     convert(tmp_path / "log.csv", tmp_path / "new.parquet", machine=machine)
     again = read_machine_file(tmp_path / "new.parquet.machine.toml")
     assert {item.channel: item.kinds for item in again.columns.sources}["label"] == ((1.0, "hard"), (2.5, 'so"ft'))
+
+
+@pytest.mark.parametrize(
+    ("head", "origin"),
+    [
+        ("# cdtool.source: a\n# cdtool.origin_s: 12.5\n", 12.5),
+        ("# cdtool.origin_s: noon\n", 0.0),
+        ("# cdtool.origin_s: nan\n", 0.0),
+        ("# a note\n# cdtool.origin_s: 12.5\n", 0.0),
+        ("", 0.0),
+    ],
+    ids=["written", "edited", "no number", "in a comment of another's", "none"],
+)
+def test_only_a_header_written_by_convert_states_the_start(head, origin, tmp_path):
+    (tmp_path / "log.csv").write_text(head + "t [s],v\n" + "".join(f"{k / 10},{k % 7}\n" for k in range(50)))
+    assert ColumnRows(tmp_path / "log.csv").origin == origin
+    assert list(survey(tmp_path / "log.csv").columns) == ["t [s]", "v"]

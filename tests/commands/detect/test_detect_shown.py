@@ -74,14 +74,3 @@ def test_an_alarm_far_from_any_contact_belongs_to_none(capsys):
     assert whys(found, capsys)[1].endswith("no contact")
     (row,) = as_rows([(None, found)], {})
     assert (row["alarms"][1]["contact_onset_s"], row["alarms"][1]["why_no_contact"]) == (None, "no contact")
-
-
-def test_missed_contacts_and_false_alarms_are_red(monkeypatch, capsys):
-    monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    show_detected([detected([(0, 2.0, 2.1)])], {})
-    lines = capsys.readouterr().out.splitlines()
-    red = [line for line in lines if "\x1b[1;31m" in line]
-    assert len(red) == 2 and "alarm" in red[0] and "no contact" in red[0] and "missed" in red[1]
-    show_detected([detected([(0, ONSET + 0.1, ONSET + 0.2)])], {})
-    assert "\x1b[1;31m" not in capsys.readouterr().out

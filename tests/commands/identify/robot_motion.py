@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, files
+from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import files as files_of_package
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ def coloured(seed: int, shape: tuple[int, int], samples: float) -> FloatArray:
 def panda_urdf() -> Path:
     """The URDF of a robot with seven joints; skips the test if example-robot-data is not installed."""
     try:
-        found = files("example-robot-data") or []
+        found = files_of_package("example-robot-data") or []
     except PackageNotFoundError:
         found = []
     for file in found:
@@ -185,3 +186,36 @@ torque = {{ columns = {columns["t"]}, {unit} }}
 position = {{ columns = {columns["q"]}, unit = "rad" }}
 speed = {{ columns = {columns["v"]}, unit = "rad/s" }}
 """
+
+
+# The file of the planar arm on the load side.
+ARM = """[machine]
+type = "planar_arm"
+coordinates = "load"
+link_mass = [1.3, 1.6]
+link_length = 0.3
+centre_of_mass = [0.14, 0.18]
+link_inertia = [0.012, 0.018]
+coulomb_slope = 50.0
+"""
+# The arm as it is: friction on the load side, which the file does not have.
+TRUE = replace(
+    planar_arm(),
+    coordinates="load",
+    motor_inertia=(0.0, 0.0),
+    transmission_ratio=(1.0, 1.0),
+    viscous_friction=(0.4, 0.3),
+    coulomb_friction=(2.4, 1.8),
+    coulomb_slope=(50.0, 50.0),
+    constant_force=(0.3, -0.1),
+)
+
+
+def files(folder: Path, machine: CoupledMachine, text: str, motions: list[Motion], noise: float = 0.05) -> Path:
+    """The machine file, and a log of each motion; returns the machine file."""
+    for number, motion in enumerate(motions):
+        run = motion.run(machine, noise * coloured(number, motion.position.shape, 5.0))
+        write_log(folder / f"run{number}.csv", run)
+    path = folder / "machine.toml"
+    path.write_text(text + channels_of(motions[0].position.shape[1]), encoding="utf-8")
+    return path

@@ -7,7 +7,6 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import cdtool
@@ -15,7 +14,6 @@ from cdtool.base.errors import UsageError
 from cdtool.commands.identify.files import check_identification_files, write_identification
 from cdtool.commands.identify.identifying import IdentifiedMachine
 from tests.command import cdtool as command
-from tests.data_folder import DATA, needs_data
 
 ROOT = Path(__file__).parents[3]
 GATE = ROOT / "sample_logs" / "gate"
@@ -101,32 +99,6 @@ def test_the_names_of_logs_and_machines_are_text_in_the_page(identified: Identif
     assert "&lt;script&gt;" in page
 
 
-def test_a_machine_without_fits_has_a_page_too(identified: IdentifiedMachine, tmp_path: Path) -> None:
-    bare = replace(
-        identified, joints=(replace(identified.joints[0], rigid=None, two_mass=None, controller=None, evidence=None),)
-    )
-    write_identification(bare, [tmp_path / "page.html"])
-    assert "data:image" not in (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert bare.summary["joints"][0]["not_identifiable"] == []
-
-
-def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_written(tmp_path: Path) -> None:
-    arm = ROOT / "sample_logs" / "arm" / "trial_1"
-    outputs = ["-o", tmp_path / "arm.html", "-o", tmp_path / "arm.toml"]
-    done = command("identify", arm / "free" / "0[1-4].*", "-m", arm / "machine.toml", *outputs)
-    assert done.status == 0
-    assert "new: viscous and Coulomb friction" in done.out
-    assert "old: the joint does not move" in done.out
-    assert "not identifiable: machine.constant_force: add runs in both directions" in done.out
-    assert f"written: {tmp_path / 'arm.toml'} (machine file)" in done.out
-    page = (tmp_path / "arm.html").read_text(encoding="utf-8")
-    assert "Torque that is not explained" in page
-    assert "What the logged motion excites" in page
-    assert page.count("data:image/png;base64,") == 2
-    assert "forearm" in page
-    assert (tmp_path / "arm.toml").exists()
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -143,15 +115,3 @@ def test_a_payload_without_its_logs_is_one_line(options: list[object], message: 
     assert done.status == 2
     assert len(done.err.strip().splitlines()) == 1
     assert message in done.err
-
-
-@needs_data("emps")
-def test_the_unseen_part_of_the_real_axis_is_predicted_within_the_required_error() -> None:
-    assert DATA is not None
-    machine = ROOT / "docs" / "examples" / "emps.toml"
-    (joint,) = cdtool.identify([DATA / "emps" / "DATA_EMPS.mat"], machine).joints
-    assert joint.evidence is not None and joint.evidence.cross_validation is not None
-    assert joint.evidence.cross_validation.error < 2.2
-    assert joint.controller is not None and joint.controller.comparison is not None
-    difference = joint.controller.comparison.measured - joint.controller.comparison.computed
-    assert np.sqrt(np.mean(difference**2)) < 0.5

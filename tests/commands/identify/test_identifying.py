@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 import shutil
 import tomllib
 from pathlib import Path
@@ -13,7 +13,7 @@ import cdtool
 from cdtool.base.errors import UsageError
 from cdtool.commands.identify.estimate import Estimate, Method
 from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.commands.identify.machine_update import changes_of, updated_text
+from cdtool.commands.identify.machine_update import MachineChange, changes_of, updated_text
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.machines.axis_model.model_table import axis_model
 from tests.command import cdtool as command
@@ -62,18 +62,6 @@ def test_what_one_speed_in_one_direction_does_not_show_is_said(identified: tuple
     keys = {(item.section, item.key) for item in joint.not_identifiable}
     assert {("machine", "viscous_friction"), ("machine", "coulomb_friction"), ("machine", "constant_force")} <= keys
     assert tomllib.loads(identified[0].text)["machine"]["viscous_friction"] == 0.00026653
-
-
-def test_the_command_shows_changes_and_what_is_missing(tmp_path: Path) -> None:
-    done = command("identify", GATE / "free" / "*", "-m", GATE / "machine.toml", "-o", tmp_path / "m.toml")
-    assert done.status == 0
-    assert "machine.load_mass" in done.out
-    assert "not identifiable: machine.viscous_friction: add runs at other speeds" in done.out
-    assert f"written: {tmp_path / 'm.toml'}" in done.out
-    as_json = command("identify", GATE / "free" / "*", "-m", GATE / "machine.toml", "--json")
-    values = json.loads(as_json.out)
-    assert values["written"] is None
-    assert {item["key"] for item in values["joints"][0]["estimates"]} >= {"load_mass", "stiffness", "speed_gain"}
 
 
 def test_an_existing_file_is_kept_unless_it_is_the_machine_file_itself(tmp_path: Path) -> None:
@@ -188,3 +176,37 @@ def test_a_joint_whose_value_is_known_only_together_does_not_undo_that_of_anothe
     (change,) = changes_of(read_machine_file(path).machine, tomllib.loads(MACHINE), [known], [vague])
     assert change.values == pytest.approx((30.0 * 0.01**2, 50.0 * 0.02**2))
     assert not change.is_known_alone
+
+
+CHANGES = [
+    MachineChange("machine", "load_mass", (620.0,), (657.9,), (33.0,), "kg", Method.OUTPUT_ERROR),
+    MachineChange("model.drive", "stiffness", (None,), (8.1e4,), (math.nan,), "N/m", Method.OUTPUT_ERROR),
+]
+LAYOUTS = {
+    "tables": '[machine]\nname = "gate"\nload_mass = 620 # kg\n[model.drive]\nfront_stiffness = 1e6\n'
+    "[channels]\nx = 1\n",
+    "inline": 'machine = { name = "gate", load_mass = 620 }\nmodel = { drive = { front_stiffness = 1e6 } }\n'
+    "channels = { x = 1 }\n",
+    "inline within": '[machine]\nname = "gate"\nload_mass = 620\n[model]\ndrive = { front_stiffness = 1e6 }\n'
+    "[channels]\nx = 1\n",
+    "dotted": 'machine.name = "gate"\nmachine.load_mass = 620\nmodel.drive.front_stiffness = 1e6\nchannels.x = 1\n',
+    "without a model": '[machine]\nname = "gate"\nload_mass = 620\n[channels]\nx = 1',
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_only_the_changed_keys_of_a_machine_file_change(layout: str) -> None:
+    before = tomllib.loads(LAYOUTS[layout])
+    after = tomllib.loads(updated_text(LAYOUTS[layout], CHANGES, "3 runs"))
+    assert after["machine"].pop("load_mass") == 657.9
+    assert after["model"]["drive"].pop("stiffness") == 8.1e4
+    del before["machine"]["load_mass"]
+    if layout == "without a model":
+        before["model"] = {"drive": {}}
+    assert after == before
+
+
+def test_a_line_that_ends_without_a_line_break_keeps_its_comment() -> None:
+    text = updated_text("[machine]\nload_mass = 620 # from the drawing", CHANGES, "3 runs")
+    assert "was 620 (from the drawing)" in text
+    assert tomllib.loads(text)["machine"]["load_mass"] == 657.9

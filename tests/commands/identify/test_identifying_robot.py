@@ -22,19 +22,19 @@ from cdtool.commands.identify.robot.robot_regressor import body_parameters, regr
 from cdtool.commands.identify.robot.robot_run import RobotRun, robot_run
 from cdtool.commands.identify.robot.updated_urdf import updated_urdf
 from cdtool.formats.machine_file import read_machine_file
-from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_reader import read_urdf
 from cdtool.machines.urdf_robot import UrdfRobot
 from tests.commands.identify.robot_motion import (
+    ARM,
     PANDA_JOINTS,
+    TRUE,
     Motion,
-    channels_of,
     coloured,
+    files,
     fourier,
     panda,
     panda_urdf,
-    planar_arm,
     ur10e,
     ur10e_run,
     write_log,
@@ -42,36 +42,6 @@ from tests.commands.identify.robot_motion import (
 from tests.data_folder import UR10E_LOGS, data, needs_data
 
 ROOT = Path(__file__).parents[3]
-ARM = """[machine]
-type = "planar_arm"
-coordinates = "load"
-link_mass = [1.3, 1.6]
-link_length = 0.3
-centre_of_mass = [0.14, 0.18]
-link_inertia = [0.012, 0.018]
-coulomb_slope = 50.0
-"""
-# The arm as it is: friction on the load side, which the file does not have.
-TRUE = replace(
-    planar_arm(),
-    coordinates="load",
-    motor_inertia=(0.0, 0.0),
-    transmission_ratio=(1.0, 1.0),
-    viscous_friction=(0.4, 0.3),
-    coulomb_friction=(2.4, 1.8),
-    coulomb_slope=(50.0, 50.0),
-    constant_force=(0.3, -0.1),
-)
-
-
-def files(folder: Path, machine: CoupledMachine, text: str, motions: list[Motion], noise: float = 0.05) -> Path:
-    """The machine file, and a log of each motion; returns the machine file."""
-    for number, motion in enumerate(motions):
-        run = motion.run(machine, noise * coloured(number, motion.position.shape, 5.0))
-        write_log(folder / f"run{number}.csv", run)
-    path = folder / "machine.toml"
-    path.write_text(text + channels_of(motions[0].position.shape[1]), encoding="utf-8")
-    return path
 
 
 def test_missing_friction_of_a_planar_arm_is_found_and_its_drawing_stays(tmp_path: Path) -> None:
@@ -168,50 +138,6 @@ def test_a_log_at_rest_and_a_log_without_positions_give_one_line(tmp_path: Path)
     path.write_text("".join(line for line in text.splitlines(True) if "position" not in line), encoding="utf-8")
     with pytest.raises(IdentificationError, match="no position"):
         cdtool.identify([tmp_path / "run0.csv"], path)
-
-
-def test_crash_logs_of_an_arm_are_used_and_the_motion_that_is_missing_is_named() -> None:
-    arm = ROOT / "sample_logs" / "arm" / "trial_1"
-    with pytest.raises(IdentificationError, match=r"from 3 logs: .*coulomb_friction needs runs in both directions"):
-        cdtool.identify([str(arm / "stiff" / "*")], arm / "machine.toml")
-
-
-def test_the_free_runs_of_the_sample_arm_repeat_one_motion(tmp_path: Path) -> None:
-    arm = ROOT / "sample_logs" / "arm" / "trial_1"
-    done = cdtool.identify([str(arm / "free" / "*")], arm / "machine.toml", tmp_path / "arm.toml")
-    first, second = done.joints
-    assert first.robot is not None
-    assert second.robot is not None
-    assert second.robot.form is FrictionForm.PREVIOUS
-    # One run deviates from an equal one by 0.14 N m (RMS).
-    assert 0.14 < first.robot.errors[first.robot.form] < 0.28
-    assert first.robot.errors[FrictionForm.PREVIOUS] > 1.4
-    assert read_machine_file(tmp_path / "arm.toml").machine.joints == ("arm", "forearm")
-
-
-def loaded_arm(mass: float, along: float) -> PlanarArm:
-    """The arm whose forearm and a point mass are one body."""
-    total = 1.6 + mass
-    centre = (1.6 * 0.18 + mass * along) / total
-    inertia = 0.018 + 1.6 * (0.18 - centre) ** 2 + mass * (along - centre) ** 2
-    return replace(TRUE, link_mass=(1.3, total), centre_of_mass=(0.14, centre), link_inertia=(0.012, inertia))
-
-
-def test_torque_constants_from_runs_with_a_payload(tmp_path: Path) -> None:
-    constants = np.array([12.0, 8.0])
-    for name, machine, seed in (("free", TRUE, 1), ("loaded", loaded_arm(0.7, 0.25), 2)):
-        run = fourier(seed, 2, 12.0, 0.01).run(machine, 0.02 * coloured(seed, (1200, 2), 5.0))
-        write_log(tmp_path / f"{name}.csv", replace(run, torque=run.torque / constants))
-    path = tmp_path / "machine.toml"
-    path.write_text(ARM + channels_of(2, "[10.0, 10.0]"), encoding="utf-8")
-    payload = LoadedRuns((tmp_path / "loaded.csv",), 0.7, centre=(0.25, 0.0, 0.0))
-    done = cdtool.identify([tmp_path / "free.csv"], path, tmp_path / "new.toml", loaded=payload)
-    values = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))
-    assert values["channels"]["torque"]["scale"] == pytest.approx([12.0, 8.0], rel=0.03)
-    assert values["channels"]["torque"]["columns"] == ["t0", "t1"]
-    # Friction is that of the torques by the new constants.
-    assert values["machine"]["coulomb_friction"] == pytest.approx([2.4, 1.8], rel=0.05)
-    assert done.summary["robot"]["torque_constants"]["not_identifiable"] == []
 
 
 def test_a_payload_of_an_axis_or_of_an_unknown_link_is_refused(tmp_path: Path) -> None:

@@ -60,15 +60,6 @@ def test_the_block_that_is_ahead_is_the_set_value(order):
     }  # fmt: skip
 
 
-def test_set_values_behind_measured_ones_do_not_double_the_joints():
-    assert blocks_of(("q", "q_des", "qd", "qd_des", "i"))["position"] == "q"
-
-
-def test_joints_at_rest_belong_to_their_blocks():
-    found = blocks_of(("q", "qd", "i"), at_rest=(1,))
-    assert found["position"] == "q" and found["speed"] == "qd"
-
-
 def test_noise_has_no_blocks():
     generator, time = np.random.default_rng(3), np.arange(1000) * 1e-2
     streams = [Stream(str(k), (str(k),), None, time, generator.normal(0.0, 1.0, (1000, 1))) for k in range(12)]

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import shlex
-import shutil
 import tomllib
+import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from cdtool.base.errors import RecordingError, UsageError
+from cdtool.base.errors import RecordingError
 from cdtool.commands.init.drafting import init
 from cdtool.commands.judging.information import info
 from cdtool.formats.machine_file import read_machine_file
 from tests.command import cdtool
+from tests.commands.init.drafts import drafted_columns, stroke
 from tests.data_folder import UR10E_LOGS, data, needs_data
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
@@ -107,16 +108,6 @@ def test_of_175_columns_the_robots_are_found(tmp_path):
     }  # fmt: skip
 
 
-def test_nothing_is_overwritten_without_force(tmp_path):
-    path = tmp_path / "machine.toml"
-    path.write_text("mine")
-    with pytest.raises(UsageError, match=r"machine\.toml: already exists"):
-        init(LOGS / "gate/stiff/03.csv", path)
-    assert path.read_text() == "mine"
-    init(LOGS / "gate/stiff/03.csv", path, force=True)
-    assert path.read_text() != "mine"
-
-
 def test_a_log_without_recognised_channels_gets_its_clock_and_columns_as_comments(tmp_path):
     log, path = tmp_path / "scope.csv", tmp_path / "machine.toml"
     log.write_text("TIME,CH1,CH2\n" + "".join(f"{k * 1e-3:.3f},{k % 3},{k % 7}\n" for k in range(300)))
@@ -139,11 +130,27 @@ def test_a_log_with_only_a_clock_is_one_line(tmp_path):
     assert not (tmp_path / "machine.toml").exists()
 
 
-def test_the_next_command_can_be_pasted_into_a_shell(tmp_path):
-    folder = tmp_path / "Läufe 1"
-    folder.mkdir()
-    log, path = folder / "a 'b'.csv", folder / "neu $x.toml"
-    shutil.copy(LOGS / "gate/stiff/03.csv", log)
-    done = cdtool("init", log, "-o", path)
-    line = next(line for line in done.out.splitlines() if line.startswith("  cdtool info"))
-    assert shlex.split(line) == ["cdtool", "info", str(log), "--machine", str(path)]
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 1e300])
+def test_impossible_values_neither_warn_nor_disturb_the_guess(tmp_path, value):
+    run = stroke(5e-3)
+    broken = np.where((run.time > 1.0) & (run.time < 1.2), value, run.travel)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        columns = {"t [s]": run.time, "pos [m]": broken, "vel [m/s]": run.speed}
+        (tmp_path / "log.csv").write_text(
+            ",".join(columns)
+            + "\n"
+            + "\n".join(",".join(map(repr, row)) for row in zip(*(c.tolist() for c in columns.values()), strict=True))
+        )
+        drafted = init(tmp_path / "log.csv", tmp_path / "machine.toml")
+    assert {"position", "speed"} <= set(drafted.channels)
+
+
+def test_joints_have_the_names_in_the_columns(tmp_path):
+    run = stroke()
+    columns = {"t [s]": run.time}
+    for k, name in enumerate(("pan", "tilt", "roll_axis")):
+        columns |= {f"{name}/position": (k + 1.0) * run.travel, f"{name}/velocity": (k + 1.0) * run.speed}
+    draft = drafted_columns(tmp_path, columns)
+    assert draft.machine["joints"] == ["pan", "tilt", "roll_axis"]
+    assert draft.channels["position"]["columns"] == [f"{name}/position" for name in draft.machine["joints"]]

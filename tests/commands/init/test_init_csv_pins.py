@@ -75,11 +75,3 @@ def test_a_word_in_a_column_of_numbers_is_drafted_as_missing_with_a_mark(tmp_pat
     assert '"ERROR" in line 22, column Position' in comment and "CHECK: do they stand for" in comment
     seen = cdtool("info", log, "-m", tmp_path / "m.toml")
     assert "2 of 200 values are missing" in one_line(seen.out)
-
-
-def test_all_words_of_a_column_are_drafted_unless_they_are_many(tmp_path):
-    api.init(words_in(tmp_path, ["OVL", "ERROR", "off"]), tmp_path / "m.toml")
-    csv = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"]
-    assert csv == {"missing": ["OVL", "ERROR", "off"]}
-    done = cdtool("init", words_in(tmp_path, ["a", "b", "c", "d", "e"]), "-o", tmp_path / "n.toml")
-    assert done.status == 2 and "is not a number" in one_line(done.err)

@@ -121,13 +121,6 @@ def test_printed_patterns_of_a_folder_with_blanks_can_be_pasted_into_a_shell(gat
     assert "/my stiff/'*.csv --machine" in done.out
 
 
-def test_a_log_that_cannot_be_read_is_named_and_the_others_are_drafted(gate, tmp_path):
-    (gate / "stiff" / "broken.csv").write_text("not,a\nlog,\n", encoding="utf-8")
-    done = cdtool("init", *csv_logs(gate, "stiff"), "-m", gate / "machine.toml", "-o", tmp_path / "study")
-    assert done.status == 3 and "broken.csv" in done.err
-    assert "../logs/stiff/*.csv" not in (tmp_path / "study" / "benchmark.toml").read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 
-import numpy as np
 import pytest
 
 from cdtool.commands.init.drafting import init
 from cdtool.formats.channels.reading import read_recording
 from cdtool.formats.machine_file import read_machine_file
-from tests.commands.init.drafts import write
-from tests.commands.init.layouts import LAYOUTS, SEALED, VENDORS, Layout, Truth
+from tests.commands.init.layouts import LAYOUTS, SEALED, VENDORS
 from tests.commands.init.layouts.score import score
 from tests.commands.init.layouts.variants import is_table, without_each_channel, without_names
 
@@ -70,23 +68,3 @@ def test_every_column_is_mapped_or_listed_exactly_once(layout, tmp_path):
     for column in layout.truth:
         assert (f'"{column}"' in drafted.text.split("# Not mapped")[0]) is (column not in listed)
     assert all(item.why for item in drafted.unmapped)
-
-
-def small(folder, truths):
-    time = np.arange(400) / 100.0
-    columns = {"t [s]": time, **{name: values(time) for name, (_, values) in truths.items()}}
-    known = {"t [s]": Truth("time", unit="s"), **{name: truth for name, (truth, _) in truths.items()}}
-    return Layout("small", "a test", "linear axis", write(folder / "small.csv", columns), known)
-
-
-def test_the_score_counts_joints_that_are_left_out(tmp_path):
-    layout = small(
-        tmp_path,
-        {
-            **{f"q{j}": (Truth("position", str(j)), lambda time, j=j: np.sin(j * time)) for j in (1, 2)},
-            **{f"qd{j}": (Truth("speed", str(j)), lambda time, j=j: j * np.cos(j * time)) for j in (1, 2)},
-            "q_third": (Truth("position", "3"), np.cos),
-        },
-    )
-    done = score(layout, tmp_path)
-    assert "speed" in done.right and [text.split(":")[0] for text in done.wrong if "joints" in text] == ["position"]

@@ -11,7 +11,6 @@ from cdtool import init, init_study
 from cdtool.commands.init import motion_evidence as motion
 from cdtool.commands.init.stream import Stream
 from tests.commands.init.drafts import drafted, drafted_columns, stroke
-from tests.commands.init.layouts.motion import arm_motion
 from tests.data_folder import data, needs_data
 
 
@@ -29,22 +28,6 @@ def test_the_lead_of_a_set_value_is_found(ahead, gain):
     assert motion.lead(one, other) == pytest.approx(ahead, rel=0.1, abs=0.1)
 
 
-def test_noise_alone_is_no_lead():
-    noise, time = np.random.default_rng(1), np.arange(3000) * 2e-3
-    one = stream(time, np.sin(3.0 * time))
-    assert motion.lead(one, stream(time, np.sin(3.0 * time) + noise.normal(0.0, 0.05, 3000))) == 0.0
-
-
-def test_inertia_and_friction_of_opposite_signs_are_no_drive():
-    time = np.arange(4000) * 1e-3
-    speed = np.sin(5.0 * time) * (1.0 + 0.2 * np.sin(time))
-    acceleration = np.gradient(speed, time)
-    drive = 0.3 * acceleration + 1.0 * np.sign(speed)
-    odd = 0.3 * acceleration - 1.0 * np.sign(speed)
-    assert motion.drive_fit(stream(time, drive), stream(time, speed)) > 0.9
-    assert motion.drive_fit(stream(time, odd), stream(time, speed)) == 0.0
-
-
 def test_a_unit_is_used_where_the_name_says_nothing(tmp_path):
     run = stroke()
     draft = drafted_columns(
@@ -58,44 +41,12 @@ def test_a_unit_is_used_where_the_name_says_nothing(tmp_path):
     }  # fmt: skip
 
 
-def test_an_axis_at_rest_is_no_load_cell(tmp_path):
-    run = stroke()
-    quiver = 0.12 + 2e-4 * np.exp(-(((run.time - 2.0) / 0.02) ** 2)) + 1e-7 * np.sin(900.0 * run.time)
-    draft = drafted_columns(tmp_path, {"t": run.time, "pos_1": run.travel, "pos_2": quiver, "vel_1": run.speed})
-    assert "force" not in draft.channels
-
-
 @pytest.mark.parametrize("name", ["computed_torque", "model_torque", "torque_target"])
 def test_a_modelled_effort_is_no_measured_one(tmp_path, name):
     run = stroke()
     draft = drafted_columns(tmp_path, {"t": run.time, "pos": run.travel, "vel": run.speed, name: run.torque})
     assert "torque" not in draft.channels
     assert any(name in item.columns for item in draft.done.unmapped) is ("target" not in name)
-
-
-def test_positions_of_different_parts_are_no_set_values_of_each_other(tmp_path):
-    run = stroke()
-    late = np.interp(run.time - 0.02, run.time, run.travel)
-    draft = drafted_columns(tmp_path, {"t": run.time, "leaf angle": run.travel, "handle angle": late})
-    assert draft.channels["position"]["column"] == "leaf angle" and "reference_position" not in draft.channels
-
-
-@pytest.mark.parametrize(("others", "found"), [((), True), (("accy", "accz"), False)])
-def test_one_of_three_axes_of_an_accelerometer_is_the_joints_only_if_it_fits(tmp_path, others, found):
-    run, noise = stroke(), np.random.default_rng(2)
-    names = ("acc x", *(name.replace("acc", "acc ") for name in others))
-    columns = {name: 9.81 + noise.normal(0.0, 1.0, len(run.time)) for name in names}
-    draft = drafted_columns(tmp_path, {"t": run.time, "pos": run.travel, "vel": run.speed, **columns})
-    assert ("acceleration" in draft.channels) is found
-
-
-def test_what_depends_on_places_alone_is_no_effort():
-    m = arm_motion(np.random.default_rng(3), 3, duration=20.0)
-    q = m.position
-    reach = 0.4 * np.cos(q[:, 1]) + 0.3 * np.cos(q[:, 1] + q[:, 2])
-    pose = Stream("p", (), None, m.time, np.column_stack([reach * np.cos(q[:, 0]), reach * np.sin(q[:, 0]), reach]))
-    place, speed, effort = (Stream("x", (), None, m.time, values) for values in (q, m.speed, m.effort))
-    assert motion.drive_fit(pose, speed, place) < 0.6 < motion.drive_fit(effort, speed, place)
 
 
 def test_a_speed_that_the_position_does_not_follow_is_left_out_with_the_reason(tmp_path):
@@ -117,16 +68,6 @@ def test_a_reversed_speed_is_recognised_and_marked(tmp_path):
     draft = drafted_columns(tmp_path, columns)
     assert draft.channels["speed"]["column"] == "vel c [m/s]"
     assert "opposite in sign" in draft.said("speed") and draft.checked("position")
-
-
-def test_units_are_not_derived_from_a_placeholder_clock(tmp_path):
-    """Without a clock, position and speed per sample say nothing about counts or units."""
-    run = stroke()
-    irregular = np.random.default_rng(1).normal(0.0, 1.0, len(run.time))
-    counts = np.round(run.travel * 4000.0)
-    draft = drafted_columns(tmp_path, {"noise": irregular, "pos_counts": counts, "vel": run.speed})
-    assert draft.channels["time"] == {"rate_hz": 1000.0} and draft.checked("time")
-    assert draft.channels["position"]["scale"] == 1.0 and "placeholder" in draft.said("position")
 
 
 @pytest.mark.parametrize(("step", "expected"), [(1e-3, 22.0), (1e-2, 4.7)])

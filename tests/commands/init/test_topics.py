@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from cdtool.commands.init.names.units import is_si
 from cdtool.formats.mcap.write import Stream, write_mcap
 from tests.commands.init.drafts import RPM, drafted, stroke
 
@@ -39,22 +38,6 @@ def test_fields_of_an_unknown_type_get_the_units_of_their_names_with_marks(tmp_p
     assert draft.machine["coordinates"] == "motor"
     assert draft.machine["transmission_ratio"] == pytest.approx(LEAD, rel=2e-3)
     assert "SI" not in draft.text
-
-
-@pytest.mark.parametrize(
-    ("name", "known"),
-    [
-        ("sensor_msgs/msg/JointState", True),
-        ("geometry_msgs/msg/WrenchStamped", True),
-        ("sensor_msgs/JointState", True),
-        ("std_msgs/msg/Float64", False),
-        ("plant.drive", False),
-        ("my_sensor_msgs/msg/JointState", False),
-        ("", False),
-    ],
-)
-def test_si_units_are_assumed_only_for_known_types(name, known):
-    assert is_si(name) is known
 
 
 def joint_states(folder, factor):

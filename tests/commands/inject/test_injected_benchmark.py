@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -101,14 +100,6 @@ def test_the_folder_is_a_benchmark_of_its_own(gate: Path, file_format: str) -> N
     assert read_injected(gate / "out").cases == done.logs.cases
 
 
-def test_every_file_says_that_it_is_injected(gate: Path) -> None:
-    done = cdtool.inject(write(gate, INJECT), gate / "out")
-    text = (gate / "out" / done.logs.cases[0].file).read_text(encoding="utf-8")
-    assert "# cdtool.injected: {" in text
-    assert json.loads((gate / "out" / "injected.json").read_text(encoding="utf-8"))["injected"] is True
-    assert "simulated" in (gate / "out" / "benchmark.toml").read_text(encoding="utf-8")
-
-
 def without_table(path: Path, table: str) -> None:
     lines, kept, skipping = path.read_text(encoding="utf-8").splitlines(), [], False
     for line in lines:
@@ -198,39 +189,6 @@ def test_a_folder_of_cdtool_inject_is_used_and_stays_the_users(gate: Path) -> No
     assert done.status == 2
     assert "holds contacts that cdtool inject made with other settings" in done.err
     assert (gate / "injected" / "mine.txt").read_text(encoding="utf-8") == "mine"
-
-
-def test_a_dry_run_counts_the_contacts_that_are_not_made_yet_and_writes_nothing(gate: Path) -> None:
-    path = write(gate, INJECT)
-    words = ("benchmark", path, "--dry-run")
-    done = command(*words)
-    assert done.status == 0, done.err
-    assert "1 contact of [inject] would be made first" in done.out
-    assert not (gate / "injected").exists()
-    cdtool.benchmark(path)
-    done = command(*words)
-    assert "would be made first" not in done.out
-    assert "injected_stiff: 1 recording" in done.out
-
-
-def test_changed_conditions_are_scored_beside_injected_contacts_and_not_copied(gate: Path) -> None:
-    conditions = (
-        '[impacts.stiff]\nlogs = ["stiff/03.csv"]\n'
-        '[conditions.worn]\nholdout.logs = ["holdout/04.csv"]\nimpacts.stiff.logs = ["soft/03.csv"]\n'
-    )
-    path = write(gate, INJECT + conditions)
-    results = cdtool.benchmark(path).results
-    assert results.groups == ("stiff", "injected_stiff")
-    assert [item.group for item in results.conditions] == ["worn/holdout", "worn/stiff"]
-    assert {row.group for row in results.recordings} == set(results.every_group)
-    cdtool.inject(path, gate / "out")
-    assert read_benchmark_file(gate / "out" / "benchmark.toml").conditions == ()
-
-
-def test_a_file_without_the_section_is_refused(gate: Path) -> None:
-    path = write(gate, '[impacts.stiff]\nlogs = ["stiff/03.csv"]\n')
-    with pytest.raises(ConfigurationError, match=r"no section \[inject\]"):
-        cdtool.inject(path, gate / "out")
 
 
 @pytest.mark.parametrize("positions", ['["0.9m", "900mm"]', '["4s", "4000 ms"]'])

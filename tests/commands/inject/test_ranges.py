@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import cdtool
 from cdtool.results.agreement import Agreement, agreements
 from tests.command import cdtool as command
+from tests.project.pages import benchmark_script
+from tests.synthetic.plain_gate import PlainGate, drawn_gate
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 SETUP = """machine = "model.toml"
@@ -81,3 +85,25 @@ def test_the_range_contains_the_real_contacts_and_is_in_every_report(gate: Path)
     assert text.index("## Results") < text.index("<summary>Injected contacts (")
     assert "drive rigid beyond its observed wind-up" in text
     assert 'id="injected"' in (gate / "r.html").read_text(encoding="utf-8")
+
+
+SOFT, STIFF = 5e3, 500e3
+
+
+@pytest.mark.parametrize(
+    ("gate", "names"),
+    [
+        (drawn_gate(0), ("inertial_momentum", "friction_ekf", "momentum", "pure_torque")),
+        (PlainGate(stiffness=math.inf), ("momentum", "pure_torque")),
+    ],
+    ids=["elastic", "rigid, logged at the load"],
+)
+def test_the_true_mean_is_within_the_stated_range(gate: PlainGate, names: tuple[str, ...]) -> None:
+    found = benchmark_script("injection").compare_plain(gate, 0, (SOFT, STIFF), 4, names)
+    for name in names:
+        for stiffness in (SOFT, STIFF):
+            item = found[stiffness][name]
+            assert not np.isnan([*item.injected.ravel(), *item.true]).any(), (stiffness, name)
+            assert item.is_in_stated_range, (stiffness, name, item)
+        # The range of one obstacle does not contain the latency of the other.
+        assert np.min(found[SOFT][name].injected) > 1.5 * np.max(found[STIFF][name].true)

@@ -22,7 +22,6 @@ from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.robot_model.parameters import RobotModel, robot_model
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recordings.recording import Recording, Series
-from tests.commands.inject.arm_twins import compare
 from tests.data_folder import UR10E_LOGS
 from tests.machines.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
 from tests.machines.robot_model.test_chain import planar_arm
@@ -89,17 +88,6 @@ def test_with_noise_the_struck_joint_changes_as_in_the_true_contact(trial: Trial
     free = as_recording(simulate_arm_run(ARM, np.random.default_rng(7), trial, "none"), "free")
     for channel in ("torque", "speed"):
         assert worst(injected, true, free, channel, start)[trial - 1] < share, channel
-
-
-def test_latencies_of_the_arm_agree_pair_by_pair() -> None:
-    """Reduced: benchmarks/injection_arm.py of commit def748d0 has five seeds and every detector."""
-    names = ("friction_ekf", "inertial_momentum", "momentum")
-    for trial, expected in ((1, names), (2, names[1:])):
-        found = compare(trial, 7300 + trial, "stiff", 2, names)
-        assert tuple(found) == expected  # the forearm of trial 2 does not move: no band of the friction EKF
-        for name, both in found.items():
-            assert np.isfinite(both.true).all(), name
-            assert both.agrees, (name, both)
 
 
 @pytest.fixture(scope="module")
@@ -189,12 +177,6 @@ def test_an_elastic_joint_hides_the_contact_from_the_motor_at_first(robot: UrdfR
     model = robot_model(robot, ModelTable({"drive": known}))
     beyond = struck(recording, model, replace(FROZEN, drive=DriveBeyond.RIGID))
     assert np.max(np.abs(at(beyond, "speed", 5e-3))) > 1.2 * early[0]
-
-
-@pytest.mark.parametrize(("time", "message"), [(99.0, "outside the log"), (0.1, "at rest")])
-def test_a_contact_that_cannot_be_is_refused(robot: UrdfRobot, recording: Recording, time: float, message: str) -> None:
-    with pytest.raises(RecordingError, match=message):
-        robot_contact(log_of(recording), robot_model(robot, None), POINT, Obstacle.spring(1e4), time, assumption=FROZEN)
 
 
 UR10E = ("joint1", "joint2", "joint3", "joint4", "joint5", "joint6")

@@ -144,33 +144,6 @@ def test_a_wrong_section_names_its_key(six: Path, old: str, new: str, message: s
     assert message in str(fault.value)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('"link6"', '"link9"', "unknown link 'link9'"),
-        ('"link6"', '"base"', "does not move"),
-        ('"link6"', "7", "no joint 7"),
-    ],
-)
-def test_an_unknown_link_is_one_line(six: Path, old: str, new: str, message: str) -> None:
-    done = command("inject", write(six, INJECT.replace(old, new)), "-o", six / "out")
-    assert done.status == 2
-    assert message in " ".join(done.err.split())
-    assert not (six / "out").exists()
-
-
-def test_a_link_is_no_key_of_an_axis(tmp_path: Path) -> None:
-    gate = Path(__file__).parents[3] / "sample_logs" / "gate"
-    text = (gate / "inject.toml").read_text(encoding="utf-8").replace("[inject]", '[inject]\nlink = "leaf"')
-    text = text.replace('"model.toml"', f'"{gate}/model.toml"')
-    for group in ("free", "stiff", "soft", "holdout"):
-        text = text.replace(f'"{group}/', f'"{gate}/{group}/')
-    path = tmp_path / "case.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="applies to a planar_arm or urdf_robot only"):
-        read_benchmark_file(path)
-
-
 def test_without_pinocchio_one_line_names_the_extra(six: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pinocchio", None)
     with pytest.raises(ConfigurationError, match=r"\.\[urdf\]") as fault:

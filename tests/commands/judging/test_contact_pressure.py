@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import cdtool
 from cdtool.base.errors import RecordingError
-from cdtool.formats.channels.reading import read_as_logged
-from cdtool.formats.machine_file import read_machine_file
 from tests.synthetic.pressure_rig import Run, write_pressure_rig
 
 
@@ -35,13 +32,3 @@ def test_alone_it_does_not_show_a_contact(rig):
     machine.write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(RecordingError, match="no ground truth: none of 'force', 'label', 'event' is mapped"):
         cdtool.benchmark(rig / "benchmark.toml")
-
-
-@pytest.mark.parametrize("suffix", ["csv", "mcap", "parquet"])
-def test_a_converted_log_has_the_same_pressure(rig, suffix):
-    log, target = rig / "edge" / "01.csv", rig / f"converted.{suffix}"
-    converted = cdtool.convert(log, target, machine=rig / "machine.toml")
-    first = read_as_logged(log, read_machine_file(rig / "machine.toml")).recording["contact_pressure"]
-    other = read_as_logged(target, read_machine_file(converted.machine_files[0])).recording["contact_pressure"]
-    assert other.unit == "Pa"
-    np.testing.assert_allclose(other.values, first.values, rtol=1e-9)

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.base.errors import ConfigurationError
+from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.base.settings import Place
 from cdtool.commands.judging.named_logs import LogsOf, OnsetTable, labels_of, read_label_file
+from cdtool.commands.judging.runs import find_logs
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 
 MACHINE = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\n'
@@ -55,3 +56,16 @@ def test_the_settings_of_the_labels_reach_the_file(tmp_path):
     labels = labels_of(of_file, logs(tmp_path), [tmp_path / "01.csv"])
     assert labels is not None and labels.kinds == ("hard",) and labels.clock == "source"
     assert labels.contacts["01.csv"][0].start == 1_743_674_400.0
+
+
+@pytest.mark.parametrize("pattern", ["", ".", "/", "#", "#1"])
+def test_a_pattern_that_is_a_folder_or_the_root_matches_nothing(pattern, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for base in (tmp_path, tmp_path.relative_to(tmp_path)):
+        with pytest.raises(UsageError, match="no file matches"):
+            find_logs([pattern], base, runs=True)
+
+
+def test_an_empty_list_of_logs_is_an_error(tmp_path):
+    with pytest.raises(UsageError, match="is empty"):
+        find_logs([], tmp_path)

@@ -214,31 +214,6 @@ def test_a_signature_learned_from_runs_knows_these_runs(folder, tmp_path):
     assert checked.status in (0, 3) and "no such file" not in checked.err
 
 
-def test_a_benchmark_file_detects_and_explains_a_run_with_the_window_of_its_group(folder, together):
-    path = folder / "windows.toml"
-    path.write_text(together.read_text().replace("[impacts.stiff]", "[impacts.stiff]\nwindow_s = 0.7"))
-    found = cdtool.detect(f"{folder}/all.csv#stiff_03", benchmark=path)
-    assert found.detected.window == 0.7 and len(found.contacts)
-    assert cdtool.detect(f"{folder}/all.csv#soft_03", benchmark=path).detected.window == 1.0
-    assert [run.recording.name for run in cdtool.detect([folder / "all.csv"], benchmark=path)] == [
-        f"all.csv#{key}" for key in IDS
-    ]
-
-
-@pytest.mark.parametrize(
-    ("operations", "words"),
-    [
-        ('operations = "columns:x"', r"operations: is 'columns:x'"),
-        ("operations = 3", r"operations: is 3"),
-        ('operations = "column:"', r"operations: is 'column:' \(write column:NAME"),
-        ('[operations]\nby = "motion"', r"operations: is a table"),
-    ],
-)
-def test_a_wrong_cut_names_the_key(folder, operations, words):
-    with pytest.raises(ConfigurationError, match=words):
-        cdtool.benchmark(benchmark_file(folder, "wrong", operations, "all.csv#{}"))
-
-
 def test_the_files_of_runs_may_not_be_overwritten(folder, together):
     before = (folder / "all.csv").read_bytes()
     refused = command("benchmark", together, "-o", folder / "all.csv", "--force")
@@ -284,20 +259,6 @@ def test_runs_are_learned_from_until_their_onset_and_scored_without_their_own_pa
     assert figures(cdtool.benchmark(cut).results) == figures(one), "other patterns name the same runs"
 
 
-def test_a_load_cell_in_a_file_of_its_own_cannot_be_divided_into_runs(folder):
-    machine = (folder / "machine.toml").read_text().splitlines()
-    own = 'force = { file = "cell_{stem}.csv", column = "F", unit = "N", time_offset = 0.0, '
-    own += 'time = { column = "t", unit = "s" } }'
-    lines = [own if line.startswith("force = { column") else line for line in machine]
-    (folder / "own.toml").write_text("\n".join(lines))
-    path = changed(folder, "own_cell", 'operations = "column:run_id"', "all.csv#{}", ("machine.toml", "own.toml"))
-    with pytest.raises(ConfigurationError, match="operations: cannot divide a channel that is in a file of its own"):
-        cdtool.benchmark(path)
-    arguments = ("-m", folder / "own.toml", "--set=operations=column:run_id", "-d", "gm", "--set=threshold.limits=200")
-    done = command("detect", f"{folder / 'all.csv'}#stiff_03", *arguments)
-    assert done.status == 2 and "cannot be divided into the runs of" in one_line(done.err)
-
-
 def test_a_label_may_be_about_a_run_of_a_file_that_is_only_learned_from(folder):
     (folder / "learned.csv").write_text((folder / "all.csv").read_text())
     (folder / "about_runs.csv").write_text(
@@ -314,3 +275,17 @@ def test_a_label_may_be_about_a_run_of_a_file_that_is_only_learned_from(folder):
     )
     done = cdtool.benchmark(path).results
     assert [item.recording for item in done.skipped if "shows a contact" in item.reason] == ["learned.csv#free_03"]
+
+
+def test_a_load_cell_in_a_file_of_its_own_cannot_be_divided_into_runs(folder):
+    machine = (folder / "machine.toml").read_text().splitlines()
+    own = 'force = { file = "cell_{stem}.csv", column = "F", unit = "N", time_offset = 0.0, '
+    own += 'time = { column = "t", unit = "s" } }'
+    lines = [own if line.startswith("force = { column") else line for line in machine]
+    (folder / "own.toml").write_text("\n".join(lines))
+    path = changed(folder, "own_cell", 'operations = "column:run_id"', "all.csv#{}", ("machine.toml", "own.toml"))
+    with pytest.raises(ConfigurationError, match="operations: cannot divide a channel that is in a file of its own"):
+        cdtool.benchmark(path)
+    arguments = ("-m", folder / "own.toml", "--set=operations=column:run_id", "-d", "gm", "--set=threshold.limits=200")
+    done = command("detect", f"{folder / 'all.csv'}#stiff_03", *arguments)
+    assert done.status == 2 and "cannot be divided into the runs of" in one_line(done.err)

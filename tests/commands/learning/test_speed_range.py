@@ -99,14 +99,3 @@ def test_a_run_between_the_classes_teaches_none_of_them(door, learned):
     )
     assert all("no signature for its class" in item.reason for item in done.refused if "near" in item.recording)
     assert len(done.added) == 3 and all("slow" in name for name in done.added)
-
-
-def test_contacts_and_false_alarms_of_a_log_cut_into_strokes_have_its_name(door):
-    file = door / "names.toml"
-    file.write_text(
-        'machine = "machine.toml"\ndetectors = ["gm"]\noperations = "motion"\n'
-        'threshold = { name = "limit", limits = 0.001 }\n[impacts.push]\nlogs = ["slow_hits.csv"]\n',
-        encoding="utf-8",
-    )
-    result = cdtool.benchmark(file)
-    assert len(result.false_alarms) and set(result.false_alarms.recording) == set(result.contacts.recording)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import cdtool
-from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.base.errors import ConfigurationError
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from cdtool.formats.signature_store import write_signature
 from cdtool.thresholds.cusum import Cusum
@@ -162,15 +162,3 @@ def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_bud
     found = cdtool.detect(door / "hits.csv", door / "machine.toml", signature=tmp_path / "s.json", settings=MOTION)
     assert [found.detections[i].verdict.outcome for i in (1, 2, 5)] == ["alarm"] * 3
     assert found.detected.threshold.endswith(f"set for 1/8op on 24 operations, {wanted.alarms} alarms")
-
-
-def test_a_factor_set_by_hand_is_refused_with_a_budget_and_shown_without(door):
-    machine, logs = door / "machine.toml", [door / "free.csv"]
-    with pytest.raises(UsageError, match="set by hand cannot be combined with a false-alarm budget 1/8op"):
-        cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), settings=MOTION, false_alarm_budget="1/8op")
-    by_hand = cdtool.learn_signature(logs, machine, "gm", rule=Limit(9.0), settings=MOTION).signature
-    assert by_hand.described == "limit, safety factor 9 set by hand"
-    limits = cdtool.learn_signature(logs, machine, "gm", rule=Limit(limits=(50.0,)), settings=MOTION).signature
-    assert limits.described == "limit 50 N set by hand"
-    plain = cdtool.learn_signature(logs, machine, "gm", rule=Limit(), settings=MOTION).signature
-    assert plain.described == "limit, safety factor 5.5 by default"

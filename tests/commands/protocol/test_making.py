@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-import re
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,6 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import ConfigurationError, UsageError
-from cdtool.commands.protocol.assessment.plan import (
-    Instrument,
-    MachineParticulars,
-    MeasuringPoint,
-    TestParticulars,
-)
 from cdtool.commands.protocol.assessment.protocol import Protocol
 from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict
 from cdtool.commands.protocol.checking import check_protocol
@@ -204,53 +197,6 @@ def test_a_pattern_without_a_file_is_named_where_other_recordings_are_there(tmp_
         assert words_of("en").reasons(verdict, "incomplete")[0] == sentence
 
 
-def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
-    def touch_then_impact(time):
-        return half_sine(30.0)(time + 2.0) + half_sine(405.0)(time)
-
-    write_rig(tmp_path, (touch_then_impact, half_sine(404.0), half_sine(403.0)), seconds=9.0)
-    protocol = cdtool.protocol(write_protocol(tmp_path))
-    assert "too_many_repetitions" in kinds(protocol) and protocol.verdict.outcome == "incomplete"
-    many = next(reason for reason in protocol.verdict.reasons if reason.kind == "too_many_repetitions")
-    assert many.values == {"point": "edge", "present": 4, "planned": 3}
-
-
-def test_a_copy_of_a_recording_at_another_point_is_no_measurement_of_it(tmp_path):
-    write_rig(tmp_path, (*FORCES, half_sine(310.0), half_sine(330.0), half_sine(1.0)))
-    (tmp_path / "edge" / "06.csv").write_bytes((tmp_path / "edge" / "01.csv").read_bytes())
-    path = write_protocol(tmp_path, logs='logs = ["edge/0[123].csv"]')
-    text = path.read_text(encoding="utf-8")
-    point = text[text.index("[[protocol.point]]") :].replace('"edge"', '"other"').replace("0[123]", "0[456]")
-    path.write_text(text + point, encoding="utf-8")
-    protocol = cdtool.protocol(path)
-    assert (protocol.verdict.outcome, kinds(protocol)) == ("incomplete", ["same_recording"])
-    assert protocol.verdict.reasons[0].values == {"point": "other", "recording": "edge/06.csv", "other": "edge/01.csv"}
-
-
-def _with_decimals(rows: list[list[str]]) -> list[list[str]]:
-    return [[*row[:3], f"{float(row[3]):.1f}"] for row in rows]
-
-
-EXPORTS = {
-    "fewer decimals": _with_decimals,
-    "samples cut": lambda rows: rows[37:-5],
-    "every second sample": lambda rows: rows[::2],
-    "times that begin at 12 s": lambda rows: [[f"{float(row[0]) + 12.0:.4f}", *row[1:]] for row in rows],
-}
-
-
-@pytest.mark.parametrize("name", EXPORTS)
-def test_a_measurement_that_was_exported_again_is_no_repetition(name, tmp_path):
-    write_rig(tmp_path, FORCES[:2])
-    header, *rows = (tmp_path / "edge" / "02.csv").read_text(encoding="utf-8").splitlines()
-    written = [",".join(row) for row in EXPORTS[name]([row.split(",") for row in rows])]
-    (tmp_path / "edge" / "third.csv").write_text("\n".join([header, *written, ""]), encoding="utf-8")
-    protocol = cdtool.protocol(write_protocol(tmp_path))
-    assert protocol.verdict.outcome == "incomplete" and "same_measurement" in kinds(protocol)
-    sentence = words_of("en").reasons(protocol.verdict, "incomplete")[0]
-    assert sentence == "edge: edge/02.csv (contact 1) and edge/third.csv (contact 1) hold the same measurement"
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -317,15 +263,6 @@ def test_a_draft_takes_the_test_points_of_the_benchmark_and_names_logs_relative_
     assert check_protocol(draft.path).recordings == {"low": 2}
 
 
-def test_every_entry_is_explained_in_the_draft(tmp_path):
-    draft = draft_protocol(None, tmp_path / "empty.toml").path.read_text(encoding="utf-8")
-    words = " ".join(draft.replace("#", " ").split())
-    own_comment = {"quantity", "logs", "range_n_per_cm2"}
-    for kind in (MachineParticulars, TestParticulars, Instrument, MeasuringPoint):
-        for item in (item for item in fields(kind) if item.name not in own_comment):
-            assert re.search(rf"^(# )?{item.name} =", draft, re.MULTILINE) and item.metadata["meaning"] in words
-
-
 def test_before_anything_is_recorded_a_plan_can_be_drafted_and_checked(tmp_path):
     write_rig(tmp_path, [])
     path = write_protocol(tmp_path)
@@ -333,9 +270,3 @@ def test_before_anything_is_recorded_a_plan_can_be_drafted_and_checked(tmp_path)
     assert reasons == {"not_measured": "test_day", "benchmark_unreadable": "test_day"}
     draft = draft_protocol(None, tmp_path / "empty.toml")
     assert [point.logs for point in read_protocol_file(draft.path).plan.points] == [("point_1/*.csv",)]
-
-
-def test_the_sample_gate_fails_and_says_what_is_incomplete():
-    protocol = cdtool.protocol("sample_logs/gate/protocol.toml")
-    assert protocol.verdict.outcome == "fail"
-    assert set(kinds(protocol)) == {"point_exceeds", "record_too_short"}

@@ -47,20 +47,6 @@ def test_a_pressure_in_every_unit_is_the_same_peak(tmp_path, unit, scale):
     assert item.peak == pytest.approx(100.0, abs=0.5) and item.late_peak == pytest.approx(0.0, abs=0.5)
 
 
-@pytest.mark.parametrize(
-    ("pressure", "outcome", "kinds"),
-    [
-        (half_sine(230.0), "pass", []),
-        (half_sine(260.0), "fail", ["pressure_exceeds"]),
-        (held(230.0, 100.0), "pass", []),
-        (held(230.0, 130.0), "fail", ["pressure_exceeds"]),
-        (held(260.0, 130.0), "fail", ["pressure_exceeds"] * 2),
-    ],
-)
-def test_a_record_is_compared_with_both_limits(tmp_path, pressure, outcome, kinds):
-    assert result(made(tmp_path, Run(pressure))) == (outcome, kinds)
-
-
 def test_an_area_of_the_plan_has_its_own_limit_and_an_unknown_one_is_refused(tmp_path):
     area = 'body_area = "pectoral muscle"'
     assert result(made(tmp_path / "a", Run(half_sine(260.0)), point=area)) == ("pass", [])

@@ -39,15 +39,6 @@ def test_a_point_may_state_another_tolerance_but_not_one_that_hides_half_the_spe
         made(tmp_path / "c", steady(0.1), point="speed_tolerance_percent = 60")
 
 
-def test_a_machine_that_brakes_before_the_contact_has_the_speed_at_which_it_touches(tmp_path):
-    def braked(time):
-        return np.where(time < 0.0, 0.2 - 0.5 * np.maximum(time + 0.2, 0.0), 0.0)
-
-    protocol = made(tmp_path, braked)
-    assert result(protocol) == ("incomplete", ["speed_differs"])
-    assert protocol.points[0].repetitions[0].speed == pytest.approx(0.1, rel=0.03)
-
-
 def test_a_gap_before_the_contact_is_incomplete_and_noise_and_other_gaps_are_not(tmp_path):
     rng = np.random.default_rng(3)
 

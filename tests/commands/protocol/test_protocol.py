@@ -78,18 +78,6 @@ def test_from_a_rig_s_logs_to_a_protocol_in_four_commands_each_named_by_the_one_
     assert "print and sign" in made.out and "PASS" in Path("protocol.html").read_text(encoding="utf-8")
 
 
-@pytest.fixture
-def force_rig(tmp_path, monkeypatch) -> list[Path]:
-    """Return recordings with only a force, as a German rig writes them, in the current folder."""
-    write_rig(tmp_path, FORCES)
-    monkeypatch.chdir(tmp_path)
-    for path in Path("edge").iterdir():
-        rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
-        text = "".join(f"{row[0]};{row[3]}\n" for row in rows[1:]).replace(".", ",")
-        path.write_text(f"Zeit [s];Kraft [N]\n{text}", encoding="utf-8")
-    return sorted(Path("edge").iterdir())
-
-
 def test_a_benchmark_without_detectors_takes_those_of_the_option_and_else_names_the_protocol(rig, tmp_path):
     path = rig / "without.toml"
     path.write_text((rig / "benchmark.toml").read_text(encoding="utf-8").replace('["gm"]', "[]"), encoding="utf-8")
@@ -156,6 +144,30 @@ def test_check_is_not_complete_where_the_next_command_fails(rig, tmp_path, file,
     assert named in " ".join(checked.out.split())
 
 
+def test_a_protocol_without_its_file_and_a_file_without_a_protocol_name_the_next_step(rig, tmp_path):
+    benchmark = rig / "benchmark.toml"
+    without = cdtool("benchmark", benchmark, "-o", tmp_path / "protocol.html")
+    assert without.status == 2 and "cdtool protocol init" in without.err
+    unused = cdtool("benchmark", benchmark, "-p", write_protocol(rig), "-o", tmp_path / "report.html")
+    assert unused.status == 2 and "-o protocol.pdf" in unused.err
+    other = tmp_path / "other.toml"
+    other.write_text("[protocols]\n", encoding="utf-8")
+    for wrong in ("[protocols]\n", ""):
+        other.write_text(wrong, encoding="utf-8")
+        refused = cdtool("protocol", "check", other)
+        assert refused.status == 2 and "other.toml" in refused.err and len(refused.err.splitlines()) == 1
+
+
+def test_a_protocol_file_names_the_key_of_a_missing_file_and_is_no_benchmark_for_a_table_machine(tmp_path):
+    text = '[protocol]\nbenchmark = "b.toml"\nlimits = "yard.toml"\n[machine]\ntype = "gate"\n'
+    point = "[[protocol.point]]\nrepetition = 4\nspeed_tolerance_percent = 30\n"
+    (tmp_path / "protocol.toml").write_text(text + point, encoding="utf-8")
+    with pytest.raises(MistakesError) as caught:
+        read_protocol_file(tmp_path / "protocol.toml")
+    keys = ["machine", "protocol.limits", "protocol.point[1].repetition", "protocol.point[1].speed_tolerance_percent"]
+    assert sorted(fault.key for fault in caught.value.mistakes) == keys
+
+
 @pytest.mark.parametrize(
     ("names", "protocols"),
     [
@@ -171,68 +183,3 @@ def test_with_p_every_pdf_or_html_is_the_protocol_unless_one_has_its_name(names,
     assert [path.name for path in documents] == protocols
     assert [path.name for path in others] == [name for name in names if name not in protocols]
     assert protocol_names([Path("prot.pdf")], is_wanted=False)[0] == []
-
-
-def test_a_protocol_without_its_file_and_a_file_without_a_protocol_name_the_next_step(rig, tmp_path):
-    benchmark = rig / "benchmark.toml"
-    without = cdtool("benchmark", benchmark, "-o", tmp_path / "protocol.html")
-    assert without.status == 2 and "cdtool protocol init" in without.err
-    unused = cdtool("benchmark", benchmark, "-p", write_protocol(rig), "-o", tmp_path / "report.html")
-    assert unused.status == 2 and "-o protocol.pdf" in unused.err
-    other = tmp_path / "other.toml"
-    other.write_text("[protocols]\n", encoding="utf-8")
-    for wrong in ("[protocols]\n", ""):
-        other.write_text(wrong, encoding="utf-8")
-        refused = cdtool("protocol", "check", other)
-        assert refused.status == 2 and "other.toml" in refused.err and len(refused.err.splitlines()) == 1
-
-
-def test_without_typst_a_pdf_is_refused_before_the_benchmark_runs(rig, tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "typst", None)
-    made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "protocol.pdf")
-    assert made.status == 2 and made.out == ""
-    assert "pip install '.[pdf]'" in made.err and len(made.err.splitlines()) == 1
-
-
-def test_a_protocol_file_names_the_key_of_a_missing_file_and_is_no_benchmark_for_a_table_machine(tmp_path):
-    text = '[protocol]\nbenchmark = "b.toml"\nlimits = "yard.toml"\n[machine]\ntype = "gate"\n'
-    point = "[[protocol.point]]\nrepetition = 4\nspeed_tolerance_percent = 30\n"
-    (tmp_path / "protocol.toml").write_text(text + point, encoding="utf-8")
-    with pytest.raises(MistakesError) as caught:
-        read_protocol_file(tmp_path / "protocol.toml")
-    keys = ["machine", "protocol.limits", "protocol.point[1].repetition", "protocol.point[1].speed_tolerance_percent"]
-    assert sorted(fault.key for fault in caught.value.mistakes) == keys
-
-
-def test_a_deviation_without_its_point_and_a_point_twice_are_named_in_one_run(tmp_path):
-    more = '[[protocol.point]]\nname = "edge"\n' * 2 + '[[protocol.deviation]]\ntext = "a"\npoint = "rear edge"\n'
-    (tmp_path / "protocol.toml").write_text("[protocol]\n" + more, encoding="utf-8")
-    with pytest.raises(MistakesError) as caught:
-        read_protocol_file(tmp_path / "protocol.toml")
-    keys = ["protocol.deviation[1].point", "protocol.point[2].name"]
-    assert [fault.key for fault in caught.value.mistakes] == keys
-
-
-def test_an_unknown_group_and_a_body_area_without_a_limit_hide_nothing(tmp_path):
-    write_rig(tmp_path, FORCES)
-    points = [
-        'name = "a"\nprofile = "en_12453"\nbody_area = "palm"\n',
-        'name = "b"\nprofile = "en_12453_reducing_gap"\nbody_area = "palm"\n',
-    ]
-    text = '[protocol]\nbenchmark = "benchmark.toml"\n' + "".join(f"[[protocol.point]]\n{point}" for point in points)
-    (tmp_path / "protocol.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(MistakesError) as caught:
-        read_protocol_file(tmp_path / "protocol.toml")
-    assert [fault.key for fault in caught.value.mistakes] == [
-        "protocol.point[1].profile",
-        "protocol.point[2].body_area",
-    ]
-    groups = "".join(f'[[protocol.point]]\nname = "{name}"\ngroup = "{name}"\n' for name in ("none", "neither"))
-    (tmp_path / "protocol.toml").write_text(f'[protocol]\nbenchmark = "benchmark.toml"\n{groups}', encoding="utf-8")
-    outcome = cdtool("protocol", "check", tmp_path / "protocol.toml")
-    assert outcome.status == 2
-    lines = outcome.err.splitlines()
-    assert [line.split("protocol.toml: ")[1].split(":")[0] for line in lines] == [
-        "protocol.point[1].group",
-        "protocol.point[2].group",
-    ]

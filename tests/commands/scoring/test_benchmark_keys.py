@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import cdtool
-from cdtool.base.errors import ConfigurationError, MistakesError, UsageError
+from cdtool.base.errors import ConfigurationError, UsageError
 from cdtool.commands.scoring.benchmark import benchmark
 from cdtool.results.files.results_file import read_results, to_json
 
@@ -53,14 +53,6 @@ def test_a_label_file_replaces_the_load_cell(gate):
     for ours, theirs in zip(labelled.results.contacts, plain.results.contacts, strict=True):
         assert (ours.kind, ours.found_by) == ("head", "label file")
         assert ours.latency_ms == pytest.approx(theirs.latency_ms + 10.0, abs=1e-6)
-
-
-def test_limits_on_detectors_that_are_not_run_are_reported_and_not_checked(gate):
-    limits = '[limits]\n"feekf.stiff.max_ms" = { max = 1 }\n"*.missed" = { max = 0 }\n'
-    assert [item.outcome for item in run(gate, HEAD, LEARN, ONSET, STIFF, limits).results.limits].count("violated") == 1
-    done = run(gate, HEAD, LEARN, ONSET, STIFF, limits, detectors=["gm"])
-    assert [(item.limit, item.outcome) for item in done.results.limits] == [("*.missed", "met")]
-    assert any("1 of 2 limits not checked" in item.reason for item in done.results.findings)
 
 
 def test_force_profile_points_and_campaigns_become_rows(gate):
@@ -201,63 +193,3 @@ def test_a_missing_machine_file_hides_no_other_mistake(gate):
     expected = ["machine", "detectors[2]", "threshold", "learn.logs", *of_inject, *of_limits]
     assert [line.split(": ")[0] for line in said] == expected
     assert "machin.toml: no such file" in said[0] and "unknown detector 'gmm'" in said[1]
-
-
-@pytest.mark.parametrize("machine", ["", "machine = 3\n", "machine = machine.toml\n"])
-def test_a_machine_that_is_not_named_hides_no_other_mistake(gate, machine):
-    wrong = HEAD.replace('machine = "machine.toml"\n', machine).replace('"gm"', '"gmm"') + 'threshold = "cusun"\n'
-    with pytest.raises(ConfigurationError) as fault:
-        run(gate, wrong, '[learn]\nlogs = ["fre/*.csv"]\n', STIFF)
-    first, *others = [line.split("b.toml: ")[1] for line in str(fault.value).splitlines()]
-    assert first.startswith("not valid TOML: Invalid value (at line 1" if machine.endswith("toml\n") else "machine: ")
-    assert [line.split(": ")[0] for line in others] == ["detectors[2]", "threshold", "learn.logs"]
-
-
-def keys_of_mistakes(gate, *sections):
-    with pytest.raises(MistakesError) as caught:
-        run(gate, *sections)
-    return [fault.key for fault in caught.value.mistakes]
-
-
-def test_a_limit_or_campaign_of_a_wrong_group_or_detector_is_not_called_wrong(gate):
-    detectors = HEAD.replace('"gm"', '"gmm", "pi"')
-    groups = '[impacts]\nstiff = ["stiff/*.csv"]\n[impacts.soft]\nlogs = ["sof/*.csv"]\n'
-    named = '[campaigns.a]\nlogs = ["stiff/*.csv"]\n[points.b]\nlogs = ["stiff/*.csv"]\n[force]\nprofile = "en_1"\n'
-    limits = '[limits]\n"feekf.stiff.p95_ms" = { max = 3 }\n"gm.soft.p95_ms" = { max = 3 }\n"x.missed" = { max = 3 }\n'
-    keys = keys_of_mistakes(gate, detectors, LEARN, groups, named, limits, '"*.hard.missed" = { max = 3 }\n')
-    expected = ["impacts.stiff", "detectors[2]", "force.profile", "impacts.soft.logs", "limits.x.missed"]
-    assert keys == [*expected, "limits.*.hard.missed"]
-
-
-def test_a_joint_that_is_named_twice_and_a_missing_machine_are_two_mistakes(gate):
-    wrong = HEAD.replace("machine.toml", "machin.toml") + 'joints = ["arm", "arm"]\nwindow_s = 0\n'
-    assert keys_of_mistakes(gate, wrong, LEARN, STIFF) == ["window_s", "machine"]
-
-
-def test_a_mistake_of_the_machine_file_does_not_hide_one_of_the_benchmark(gate):
-    (gate / "wrong.toml").write_text(f"{(gate / 'machine.toml').read_text()}[detectors.gm]\nbandwidth = -1\n")
-    head = HEAD.replace("machine.toml", "wrong.toml").replace('"gm"', '"gmm", "friction_ekf"')
-    assert keys_of_mistakes(gate, head, LEARN, STIFF) == ["detectors.gm.bandwidth", "detectors[2]", "detectors[3]"]
-
-
-def test_all_mistakes_of_injected_contacts_are_named(gate):
-    inject = """[inject]
-logs = ["free/*.csv"]
-positions = ["0.9", "1.1m", 3]
-lever_arm_m = 0.3
-link = 1
-point = [0, 0, 1]
-joint = "leaf"
-[inject.obstacles.a]
-stiffness_n_per_mm = 3
-compare_with = "stif"
-[inject.obstacles.b]
-profile = "rubber"
-[tune]
-seed = -1
-thresholds = ["limits"]
-"""
-    keys = keys_of_mistakes(gate, HEAD, LEARN, STIFF, inject)
-    of_inject = ["positions[3]", "joint", "obstacles.a.compare_with", "obstacles.b.profile", "positions[1]"]
-    expected = [f"inject.{key}" for key in (*of_inject, "link", "point", "lever_arm_m")]
-    assert keys == [*expected, "tune.seed", "tune.thresholds"]

@@ -118,16 +118,6 @@ def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate, results
         assert not prepared.detect(log).runs[0].learned, "scored with what was learned from the others"
 
 
-def test_a_threshold_that_needs_the_logs_own_part_leaves_it_not_assessable_with_the_reason(gate):
-    few = setup_of(gate, HEAD, LEARN.replace("*.csv", "01.csv"), ONSET, GROUPS.replace("*.csv", "01.csv"))
-    done = benchmark(few).results
-    assert {row.outcome for row in done.contacts} == {"not_assessable"}
-    assert any(
-        "nothing can be learned from the other recordings: a limit needs at least 2" in str(item.reason)
-        for item in done.findings
-    )
-
-
 def test_sections_limit_what_is_learned_and_what_is_scored(gate):
     groups = '[impacts.stiff]\nfrom = "1s"\nlogs = ["stiff/0[12].csv", { path = "stiff/0[34].csv", to = "6.9s" }]\n'
     learn = '[learn]\nto = "0.5m"\nlogs = ["free/*.csv", { path = "soft/*.csv", from = "500ms" }]\n'
@@ -167,26 +157,6 @@ def test_a_log_whose_load_cell_is_lost_is_left_out_because_its_contact_would_be_
     assert "no contact found, and the load cell" in runs.skipped[0].reason
     done = benchmark(setup_of(tmp_path, HEAD, LEARN, ONSET, GROUPS)).results
     assert [row.outcome for row in done.contacts] == ["detected"] * 6
-
-
-def labels_of_contacts(gate, results):
-    rows = [row for row in results.contacts if row.group == "stiff"]
-    lines = [f"{row.recording},{row.onset_s},{row.onset_s + 0.2}" for row in rows]
-    (gate / "labels.csv").write_text("\n".join(["recording,start_s,end_s", *lines]), encoding="utf-8")
-
-
-def test_the_label_file_keeps_a_contact_out_of_a_part_that_is_learned_from(gate, results):
-    labels_of_contacts(gate, results)
-    machine = (gate / "machine.toml").read_text(encoding="utf-8").splitlines()
-    (gate / "blind.toml").write_text("\n".join(line for line in machine if "load_cell" not in line), encoding="utf-8")
-    learn = '[learn]\nlogs = ["free/*.csv", { path = "stiff/*.csv", to = "7s" }]\n'
-    onset = '[onset]\nlabels = "labels.csv"\n'
-    stiff = '[impacts.stiff]\nlogs = ["stiff/*.csv"]\n'
-    setup = setup_of(gate, HEAD.replace("machine.toml", "blind.toml"), learn, onset, stiff)
-    runs, _ = learned_of(setup)
-    assert [item.recording for item in runs.skipped] == [f"stiff/0{i}.csv" for i in range(1, 5)]
-    assert all("shows a contact" in item.reason for item in runs.skipped)
-    assert {row.outcome for row in benchmark(setup).results.contacts} == {"detected"}
 
 
 @pytest.mark.parametrize(
@@ -237,39 +207,6 @@ def test_a_log_without_ground_truth_or_with_too_little_before_the_contact_is_lef
     assert {operation.name for operation in runs.operations} >= {"free/01.csv", "free/02.csv"}
 
 
-def changed(log, rows, factor, column="i_motor"):
-    """Multiply a column of a log in some of its rows."""
-    header, *lines = log.read_text(encoding="utf-8").splitlines()
-    at = header.split(",").index(column)
-    for i in rows:
-        cells = lines[i].split(",")
-        cells[at] = repr(float(cells[at]) * factor)
-        lines[i] = ",".join(cells)
-    log.write_text("\n".join([header, *lines]), encoding="utf-8")
-
-
-def test_plausible_ranges_of_a_log_are_those_of_the_others(gate):
-    folder = gate.parent / "own"
-    shutil.copytree(gate, folder, dirs_exist_ok=True)
-    for name in ("01", "02"):
-        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 3.0)
-    own, _ = learned_of(setup_of(folder, HEAD, LEARN, ONSET, GROUPS))
-    alone, _ = learned_of(setup_of(folder, HEAD, LEARN.replace("stiff/*", "stiff/0[2-4]"), ONSET, GROUPS))
-    assert own.ranges.without("stiff/01.csv") == alone.ranges.all != own.ranges.all
-    assert own.ranges.without("free/01.csv") == own.ranges.all
-
-
-def test_a_value_far_from_those_of_the_other_logs_is_masked_whatever_its_own_log_has(gate):
-    """Two of six logs have fill values before their contacts; in the range of all, such values would be usual."""
-    folder = gate.parent / "fill"
-    shutil.copytree(gate, folder, dirs_exist_ok=True)
-    for name in ("01", "02"):
-        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 1e6)
-    parts = HEAD, LEARN.replace("soft/*", "soft/0[12]"), ONSET, GROUPS
-    found = [item.recording for item in benchmark(setup_of(folder, *parts)).results.findings if item.is_loss]
-    assert sorted(found) == ["stiff/01.csv", "stiff/02.csv"]
-
-
 @pytest.mark.parametrize("how", ["detour", "absolute", "link"])
 def test_no_log_judges_itself_whatever_its_path_is_written(gate, how):
     folder = gate / "stiff"
@@ -301,3 +238,46 @@ def test_the_load_cells_synchronisation_is_part_of_the_guard(gate):
     late, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, "synchronisation_s = 0.5\n", GROUPS))
     for before, after in zip(plain.operations, late.operations, strict=True):
         assert before.recording.end - after.recording.end == pytest.approx(0.5, abs=0.002)
+
+
+def test_a_threshold_that_needs_the_logs_own_part_leaves_it_not_assessable_with_the_reason(gate):
+    few = setup_of(gate, HEAD, LEARN.replace("*.csv", "01.csv"), ONSET, GROUPS.replace("*.csv", "01.csv"))
+    done = benchmark(few).results
+    assert {row.outcome for row in done.contacts} == {"not_assessable"}
+    assert any(
+        "nothing can be learned from the other recordings: a limit needs at least 2" in str(item.reason)
+        for item in done.findings
+    )
+
+
+def changed(log, rows, factor, column="i_motor"):
+    """Multiply a column of a log in some of its rows."""
+    header, *lines = log.read_text(encoding="utf-8").splitlines()
+    at = header.split(",").index(column)
+    for i in rows:
+        cells = lines[i].split(",")
+        cells[at] = repr(float(cells[at]) * factor)
+        lines[i] = ",".join(cells)
+    log.write_text("\n".join([header, *lines]), encoding="utf-8")
+
+
+def test_plausible_ranges_of_a_log_are_those_of_the_others(gate):
+    folder = gate.parent / "own"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    for name in ("01", "02"):
+        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 3.0)
+    own, _ = learned_of(setup_of(folder, HEAD, LEARN, ONSET, GROUPS))
+    alone, _ = learned_of(setup_of(folder, HEAD, LEARN.replace("stiff/*", "stiff/0[2-4]"), ONSET, GROUPS))
+    assert own.ranges.without("stiff/01.csv") == alone.ranges.all != own.ranges.all
+    assert own.ranges.without("free/01.csv") == own.ranges.all
+
+
+def test_a_value_far_from_those_of_the_other_logs_is_masked_whatever_its_own_log_has(gate):
+    """Two of six logs have fill values before their contacts; in the range of all, such values would be usual."""
+    folder = gate.parent / "fill"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    for name in ("01", "02"):
+        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 1e6)
+    parts = HEAD, LEARN.replace("soft/*", "soft/0[12]"), ONSET, GROUPS
+    found = [item.recording for item in benchmark(setup_of(folder, *parts)).results.findings if item.is_loss]
+    assert sorted(found) == ["stiff/01.csv", "stiff/02.csv"]

@@ -6,8 +6,7 @@ import json
 
 import pytest
 
-import cdtool as api
-from cdtool.base.errors import ConfigurationError, UsageError
+from cdtool.base.errors import UsageError
 from cdtool.commands.judging.settings_table import apply_settings, given_settings
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
 from tests.command import cdtool
@@ -74,12 +73,6 @@ def test_a_wrong_setting_is_one_line_that_names_the_option(gate_folder, text, sa
     assert done.status == 2 and said in done.err and "Traceback" not in done.err
 
 
-def test_a_unit_behind_a_key_gets_the_unit_of_the_key_without_a_benchmark_file_too(gate_folder):
-    log, machine = gate_folder / "stiff/01.csv", ("-m", gate_folder / "machine.toml")
-    done = cdtool("detect", log, *machine, "-d", "gm", "--set", "activation.debounce_ms=9")
-    assert done.status == 2 and "(give activation.debounce: consecutive samples outside" in done.err
-
-
 def test_values_are_those_of_toml_and_a_bare_word_is_a_text():
     found = given_settings(["a.b=1.5", "a.c=word", "a.d=[1, 2]", "e=true", 'f="x"'])
     assert found == {"a.b": 1.5, "a.c": "word", "a.d": [1, 2], "e": True, "f": "x"}
@@ -91,19 +84,6 @@ def test_values_are_those_of_toml_and_a_bare_word_is_a_text():
     }
     with pytest.raises(UsageError, match="--set is '=3'"):
         given_settings(["=3"])
-
-
-def test_a_threshold_named_by_a_text_may_get_settings():
-    assert apply_settings({"threshold": "cusum"}, {"threshold.drift": 0.5}) == {
-        "threshold": {"name": "cusum", "drift": 0.5}
-    }
-
-
-def test_python_has_the_same(gate_folder):
-    setup = read_benchmark_file(gate_folder / "benchmark.toml", settings={"window_s": 0.3})
-    assert setup.window == 0.3
-    with pytest.raises(ConfigurationError, match="--set window_s: is -1"):
-        api.benchmark(gate_folder / "benchmark.toml", detectors=["gm"], settings={"window_s": -1})
 
 
 def test_a_command_refuses_the_keys_that_it_does_not_read_and_names_one_that_does(gate_folder):
@@ -120,12 +100,6 @@ def test_a_command_refuses_the_keys_that_it_does_not_read_and_names_one_that_doe
         done = cdtool(*command, "--set", key)
         assert done.status == 2 and f"--set {key.partition('=')[0]}: has no effect in this command" in done.err, command
     assert cdtool(*score, "--set", "activation.rearm_s=0.1").status in (0, 1, 3)
-
-
-def test_the_file_may_have_a_section_of_another_command(gate_folder):
-    text = (gate_folder / "benchmark.toml").read_text(encoding="utf-8")
-    (gate_folder / "with_tune.toml").write_text(text + '[tune]\nobjective = "p95"\n', encoding="utf-8")
-    assert cdtool("benchmark", gate_folder / "with_tune.toml", "-d", "gm", "-q").status in (0, 1)
 
 
 def test_detectors_as_a_setting_are_those_of_the_option(gate_folder, tmp_path):

@@ -14,9 +14,8 @@ import cdtool
 from cdtool.base.errors import OutputError, RecordingError
 from cdtool.commands.scoring import benchmark, pieces
 from cdtool.commands.scoring.benchmark_file import read_benchmark_file
-from cdtool.commands.scoring.learned import Learned, Teaching
+from cdtool.commands.scoring.learned import Teaching
 from cdtool.commands.scoring.store.determinants import Determinants
-from cdtool.commands.scoring.store.stored_learned import learned_with_store
 from cdtool.execution.store.sources import read_sources
 from cdtool.execution.store.store import Store
 from cdtool.execution.workers import Workers
@@ -182,25 +181,6 @@ def test_content_is_compared_not_times(gate, tmp_path):
     assert run(gate, tmp_path / "s")[1] == 0
 
 
-def test_a_reading_error_is_stored(gate, tmp_path):
-    (gate / "stiff" / "02.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
-    expected = alone(gate)
-    assert run(gate, tmp_path / "s") == (expected, 6)
-    assert run(gate, tmp_path / "s") == (expected, 0)
-
-
-@pytest.mark.parametrize("operations", ["", 'operations = "clock-reset"'])
-def test_a_log_that_cannot_be_read_stays_one_with_another_detector(gate, tmp_path, operations):
-    (gate / "stiff" / "02.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
-    write(gate, operations=operations)
-    run(gate, tmp_path / "s")
-    text = (gate / "b.toml").read_text(encoding="utf-8")
-    (gate / "b.toml").write_text(text.replace('"friction_ekf"]', '"friction_ekf", "pure_torque"]'), encoding="utf-8")
-    expected = alone(gate)
-    assert run(gate, tmp_path / "s") == (expected, 6)
-    assert run(gate, tmp_path / "s") == (expected, 0)
-
-
 def test_an_error_of_the_system_is_not_stored(gate, tmp_path, monkeypatch):
     def fail(path: Path, *_: object) -> None:
         raise RecordingError(f"{path}: cannot be read: the disk is gone") from OSError(5, "Input/output error")
@@ -254,26 +234,6 @@ def logs_in(store: Path) -> list[Path]:
     return [path for path in (store / "logs").rglob("*") if path.is_file()]
 
 
-def test_a_detector_refused_in_a_group_is_not_found_under_the_key_of_one_that_is_not(gate):
-    setup = read_benchmark_file(write(gate))
-    teaching = Teaching(setup, Workers())
-    groups = {name: replace(item, refused={"momentum": "no stiffness"}) for name, item in setup.impacts.items()}
-    one, other = (Determinants(each, teaching.learned, {}, {}) for each in (setup, replace(setup, impacts=groups)))
-    group, item = next(iter(setup.impacts.items()))
-    assert one.key(group, item.logs[0], ()) != other.key(group, item.logs[0], ())
-
-
-def test_a_renamed_part_of_a_log_is_another_log(tmp_path):
-    for name in ("a.mcap", "b.mcap"):
-        (tmp_path / name).write_bytes(b"x")
-    before = read_sources(sorted(tmp_path.iterdir()))
-    (tmp_path / "a.mcap").rename(tmp_path / "c.mcap")
-    after = read_sources(sorted(tmp_path.iterdir()))
-    assert before is not None and after is not None
-    assert {item.digest for item in before} == {item.digest for item in after}
-    assert [item.content for item in before] != [item.content for item in after]
-
-
 def test_a_damaged_or_missing_file_is_computed_again(gate, tmp_path):
     expected, _ = run(gate, tmp_path / "s")
     first, second, *_ = logs_in(tmp_path / "s")
@@ -319,18 +279,21 @@ def test_a_folder_that_is_not_a_store_is_refused(gate):
     assert not (gate / "logs").exists()
 
 
-def test_what_was_learned_is_not_learned_again(gate, tmp_path):
-    bad = gate / "free" / "99.csv"
-    bad.write_text("no table")
-    run(gate, tmp_path / "store")
+def test_a_detector_refused_in_a_group_is_not_found_under_the_key_of_one_that_is_not(gate):
     setup = read_benchmark_file(write(gate))
-    asked = []
+    teaching = Teaching(setup, Workers())
+    groups = {name: replace(item, refused={"momentum": "no stiffness"}) for name, item in setup.impacts.items()}
+    one, other = (Determinants(each, teaching.learned, {}, {}) for each in (setup, replace(setup, impacts=groups)))
+    group, item = next(iter(setup.impacts.items()))
+    assert one.log_key(group, item.logs[0], ()) != other.log_key(group, item.logs[0], ())
 
-    class Asked(Teaching):
-        @property
-        def learned(self) -> Learned:
-            asked.append(1)
-            return super().learned
 
-    learned, _ = learned_with_store(Store(tmp_path / "store"), Asked(setup, Workers()))
-    assert not asked and [item.recording for item in learned.about.skipped] == ["free/99.csv"]
+def test_a_renamed_part_of_a_log_is_another_log(tmp_path):
+    for name in ("a.mcap", "b.mcap"):
+        (tmp_path / name).write_bytes(b"x")
+    before = read_sources(sorted(tmp_path.iterdir()))
+    (tmp_path / "a.mcap").rename(tmp_path / "c.mcap")
+    after = read_sources(sorted(tmp_path.iterdir()))
+    assert before is not None and after is not None
+    assert {item.digest for item in before} == {item.digest for item in after}
+    assert [item.content for item in before] != [item.content for item in after]

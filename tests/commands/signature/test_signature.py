@@ -35,16 +35,6 @@ def check(signature: Path, gate_folder: Path, *arguments: object) -> Outcome:
     return cdtool("signature", "check", signature, *arguments, "-m", gate_folder / "machine.toml")
 
 
-def test_show_lists_the_content_of_the_file(signature):
-    done = cdtool("signature", "show", signature)
-    assert done.status == 0, done.err
-    for words in ("friction_ekf", "safety factor 5.5 by default", "debounce 9 ms", "forward at 0.201 m/s", "11"):
-        assert words in done.out, done.out
-    values = json.loads(cdtool("signature", "show", signature, "--json").out)
-    assert len(values["runs"]) == 11 and values["classes"][0]["runs"] == 11
-    assert [joint["moved"] for joint in values["classes"][0]["joints"]] == [0.0]
-
-
 def test_runs_learned_from_are_checked_against_the_others(signature, gate_folder):
     done = check(signature, gate_folder, *logs_of(gate_folder))
     assert done.status == 0, done.err

@@ -18,7 +18,6 @@ from cdtool.commands.simulate.arm_model import (
     specific_force,
 )
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
-from cdtool.machines.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 
 ARM = ArmParameters()
 QUIET = replace(
@@ -111,9 +110,6 @@ def energy(trial: Trial, impact: Impact, truth: dict[str, Array], obstacle: floa
     return np.asarray(kinetic + 9.81 * height + springs + bristles + contact)
 
 
-# Mechanics
-
-
 @pytest.mark.parametrize(("trial", "impact"), HITS)
 def test_a_lossless_arm_keeps_its_energy_through_the_impact(trial: Trial, impact: Impact) -> None:
     truth, obstacle = coast(LOSSLESS, trial, impact)
@@ -151,14 +147,6 @@ def test_the_drives_wind_up_in_rest_as_their_two_stiffnesses_say() -> None:
     assert ARM.wind_up(-torque) == pytest.approx(-wind_up[0], rel=1e-6)
 
 
-def test_the_inertias_and_gravity_torques_are_the_design_s() -> None:
-    assert ARM.arm_inertia == pytest.approx(0.18148)
-    assert ARM.forearm_inertia == pytest.approx(0.06984)
-    assert ARM.coupling_inertia == pytest.approx(0.0864)
-    assert ARM.gravity_torque == pytest.approx((6.49422, 2.82528))
-    assert ARM.reflected_inertia == pytest.approx((0.054, 0.054))
-
-
 def test_the_integration_is_of_fourth_order_where_the_laws_are_smooth() -> None:
     smooth = replace(LOSSLESS, speed_gain=4.4, integral_gain=50.0, soft_stiffness=800.0, torque_limit=1e9)
     samples = 200
@@ -177,9 +165,6 @@ def test_the_integration_is_of_fourth_order_where_the_laws_are_smooth() -> None:
     assert order == pytest.approx(4.0, abs=0.3)
 
 
-# Motion
-
-
 @pytest.mark.parametrize("trial", [1, 2])
 def test_the_arm_meets_the_obstacle_at_its_angle_and_nominal_speed(trial: Trial) -> None:
     angles, speeds = [], []
@@ -192,12 +177,6 @@ def test_the_arm_meets_the_obstacle_at_its_angle_and_nominal_speed(trial: Trial)
     assert np.mean(angles) == pytest.approx((62.0, 72.5)[trial - 1], abs=0.5)
     assert 0.1 < np.std(angles) < 1.0
     assert np.mean(speeds) == pytest.approx(np.radians(16.0), rel=0.04)
-
-
-# Randomness
-
-
-# Measured channels
 
 
 def test_an_ideal_inertial_sensor_feels_the_second_derivative_of_its_place_and_gravity() -> None:
@@ -220,24 +199,3 @@ def test_an_ideal_inertial_sensor_feels_the_second_derivative_of_its_place_and_g
         pull = (before - 2.0 * now + after) / step**2 + np.array([[0.0], [9.81]])
         axis = np.array([-np.sin(position[link]), np.cos(position[link])])
         np.testing.assert_allclose(felt[link], np.sum(pull * axis, axis=0), atol=1e-5)
-
-
-def test_the_noise_of_each_channel_has_its_stated_size() -> None:
-    run = run_of(2, "none")
-    still, cruise = (run.time > 0.1) & (run.time < 0.3), run.time > 0.7
-    assert np.std(run.load_cell) == pytest.approx(0.1, rel=0.05)
-    keep = np.exp(-1.0 / 4.0)
-    white = 0.1 / 60.0 * np.sqrt((1.0 - keep) / (1.0 + keep))
-    lagged = first_order_low_pass(run.drive_torque[:, 1] / 60.0, 4e-3, ARM.sample_period)
-    assert np.std((run.motor_torque[:, 1] - lagged)[still]) == pytest.approx(white, rel=0.2)
-    felt = specific_force(ARM, run.joint_position.T, run.joint_speed.T, run.joint_acceleration.T).T
-    gravity = 9.81 * np.cos(run.joint_position[still].mean(axis=0))
-    np.testing.assert_allclose(run.imu[still].mean(axis=0), gravity + ARM.imu_bias, atol=0.02)
-    # White noise of 0.12 m/s2 through 78 Hz; while the arm moves, 0.1 m/s2 of vibration at 30 Hz come on top.
-    passed = [second_order_low_pass(felt[:, j] - felt[0, j], 78.0, 0.8, ARM.sample_period) for j in (0, 1)]
-    added = run.imu - felt[0] - np.column_stack(passed)
-    quiet, shaken = (np.std(added[part], axis=0) for part in (still, cruise))
-    assert np.all((quiet > 0.03) & (quiet < 0.09))
-    assert np.all((shaken > 0.09) & (shaken < 0.2))
-    steps = run.imu / ARM.imu_resolution
-    np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,13 +9,13 @@ import numpy as np
 import pytest
 
 import cdtool
-from cdtool.base.errors import UsageError
 from cdtool.commands.simulate.arm_model import ArmRun, Impact, simulate_arm_run
 from cdtool.commands.simulate.arm_parameters import ArmParameters, Trial
 from cdtool.commands.simulate.arm_recordings import simulate_arm
 from cdtool.formats.machine_file import MachineFile, read_machine_file
 from cdtool.recordings.recording import Recording
 from tests.command import cdtool as command
+from tests.command import keys
 from tests.synthetic.arm_as_recording import as_recording
 
 ARM = ArmParameters()
@@ -65,43 +63,28 @@ def test_a_log_read_back_is_the_simulated_run_but_for_rounding(folder: Path, nam
         np.testing.assert_allclose(read[channel].values, expected[channel].values, atol=limit)
 
 
-def test_the_links_true_motion_is_found_again_on_the_load_side(folder: Path) -> None:
-    run = simulated(1, 0, "none", 1)
-    read = cdtool.read(folder / "free" / "01.mcap", folder / "machine.toml")
-    # Motor minus link is the drive's wind-up, some 10 mrad; the sensors' low-passes lag behind.
-    np.testing.assert_allclose(read["position"].values, run.joint_position, atol=0.02)
-    cruise = run.time > 0.7
-    np.testing.assert_allclose(
-        read["speed"].values[cruise].mean(axis=0), run.joint_speed[cruise].mean(axis=0), atol=2e-3
-    )
-    for joint in (0, 1):
-        truth, felt = run.joint_acceleration[:-3, joint], read["acceleration"].values[3:, joint]
-        assert np.corrcoef(truth, felt)[0, 1] > 0.8
-        assert np.polyfit(truth, felt, 1)[0] == pytest.approx(1.0, abs=0.15)
+def _simulated(folder, free, holdout, stiff, machine="gate"):
+    counts = keys(free=free, holdout=holdout, stiff=stiff, soft=0)
+    done = command("simulate", machine, *counts, "--seed", 5, "-o", folder)
+    assert done.status == 0, done.err
+    return done.out
 
 
-@pytest.mark.parametrize(("trial", "watched"), [(1, "arm"), (2, "forearm")])
-def test_the_benchmark_file_watches_the_link_that_is_hit(tmp_path: Path, trial: Trial, watched: str) -> None:
-    simulate_arm(tmp_path / "logs", {"free": 2, "soft": 1}, seed=6, trial=trial)
-    values = tomllib.loads((tmp_path / "logs" / "benchmark.toml").read_text())
-    assert values["joints"] == [watched]
-    assert values["learn"]["logs"] == ["free/*.csv"]
-    assert list(values["impacts"]) == ["soft"]
-    assert values["signature"] == {"force": True, "position_step": 2e-3, "position_window": 22e-3, "sides": "one"}
-    assert values["activation"] == {"debounce": 7}
-    assert values["onset"] == {"above_n": 0.5, "back_to_n": 0.5, "hold_s": 0.003}
+@pytest.mark.parametrize("counts", [(2, 0, 1), (2, 1, 0), (10, 0, 1), (2, 0, 1, "arm")])
+def test_the_written_benchmark_runs(tmp_path, counts):
+    assert "benchmark.toml" in _simulated(tmp_path / "gate", *counts).splitlines()[0]
+    done = command("benchmark", tmp_path / "gate" / "benchmark.toml", "--detectors", "pt")
+    assert done.status == 0, done.err
+    forced = "force = true" in (tmp_path / "gate" / "benchmark.toml").read_text(encoding="utf-8")
+    assert forced == (counts[0] < 10)
 
 
-def test_what_cannot_be_written_is_refused_before_anything_is(folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no recording is requested"):
-        simulate_arm(tmp_path / "none", {}, seed=1)
-    with pytest.raises(UsageError, match="not an empty folder"):
-        simulate_arm(folder, COUNTS, seed=1)
-    with pytest.raises(UsageError, match="encoder_counts is 0"):
-        simulate_arm(tmp_path / "ideal", COUNTS, seed=1, parameters=replace(ARM, encoder_counts=0))
-    with pytest.raises(UsageError, match="unknown trial 3"):
-        simulate_arm(tmp_path / "third", COUNTS, seed=1, trial=3)  # type: ignore[arg-type]
-    assert command("simulate", "arm", "--trial", 3, "-o", tmp_path / "third").status == 2
-    assert command("simulate", "gate", "--trial", 2, "-o", tmp_path / "third").status == 2
-    assert command("simulate", "arm", "--set", "format=cvs", "-o", tmp_path / "third").status == 2
-    assert not any(tmp_path.iterdir())
+@pytest.mark.parametrize(
+    ("counts", "why"),
+    [((0, 1, 1), "--set free=10"), ((1, 0, 1), "--set free=10"), ((2, 0, 0), "set holdout, stiff or soft")],
+)
+def test_an_unusable_benchmark_is_not_written_and_the_reason_is_shown(tmp_path, counts, why):
+    shown = _simulated(tmp_path / "gate", *counts).splitlines()
+    assert not (tmp_path / "gate" / "benchmark.toml").exists()
+    assert len(shown) == 2 and shown[1].startswith("no benchmark.toml: ") and shown[1].endswith(why)
+    assert "recordings" in shown[0] or counts == (0, 0, 1)

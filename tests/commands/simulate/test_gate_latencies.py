@@ -11,12 +11,12 @@ import pytest
 
 from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import detect_operation
+from cdtool.commands.learning.fitting import fit_operations
 from cdtool.detectors import DETECTORS
 from cdtool.recordings.operations import operations_of
 from cdtool.thresholds.signature import Signature
 from cdtool.truth.matching import match
 from cdtool.truth.onset import OnsetRule, find_contacts
-from tests.fitted_runs import fit_operations
 
 REFERENCE = {
     "none": {},

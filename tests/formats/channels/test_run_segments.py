@@ -36,12 +36,6 @@ def test_every_sample_with_an_id_is_in_exactly_one_run_which_has_this_id(parts):
         assert len(set(names(found))) == len(found)
 
 
-def test_missing_ids_are_bridged_only_between_equal_ids():
-    ids = np.array([NAN, 1.0, NAN, 1.0, NAN, 2.0, NAN])
-    assert spans(segments_by_id(ids, {}, True)) == [(1, 4), (5, 6)]
-    assert spans(segments_by_id(ids, {}, False)) == [(1, 2), (3, 4), (5, 6)]
-
-
 def test_texts_that_would_have_the_same_name_have_names_of_their_own():
     words = {-1.0: "A", -2.0: "A/2", -3.0: " A_2", -4.0: "..\\A"}
     assert names(segments_by_id(np.array([-2.0, -3.0, -4.0]), words, True)) == ["A_2", "A_2/2", ".._A"]
@@ -72,24 +66,6 @@ def test_single_stray_or_missing_stamps_are_no_new_run(stray):
     assert len(segments_by_reset(stamps)) == 1
 
 
-def test_rows_out_of_order_by_a_small_step_are_no_new_run():
-    stamps = np.arange(400) * 0.01
-    stamps[200:210], stamps[210:220] = stamps[210:220].copy(), stamps[200:210].copy()
-    assert len(segments_by_reset(stamps)) == 1
-
-
 @pytest.mark.parametrize(("bits", "step"), [(16, 10), (32, 1000000)])
 def test_a_counter_that_wraps_is_no_new_run(bits, step):
     assert len(segments_by_reset((np.arange(20000) * step % 2**bits).astype(float))) == 1
-
-
-def test_missing_stamps_do_not_hide_that_a_clock_starts_again():
-    run = np.arange(50) * 0.01
-    stamps = np.concatenate((run, run, run))
-    stamps[[49, 51, 99, 103]] = NAN
-    assert spans(segments_by_reset(stamps)) == [(0, 50), (50, 100), (100, 150)]
-
-
-def test_a_clock_that_only_runs_backward_has_runs_of_single_rows():
-    found = segments_by_reset(np.arange(300.0, 0.0, -1.0))
-    assert np.all(found.stop - found.start <= 3) and found.stop[-1] == 300

@@ -91,44 +91,26 @@ def test_at_most_a_tenth_is_transferred_and_everything_is_as_in_a_local_file(mem
     assert len(here.digest) == 64 and there.digest.startswith("modified:")
 
 
-def test_topics_and_counts_are_those_of_the_whole_file(memory, machine, tmp_path):
-    content = recorded()
-    memory.pipe_file("/logs/large.mcap", content)
-    (tmp_path / "large.mcap").write_bytes(content)
-    here, there = cdtool.info(tmp_path / "large.mcap", machine=machine), cdtool.info(URL, machine=machine)
-    assert (here.details, here.channels, here.findings) == (there.details, there.channels, there.findings)
-    assert cdtool.info(tmp_path / "large.mcap").channels == cdtool.info(URL).channels
+def flipped(content: bytes) -> bytes:
+    return content[:200_000] + bytes([content[200_000] ^ 1]) + content[200_001:]
 
 
-def test_a_file_without_checksums_is_read_as_a_whole(memory, machine, tmp_path):
-    content = recorded(crc=False)
+@pytest.mark.parametrize(
+    ("make", "share", "count"),
+    [
+        (lambda: recorded(crc=False), (0.9, 2.0), 10_000),
+        (lambda: flipped(recorded()), (0.0, 2.0), 5000),
+        (lambda: recorded()[:-5_000_000], (0.0, 2.0), 5000),
+        (lambda: recorded(chunks=2, every=2), (1.0, 1.0), 5000),
+    ],
+    ids=["without checksums: as a whole", "damaged", "cut", "small: in one request"],
+)
+def test_any_other_file_has_the_same_samples_and_losses_as_a_local_one(memory, machine, tmp_path, make, share, count):
+    content = make()
     here, there, size = read_both(content, memory, machine, tmp_path)
-    assert size >= 0.9 * len(content) and there.findings == here.findings
-    assert here["torque"].values.tobytes() == there["torque"].values.tobytes()
-
-
-def test_damage_in_what_is_read_is_the_same_loss(memory, machine, tmp_path):
-    content = bytearray(recorded())
-    content[200_000] ^= 1
-    here, there, _ = read_both(bytes(content), memory, machine, tmp_path)
-    assert there.findings[: len(here.findings)] == here.findings or {str(item) for item in there.findings} == {
-        str(item) for item in here.findings
-    }
-    assert any(item.severity == "loss" for item in there.findings)
-    assert len(there["torque"].time) == len(here["torque"].time) == 5000
-
-
-def test_a_cut_file_is_read_to_its_end(memory, machine, tmp_path):
-    content = recorded()
-    here, there, _ = read_both(content[: len(content) - 5_000_000], memory, machine, tmp_path)
-    assert [str(item) for item in there.findings] == [str(item) for item in here.findings]
-    assert here["torque"].values.tobytes() == there["torque"].values.tobytes()
-
-
-def test_a_small_file_is_copied_in_one_request(memory, machine, tmp_path):
-    content = recorded(chunks=2, every=2)
-    here, there, size = read_both(content, memory, machine, tmp_path)
-    assert size == len(content) and there.digest == here.digest
+    assert share[0] * len(content) <= size <= share[1] * len(content)
+    assert {str(item) for item in there.findings} == {str(item) for item in here.findings}
+    assert there["torque"].values.tobytes() == here["torque"].values.tobytes() and len(there["torque"]) == count
 
 
 def test_a_file_that_is_replaced_while_it_is_read_is_not_used(memory, machine, monkeypatch):

@@ -34,14 +34,6 @@ def missing_messages(path):
     return [finding for finding in Mcap().columns(path).findings if finding.kind == "missing_messages"]
 
 
-def test_jumps_are_counted_with_the_time_of_the_first(tmp_path):
-    numbers = [i + 1 for i in range(400) if i not in (100, 101, 102, 300)]
-    path = write(tmp_path / "log.mcap", [("/a", number - 1, number) for number in numbers])
-    assert missing_messages(path) == [
-        Finding("missing_messages", "/a", {"jumps": 2, "missing": 4, "after": 0.099, "of_topic": True})
-    ]
-
-
 @pytest.mark.parametrize(
     "numbers",
     [

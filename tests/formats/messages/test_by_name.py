@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 from cdtool.base.errors import RecordingError
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.messages.decoded_batch import ABSENT, OTHER_JOINTS, PRESENT
 from cdtool.formats.messages.decoders import decoder_for
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 from tests.formats.messages import test_cdr, test_ros1
-from tests.formats.messages.batches import assert_follows_field_language, batch_of, fields_of, same
+from tests.formats.messages.batches import assert_follows_field_language, batch_of, fields_of
 from tests.formats.messages.protobuf_messages import add, descriptor_pb2, make_decoder
 
 RULE = "=" * 80
@@ -128,57 +127,12 @@ def test_random_messages_decode_as_the_field_language_defines(encoding, differen
             assert_follows_field_language(decoded, messages[::step], fields, joints)
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS[1:])
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(messages=st.lists(things, min_size=1, max_size=6))
-def test_every_encoding_decodes_to_the_values_of_json(encoding, messages):
-    fields = fields_of(*WANTED)
-    batches = []
-    for each in ("json", encoding):
-        decoder, payloads = encode(each, messages)
-        batches.append(decoder.decode(batch_of(payloads), fields))
-    for field, expected, field_values in zip(fields, batches[0].fields, batches[1].fields, strict=True):
-        assert field_values.state.tolist() == expected.state.tolist(), field.text
-        assert same(field_values.values, expected.values), field.text
-        there = expected.state == PRESENT
-        assert expected.count is None or (field_values.count[there] == expected.count[there]).all(), field.text
-        assert (field_values.fault is None) == (expected.fault is None), field.text
-        if expected.fault is not None:
-            assert field_values.fault.problem == expected.fault.problem, field.text
-
-
 def states(order, **more):
     return {"name": order, "pose": [item(ord(name)) for name in order], "group": []} | more
 
 
 def item(x):
     return {"x": float(x), "name": [], "q": [x, x + 1], "part": []}
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_an_element_beyond_the_end_of_an_array_in_a_named_element_is_a_fault_of_its_message(encoding):
-    messages = [states(["b"]), states(["a", "b"]), states(["a"])]
-    decoder, payloads = encode(encoding, messages)
-    (field_values,) = decoder.decode(batch_of(payloads), fields_of("pose[b].q[2]")).fields
-    assert field_values.state.tolist() == [ABSENT, ABSENT, OTHER_JOINTS]
-    assert field_values.fault.problem == "'q' has 2 elements" and field_values.fault.known == ("q[0] to q[1]",)
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS[1:])
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("pose[b].y", "there is no 'y'"),
-        ("pose[b].part[a].y", "there is no 'y'"),
-        ("pose[b]", "'pose[b]' has members"),
-        ("pose[b].name[0]", "is a string"),
-        ("group[b].pose[b].x[0]", "'x' is not an array"),
-    ],
-)
-def test_a_field_that_the_schema_does_not_have_is_absent_with_the_reason(encoding, text, problem):
-    decoder, payloads = encode(encoding, [states(["a", "b"])])
-    (field_values,) = decoder.decode(batch_of(payloads), fields_of(text)).fields
-    assert field_values.state.tolist() == [ABSENT] and problem in field_values.fault.problem
 
 
 def test_damage_that_only_one_field_reveals_applies_to_all_fields_of_the_message():

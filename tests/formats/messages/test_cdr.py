@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 import tracemalloc
 from io import BytesIO
 from types import SimpleNamespace
@@ -103,26 +102,6 @@ def test_a_message_cut_at_any_byte_is_damaged_and_never_a_value(data):
     assert all(alone)
 
 
-def test_messages_alike_are_read_together_and_names_may_change_between_them():
-    text = "string frame_id\nstring[] name\nfloat64[] position\nint16 last"
-    row = {"frame_id": "base", "name": ["a", "b"], "position": [1.5, -2.5], "last": 7}
-    other = {"frame_id": "gripper", "name": ["b", "a"], "position": [3.0, 4.0], "last": 8}
-    shuffled = row | {"name": ["b", "a"]}
-    wanted = fields_of("position[:]", "position[b]", "last")
-    for messages in ([row] * 3, [row, other, row], [other] * 2, [row, shuffled, row, shuffled]):
-        decoder = decoder_of(text)
-        walks = []
-        walk = decoder.walk
-        decoder.walk = lambda *arguments, walks=walks, walk=walk: walks.append(1) or walk(*arguments)
-        for _ in range(2):
-            decoded = decoder.decode(batch_of([encode(text, each) for each in messages]), wanted, ("a", "b"))
-            expected = [each["position"] if each["name"] == ["a", "b"] else each["position"][::-1] for each in messages]
-            assert decoded.fields[0].values.tolist() == expected
-            assert decoded.fields[1].values.tolist() == [each[1] for each in expected]
-            assert decoded.fields[2].values.tolist() == [each["last"] for each in messages]
-        assert len(walks) == len({json.dumps(each) for each in messages})
-
-
 def test_messages_of_more_layouts_than_are_compared_are_read_one_by_one():
     text = "string frame_id\nstring[] name\nfloat64[] position"
     messages = [{"frame_id": "x" * k, "name": [f"{k}", "b"], "position": [k, -k]} for k in range(300)] * 2
@@ -132,16 +111,6 @@ def test_messages_of_more_layouts_than_are_compared_are_read_one_by_one():
         order = slice(None, None, step)
         decoded = decoder.decode(batch_of(payloads[order]), wanted, ())
         assert_equals_package(decoded, [*(oracle(text, payload) for payload in payloads[:-1]), None][order], wanted, ())
-
-
-def test_an_integer_beyond_two_to_the_53_is_rounded_to_the_nearest_float():
-    text = "int64 a\nuint64 b"
-    message = {"a": -(2**63) + 1, "b": 2**64 - 1}
-    decoded = read(text, [encode(text, message), encode(text, message, big=True)], fields_of("a", "b"))
-    assert [field_values.values.tolist() for field_values in decoded.fields] == [
-        [float(-(2**63) + 1)] * 2,
-        [float(2**64 - 1)] * 2,
-    ]
 
 
 def test_a_header_stamp_is_exact_to_the_nanosecond_even_before_the_epoch():

@@ -103,27 +103,6 @@ def test_a_message_with_changed_bytes_is_damaged_or_decodes_as_with_the_package(
     assert_equals_package(decoder, kind, [bytes(payload)], (*decoder.fields(None), *MORE))
 
 
-@pytest.mark.parametrize(
-    ("payload", "reason"),
-    [
-        (b"\x18", "end within a field"),
-        (b"\x09\0\0\0", "end within a field"),
-        (b"\xb2\x04" + b"\xff" * 11, "end within a field"),
-        (b"\xd2\x05\x05\x09\0", "end within a field"),
-        (b"\x08\x01", "written as another type"),
-        (b"\x0d\0\0\0\0", "written as another type"),
-        (b"\x00\x01", "not protobuf"),
-        (b"\x0c", "not protobuf"),
-        (b"\x0f\x01", "not protobuf"),
-    ],
-)
-def test_damage_has_a_reason(payload, reason):
-    decoded = CASES["proto3"][0].decode(batch_of([payload]), fields_of("one_double", "inner.one_double"))
-    assert decoded.status.tolist() == [1]
-    assert reason in decoded.reason
-    assert np.isnan(decoded.fields[0].values).all()
-
-
 def test_elements_are_found_by_their_names_even_if_these_change():
     decoder, kind = CASES["proto3"]
     rows = [(["x", "y"], [1, 2]), (["y", "x"], [2, 1]), (["y"], [2])]
@@ -157,3 +136,13 @@ def test_without_the_package_the_reason_names_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "google.protobuf", None)
     with pytest.raises(UndecodableError, match=r"protobuf is not installed: pip install '\.\[protobuf\]'"):
         decoder_for("protobuf", "protobuf", "pkg.Outer", b"")
+
+
+def test_an_entry_of_a_map_cannot_be_selected_by_number():
+    """Maps are repeated messages on the wire, whose order has no meaning."""
+    decoder, kind = CASES["proto3"]
+    message = kind(one_double=3.0, table={"f": 20.0, "g": 1001.0})
+    refused, data = decoder.decode(
+        batch_of([message.SerializeToString()]), fields_of("table[0].value", "one_double")
+    ).fields
+    assert refused.fault.problem == "'table' is not an array" and data.values.tolist() == [3.0]

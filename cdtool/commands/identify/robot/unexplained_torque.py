@@ -51,7 +51,7 @@ def _outside(fit: RobotFit) -> BoolArray:
         own = joints == joint
         # No sensor resolves 1e-9 of its range: less is rounding.
         least = 1e-9 * float(np.max(np.abs(equations.torques[own])))
-        # Beyond eight robust standard deviations it is no friction and no noise.
+        # Beyond eight robust standard deviations it is neither friction nor noise.
         outside[own] = size[own] > 8.0 * MAD_TO_STD * max(float(np.median(size[own])), least)
     return outside
 

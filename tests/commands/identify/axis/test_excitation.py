@@ -12,6 +12,7 @@ from cdtool.commands.identify.axis.excitation import Excitation, measure_excitat
 from cdtool.commands.identify.axis.filtered_regression import filter_run
 from cdtool.commands.identify.axis.rigid_axis import RigidAxisFit, identify_rigid_axis
 from cdtool.commands.identify.estimate import Missing
+from cdtool.commands.identify.evidence import friction_curve, speed_edges
 from cdtool.machines.axis_model.axis_run import AxisRun
 from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction
 from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
@@ -19,25 +20,10 @@ from cdtool.machines.axis_model.simulation import AxisInputs, simulate_axis
 PERIOD = 2e-3
 
 
-def excitation_of(*speeds: FloatArray, noise: float = 0.0) -> Excitation:
-    rng = np.random.default_rng(1)
-    runs = [
-        AxisRun("log", 0.0, PERIOD, np.zeros(len(speed)), speed=speed + noise * rng.standard_normal(len(speed)))
-        for speed in speeds
-    ]
-    return measure_excitation([filter_run(run, 20.0) for run in runs])
-
-
 def stroke(speed: float, seconds: float = 4.0, acceleration: float = 1.0) -> FloatArray:
     ramp = np.linspace(0.0, speed, max(round(abs(speed) / acceleration / PERIOD), 2))
     hold, rest = np.full(round(seconds / PERIOD), speed), np.zeros(round(0.3 / PERIOD))
     return np.concatenate((rest, ramp, hold, ramp[::-1], rest))
-
-
-@pytest.mark.parametrize("speeds", [(0.2,), (0.1, 0.2), (0.05, 0.12, 0.3)])
-def test_the_held_speeds_are_found(speeds):
-    excitation = excitation_of(*(stroke(speed) for speed in speeds))
-    assert excitation.speeds == pytest.approx(speeds, rel=0.01)
 
 
 # An axis with a screw, as the simulated axis has it; its friction depends on the position, too.
@@ -123,20 +109,35 @@ def noisy(run: AxisRun) -> AxisRun:
     return replace(run, position=position, speed=None, reference_speed=None)
 
 
-def test_standstill_excites_nothing():
-    excitation = excitation_of(np.zeros(2000), noise=1e-4)
-    assert excitation.moving_time < 0.1
-    assert not excitation.is_accelerated
-    assert measure_excitation([]).speeds == ()
+def test_the_curve_of_a_line_is_the_line():
+    speed = np.linspace(-0.3, 0.3, 6001)
+    edges = speed_edges(speed)
+    curve = friction_curve(speed, 200.0 * speed, np.arange(6001) % 5, edges)
+    assert len(curve.mean) == len(edges) - 1
+    np.testing.assert_allclose(curve.mean, 200.0 * curve.abscissa, atol=0.05)
+    assert curve.count.sum() == 6001
 
 
-def test_acceleration_above_its_noise_is_enough():
-    excitation = excitation_of(stroke(0.2), stroke(-0.2), noise=1e-4)
-    assert excitation.is_accelerated and not excitation.is_one_way
-    assert excitation.moving_time == pytest.approx(8.8, rel=0.05)
+def test_the_standard_error_is_that_between_strokes_not_between_samples():
+    rng = np.random.default_rng(1)
+    stroke = np.repeat(np.arange(16), 200)
+    force = rng.standard_normal(16)[stroke] + 0.1 * rng.standard_normal(3200)
+    curve = friction_curve(np.full(3200, 0.5), force, stroke, np.array([0.0, 1.0]))
+    assert curve.standard_error[0] == pytest.approx(0.25, rel=0.4)
 
 
-def test_one_direction_and_hardly_any_acceleration_are_missing():
-    excitation = excitation_of(np.full(5000, -0.2), noise=1e-3)
-    assert excitation.is_one_way
-    assert not excitation.is_accelerated
+def excitation_of(*speeds: FloatArray, noise: float) -> Excitation:
+    rng = np.random.default_rng(1)
+    runs = [
+        AxisRun("log", 0.0, PERIOD, np.zeros(len(speed)), speed=speed + noise * rng.standard_normal(len(speed)))
+        for speed in speeds
+    ]
+    return measure_excitation([filter_run(run, 20.0) for run in runs])
+
+
+def test_acceleration_counts_only_above_its_noise():
+    both = excitation_of(stroke(0.2), stroke(-0.2), noise=1e-4)
+    assert both.is_accelerated and not both.is_one_way
+    assert both.moving_time == pytest.approx(8.8, rel=0.05)
+    steady = excitation_of(np.full(5000, -0.2), noise=1e-3)
+    assert steady.is_one_way and not steady.is_accelerated

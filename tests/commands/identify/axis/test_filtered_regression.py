@@ -9,26 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import UsageError
 from cdtool.commands.identify.axis.filtered_regression import (
     LowPass,
     block_covariance,
-    filter_run,
     fit_linear,
 )
-from cdtool.commands.identify.estimate import IdentificationError
-from cdtool.machines.axis_model.axis_run import AxisRun
 
 PERIOD = 1e-3
 TIME = np.arange(4000) * PERIOD
-
-
-def run_of(
-    position: FloatArray | None = None, speed: FloatArray | None = None, torque: FloatArray | None = None
-) -> AxisRun:
-    length = len(position if position is not None else speed)  # type: ignore[arg-type]
-    return AxisRun("log", 0.0, PERIOD, np.zeros(length) if torque is None else torque, speed, position)
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.sampled_from([5.0, 20.0, 80.0]))
@@ -49,34 +37,6 @@ def test_the_corner_of_the_low_pass_is_where_it_is_stated(corner):
     assert np.nanmax(low_pass.value(wave)) == pytest.approx(math.sqrt(0.5), rel=0.04)
 
 
-@pytest.mark.parametrize("corner", [0.0, -1.0, math.nan, math.inf])
-def test_a_low_pass_without_a_frequency_is_refused(corner):
-    with pytest.raises(UsageError, match="low-pass"):
-        LowPass(corner, PERIOD)
-
-
-def test_a_position_that_is_the_integral_of_the_speed_is_not_used():
-    speed = np.full(1000, 0.2)
-    run = AxisRun("log", 0.0, PERIOD, np.zeros(1000), speed, np.zeros(1000), derived=frozenset({"position"}))
-    assert np.nanmean(filter_run(run, 20.0).speed) == pytest.approx(0.2)
-
-
-def test_a_run_without_motion_channels_is_an_error():
-    with pytest.raises(IdentificationError, match="no speed or position"):
-        filter_run(AxisRun("log", 0.0, PERIOD, np.zeros(100)), 20.0)
-
-
-def test_strokes_end_at_reversals_rests_and_gaps():
-    speed = np.concatenate(
-        (np.full(500, 0.2), np.full(500, -0.2), np.zeros(300), np.full(500, -0.2), np.full(500, -0.2))
-    )
-    speed[2000:2100] = np.nan
-    run = filter_run(run_of(speed=speed), 20.0)
-    assert run.stroke.max() == 3
-    assert (run.stroke[1050:1250] == -1).all()
-    assert not run.usable[1020:1280].any()
-
-
 def test_instruments_remove_the_bias_of_noise_in_the_regressors():
     """Errors in variables: least squares is low by the factor var(x) / (var(x) + var(noise)) = 0.8."""
     rng = np.random.default_rng(2)
@@ -87,14 +47,6 @@ def test_instruments_remove_the_bias_of_noise_in_the_regressors():
     cured = fit_linear(measured[:, None], force, truth[:, None])
     assert plain.coefficients[0] == pytest.approx(2.4, rel=0.02)
     assert cured.coefficients[0] == pytest.approx(3.0, rel=0.01)
-
-
-def test_regressors_that_depend_on_each_other_are_an_error():
-    column = np.arange(20.0)
-    with pytest.raises(IdentificationError, match="depend on each other"):
-        fit_linear(np.column_stack((column, 2.0 * column)), column)
-    with pytest.raises(IdentificationError, match="1 equations for 2 parameters"):
-        fit_linear(np.ones((1, 2)), np.ones(1))
 
 
 def test_the_block_covariance_is_the_jackknife():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdtool.commands.identify.axis.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
-from cdtool.commands.identify.estimate import Estimate, IdentificationError
+from cdtool.commands.identify.estimate import IdentificationError
 from cdtool.machines.axis_model.axis_run import AxisRun, axis_run
 from cdtool.machines.axis_model.parameters import AxisModel, Controller, ElasticDrive, Friction, Sensors
 from cdtool.machines.axis_model.sensor_filters import first_order_low_pass
@@ -30,16 +30,6 @@ def test_the_gate_is_identified(fit: TwoMassFit) -> None:
     assert fit.identified["stiffness"].value == pytest.approx(GATE.take_up_stiffness, rel=0.05)
     assert fit.model.friction.coulomb_forward == pytest.approx(COULOMB, rel=0.15)
     assert fit.model.drive.load_mass == fit.identified["load_mass"].value
-
-
-def test_the_standard_errors_are_of_the_size_of_the_errors(fit: TwoMassFit) -> None:
-    truth = {"load_mass": GATE.leaf_mass, "stiffness": GATE.take_up_stiffness, "coulomb_forward": COULOMB}
-    for key, value in truth.items():
-        if key == "coulomb_forward" and key not in fit.identified:
-            continue  # one speed may refuse it
-        estimate: Estimate = fit.identified[key]
-        assert abs(estimate.value - value) < 3.0 * estimate.standard_error
-        assert 0.002 < estimate.relative_error < 0.2
 
 
 def test_standard_errors_cover_on_other_tracks() -> None:
@@ -72,16 +62,6 @@ def test_runs_that_never_start_from_rest_are_refused() -> None:
 def test_the_motor_inertia_is_needed() -> None:
     with pytest.raises(IdentificationError, match="motor's inertia"):
         identify_two_mass(free_runs(GATE, 5, 2), TwoMassSettings(motor_mass=0.0))
-
-
-def test_torque_and_speed_alone_are_enough() -> None:
-    runs = [
-        AxisRun(run.name, run.start, run.period, torque=run.torque, speed=run.speed)
-        for run in free_runs(GATE, 404, 8, references=False)
-    ]
-    found = identify_two_mass(runs, TwoMassSettings(motor_mass=GATE.motor_mass))
-    assert found.identified["load_mass"].value == pytest.approx(GATE.leaf_mass, rel=0.2)
-    assert found.identified["stiffness"].value == pytest.approx(GATE.take_up_stiffness, rel=0.1)
 
 
 def test_a_rigid_drive_is_not_given_a_stiffness() -> None:

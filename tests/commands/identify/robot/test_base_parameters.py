@@ -10,7 +10,6 @@ import pytest
 
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.identify.robot.base_parameters import (
-    Grouping,
     group_columns,
 )
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, Regressor, regressor_of, stacked_torque
@@ -59,23 +58,6 @@ def test_the_inertial_columns_are_those_of_pinocchio(tmp_path: Path) -> None:
     for row, (q, v, a) in zip(own, motion.transpose(1, 0, 2), strict=True):
         wanted = pinocchio.computeJointTorqueRegressor(model, data, q, v, a)
         np.testing.assert_allclose(row, wanted, atol=1e-11)
-
-
-def absent_of(grouping: Grouping) -> list[int]:
-    """The columns without any effect on the torques."""
-    used = grouping.combination.any(axis=0)
-    return [column for column, is_used in zip(grouping.columns, used, strict=True) if not is_used]
-
-
-def test_a_panda_has_43_base_parameters_and_grouped_inertias(tmp_path: Path) -> None:
-    pytest.importorskip("pinocchio")
-    regressor = regressor_of(panda(tmp_path))
-    grouping = group_columns(regressor, inertial(regressor))
-    assert len(grouping.base) == 43
-    # The first joint turns about a vertical axis: of its link only izz acts.
-    absent = {regressor.columns[i].name for i in absent_of(grouping)}
-    assert {f"{item} panda_joint1" for item in ("mass", "mz", "ixx", "iyy")} <= absent
-    assert "mz panda_joint1" in absent
 
 
 @pytest.mark.parametrize("name", ["six", "panda"])

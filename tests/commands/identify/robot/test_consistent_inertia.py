@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import ConfigurationError
 from cdtool.commands.identify.robot.consistent_inertia import (
     ConsistentFit,
     body_of,
@@ -125,12 +123,3 @@ def test_unphysical_links_are_repaired_at_a_small_rise_of_the_residual(robot: Ur
     for share in (1.0, 0.1, 0.01):
         way = (1.0 - share) * found.fit.parameters + share * regressor_of(robot).values
         assert residual(replace(found.fit, parameters=way)) > residual(found.fit) * (1.0 - 1e-6)
-
-
-def test_a_solver_that_is_missing_is_named_with_its_extra(robot: UrdfRobot, monkeypatch: pytest.MonkeyPatch) -> None:
-    fit = fit_of(robot, robot, 0.1)
-    monkeypatch.setitem(sys.modules, "cvxpy", None)
-    with pytest.raises(ConfigurationError, match="not installed") as caught:
-        consistent_fit(fit)
-    assert ".[identify]" in caught.value.hint
-    assert "\n" not in str(caught.value)

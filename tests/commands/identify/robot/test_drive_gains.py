@@ -66,11 +66,3 @@ def test_a_joint_that_the_payload_does_not_load_is_refused() -> None:
     found = drive_gains(runs[:1], runs[1:], small, ARM, (1.0, 1.0))
     refused = {item.joint: item.missing for item in found.not_identifiable}
     assert refused[1] == (Missing.PAYLOAD,)
-
-
-def test_a_payload_below_the_noise_is_refused() -> None:
-    tiny = replace(TOOL, mass=0.001)
-    runs = [currents(ARM, fourier(seed, 2, 15.0), FACTORS, 0.3, seed) for seed in (1, 2)]
-    found = drive_gains(runs[:1], runs[1:], tiny, ARM, (1.0, 1.0))
-    assert not found.estimates
-    assert {item.missing for item in found.not_identifiable} == {(Missing.PAYLOAD,)}

@@ -11,10 +11,12 @@ import pytest
 from cdtool.base.arrays import FloatArray
 from cdtool.base.errors import UsageError
 from cdtool.commands.identify.estimate import Estimate, IdentificationError, Missing
+from cdtool.commands.identify.robot.friction_choice import FrictionForm, JointFriction, choose_friction
 from cdtool.commands.identify.robot.robot_dynamics import FRICTION, RobotFit, identify_robot
 from cdtool.commands.identify.robot.robot_regressor import ColumnGroup, regressor_of
 from cdtool.commands.identify.robot.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
+from cdtool.machines.planar_arm import PlanarArm
 from tests.commands.identify.robot_motion import (
     Motion,
     coloured,
@@ -22,8 +24,6 @@ from tests.commands.identify.robot_motion import (
     panda,
     planar_arm,
     predicted_torque,
-    ur10e,
-    ur10e_run,
 )
 from tests.synthetic.machines import GATE, machine_of
 
@@ -88,42 +88,6 @@ def test_standard_errors_of_a_planar_arm_cover(samples: float) -> None:
     assert np.median(np.abs(distance)) > 0.4
 
 
-def test_keys_units_and_values_of_a_planar_arm_are_those_of_the_load_side() -> None:
-    fit = identify_robot(
-        [fourier(3, 2, 20.0, 0.002).run(PLANAR)], unknown(PLANAR), FRICTION | {ColumnGroup.DRIVE_INERTIA}
-    )
-    assert by_joint(fit, "viscous_friction")[0].value == pytest.approx(1.1e-4 * 3600.0, rel=1e-4)
-    assert by_joint(fit, "coulomb_friction")[1].value == pytest.approx(0.03 * 60.0, rel=1e-4)
-    assert by_joint(fit, "constant_force")[1].value == pytest.approx(-0.002 * 60.0, rel=1e-3)
-    assert by_joint(fit, "drive_inertia")[0].value == pytest.approx(1.5e-5 * 3600.0, rel=1e-4)
-    units = {item.key: item.unit for item in fit.identified.estimates}
-    assert units == {
-        "drive_inertia": "kg m2",
-        "viscous_friction": "N m s/rad",
-        "coulomb_friction": "N m",
-        "constant_force": "N m",
-    }
-    assert {item.section for item in fit.identified.estimates} == {"machine"}
-
-
-def test_noise_of_the_speed_and_quantised_positions_hardly_matter(tmp_path: Path) -> None:
-    motion = fourier(4, 2, 20.0, 0.005)
-    rng = np.random.default_rng(4)
-    noisy = RobotRun(
-        "noisy",
-        0.0,
-        motion.period,
-        motion.run(PLANAR).torque + 0.05 * rng.normal(size=motion.speed.shape),
-        np.round(motion.position / 1e-4) * 1e-4,
-        motion.speed + 5e-3 * rng.normal(size=motion.speed.shape),
-    )
-    fit = identify_robot([noisy], PLANAR, EVERYTHING)
-    other = fourier(5, 2, 10.0, 0.005).run(PLANAR)
-    error = predicted_torque(fit, other) - other.torque
-    assert np.sqrt(np.nanmean(error**2, axis=0)) == pytest.approx([0.0, 0.0], abs=0.05)
-    assert [fit.left_out.error(joint) for joint in (0, 1)] == pytest.approx([0.03, 0.03], abs=0.03)
-
-
 def one_joint_moves(motion: Motion, joint: int) -> Motion:
     still = np.arange(motion.position.shape[1]) != joint
     speed, acceleration = motion.speed.copy(), motion.acceleration.copy()
@@ -145,26 +109,6 @@ def test_a_joint_at_rest_has_no_friction_and_its_machine_keeps_the_old_one() -> 
     assert np.isnan(predicted_torque(fit, motion.run(PLANAR))[:, 1]).all()
 
 
-def ramp(speeds: tuple[float, ...], seconds: float = 6.0, period: float = 0.005) -> list[Motion]:
-    """Both joints at constant speeds."""
-    time = period * np.arange(round(seconds / period))[:, np.newaxis] * np.ones(2)
-    return [Motion(period, -1.0 + v * time, v * np.ones_like(time), np.zeros_like(time)) for v in speeds]
-
-
-def runs_of(motions: list[Motion]) -> list[RobotRun]:
-    return [
-        motion.run(PLANAR, 0.05 * coloured(i, motion.position.shape, 5.0), f"run {i}")
-        for i, motion in enumerate(motions)
-    ]
-
-
-def test_one_direction_leaves_coulomb_friction_and_offset_open() -> None:
-    fit = identify_robot(runs_of(ramp((0.2, 0.5))), PLANAR)
-    assert refused(fit, "coulomb_friction") == dict.fromkeys((0, 1), (Missing.REVERSALS,))
-    assert refused(fit, "constant_force") == dict.fromkeys((0, 1), (Missing.REVERSALS,))
-    assert set(by_joint(fit, "viscous_friction")) == {0, 1}
-
-
 def test_other_machines_other_joints_and_no_motion_are_refused() -> None:
     with pytest.raises(UsageError, match="is no robot"):
         identify_robot([fourier(1, 2).run(PLANAR)], machine_of(GATE))  # type: ignore[arg-type]
@@ -172,27 +116,6 @@ def test_other_machines_other_joints_and_no_motion_are_refused() -> None:
         identify_robot([RobotRun("three", 0.0, 0.01, *np.zeros((3, 100, 3)))], PLANAR)
     with pytest.raises(IdentificationError, match="no joint moves"):
         identify_robot([RobotRun("rest", 0.0, 0.01, *np.zeros((3, 100, 2)))], PLANAR)
-
-
-@pytest.fixture(scope="module")
-def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[CoupledMachine, RobotRun, RobotRun, RobotRun]:
-    pytest.importorskip("pinocchio")
-    file = ur10e(tmp_path_factory.mktemp("ur10e"))
-    names = ("no_torque.csv.gz", "link4.csv.gz", "ur-static.csv.gz")
-    first, second, third = (ur10e_run(file, name) for name in names)
-    machine = file.machine
-    assert isinstance(machine, CoupledMachine)
-    return machine, first, second, third
-
-
-def test_five_seconds_of_the_ur10e_do_not_determine_its_base_parameters(arm) -> None:
-    machine, learned, _, _ = arm
-    fit = identify_robot([learned], machine, FRICTION | {ColumnGroup.INERTIAL})
-    (found,) = [item for item in fit.identified.not_identifiable if item.key == "base_parameters"]
-    assert Missing.OTHER_MOTION in found.missing
-    assert found.numbers["not_determined"] > 0
-    assert found.numbers["uncertain_torque_share"] > 0.3
-    assert found.numbers["condition_number"] > 50.0
 
 
 def test_friction_is_not_negative() -> None:
@@ -205,19 +128,42 @@ def test_friction_is_not_negative() -> None:
     assert any(item.value == 0.0 and item.standard_error > 0.0 for item in estimates)
 
 
-def test_one_speed_leaves_viscous_and_coulomb_friction_open() -> None:
-    fit = identify_robot(runs_of(ramp((0.4, -0.4))), PLANAR)
-    assert refused(fit, "viscous_friction") == dict.fromkeys((0, 1), (Missing.SECOND_SPEED,))
-    assert refused(fit, "coulomb_friction") == dict.fromkeys((0, 1), (Missing.SECOND_SPEED,))
-    assert set(by_joint(fit, "constant_force")) == {0, 1}
+ARM = planar_arm(coulomb_slope=50.0)
+NOISE = 0.05
 
 
-def test_a_torque_of_the_wrong_sign_is_not_explained_by_negative_friction() -> None:
-    run = fourier(12, 2).run(PLANAR, 0.02 * coloured(12, (4000, 2), 5.0))
-    turned = replace(
-        run, torque=2.0 * PLANAR.inverse_dynamics(run.position, run.speed, run.acceleration()) - run.torque
-    )
-    fit = identify_robot([turned], PLANAR)
-    assert by_joint(fit, "coulomb_friction") == {}
-    numbers = [item.numbers for item in fit.identified.not_identifiable if item.key == "coulomb_friction"]
-    assert all(item["least_squares"] < 0.0 for item in numbers)
+def runs_of(machine: PlanarArm, amplitude: float = 0.5, noise: float = NOISE) -> list[RobotRun]:
+    motions = [fourier(seed, 2, 15.0, 0.01, amplitude) for seed in (1, 2, 3)]
+    return [motion.run(machine, noise * coloured(seed, (1500, 2), 5.0)) for seed, motion in enumerate(motions)]
+
+
+def frictionless(machine: PlanarArm) -> PlanarArm:
+    return replace(machine, viscous_friction=(0.0, 0.0), coulomb_friction=(0.0, 0.0), constant_force=(0.0, 0.0))
+
+
+def values_of(friction: JointFriction) -> dict[str, float]:
+    return {item.key: item.value for item in friction.identified.estimates}
+
+
+def test_a_missing_motor_inertia_is_found_and_one_from_a_data_sheet_is_kept() -> None:
+    without = replace(ARM, motor_inertia=(0.0, 0.0))
+    (first, _), _ = choose_friction(runs_of(ARM), without)
+    assert first.form is FrictionForm.DRIVE_INERTIA
+    assert values_of(first)["drive_inertia"] == pytest.approx(1.5e-5 * 3600.0, rel=0.1)
+    wrong = replace(ARM, motor_inertia=(1e-5, 1e-5))
+    assert {item.form for item in choose_friction(runs_of(ARM), wrong)[0]} <= {
+        FrictionForm.FRICTION,
+        FrictionForm.FRICTION_ALONE,
+        FrictionForm.PREVIOUS,
+    }
+
+
+def test_viscous_friction_of_slow_motion_is_known_only_together_with_the_rest() -> None:
+    slow = replace(ARM, viscous_friction=(1e-6, 1e-6))
+    friction = choose_friction(runs_of(slow, 0.02, 0.3), frictionless(ARM))[0][0]
+    assert "viscous_friction" not in values_of(friction)
+    assert values_of(friction)["coulomb_friction"] == pytest.approx(2.4, rel=0.1)
+    assert [item.key for item in friction.together] == ["viscous_friction"]
+    (missing,) = friction.identified.not_identifiable
+    assert missing.missing == (Missing.SECOND_SPEED,)
+    assert missing.numbers["standard_error"] > 0.5 * missing.numbers["value"]

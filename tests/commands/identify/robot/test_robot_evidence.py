@@ -17,45 +17,16 @@ from cdtool.commands.identify.identifying import IdentifiedMachine
 from cdtool.commands.identify.robot.friction_choice import FrictionAnswer
 from cdtool.machines.planar_arm import PlanarArm
 from tests.command import cdtool as command
-from tests.commands.identify.robot_motion import channels_of, coloured, fourier, planar_arm, ur10e, write_log
+from tests.commands.identify.robot_motion import ARM, TRUE, channels_of, coloured, files, fourier, ur10e, write_log
 from tests.data_folder import UR10E_LOGS
-from tests.synthetic.robots import JOINTS, six_joint_urdf, urdf_robot
 
 ROOT = Path(__file__).parents[4]
-ARM = """[machine]
-type = "planar_arm"
-coordinates = "load"
-link_mass = [1.3, 1.6]
-link_length = 0.3
-centre_of_mass = [0.14, 0.18]
-link_inertia = [0.012, 0.018]
-coulomb_slope = 50.0
-"""
-TRUE = replace(
-    planar_arm(),
-    coordinates="load",
-    motor_inertia=(0.0, 0.0),
-    transmission_ratio=(1.0, 1.0),
-    viscous_friction=(0.4, 0.3),
-    coulomb_friction=(2.4, 1.8),
-    coulomb_slope=(50.0, 50.0),
-    constant_force=(0.3, -0.1),
-)
-
-
-def arm_files(folder: Path, text: str, noise: float) -> Path:
-    for seed in (1, 2):
-        motion = fourier(seed, 2, 12.0, 0.01)
-        write_log(folder / f"run{seed}.csv", motion.run(TRUE, noise * coloured(seed, (1200, 2), 5.0)))
-    path = folder / "machine.toml"
-    path.write_text(text + channels_of(2), encoding="utf-8")
-    return path
 
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> IdentifiedMachine:
     folder = tmp_path_factory.mktemp("arm")
-    path = arm_files(folder, ARM, 0.05)
+    path = files(folder, TRUE, ARM, [fourier(seed, 2, 12.0, 0.01) for seed in (1, 2)])
     return cdtool.identify([str(folder / "run*.csv")], path)
 
 
@@ -158,54 +129,3 @@ def test_the_command_identifies_torque_constants(tmp_path: Path) -> None:
     # By the new constants the friction is that of the arm.
     assert values["machine"]["coulomb_friction"] == pytest.approx([2.4, 1.8], rel=0.05)
     assert all(joint["friction_decision"]["after"] < 0.2 for joint in shown)
-
-
-def test_the_command_identifies_torque_constants_of_a_robot_from_a_urdf(tmp_path: Path) -> None:
-    pytest.importorskip("pinocchio")
-    urdf = six_joint_urdf(("revolute",) * 6)
-    heavier = urdf.replace('<mass value="0.8"/>', '<mass value="3.8"/>')
-    # A point mass of 3 kg at the centre of mass of the last link: its inertia there does not change.
-    values = {"joints": list(JOINTS), "drive_inertia": 0.3, "viscous_friction": 2.0, "coulomb_friction": 1.0}
-    (tmp_path / "other").mkdir()
-    loaded = urdf_robot(tmp_path / "other", heavier, {**values, "coulomb_slope": 50.0})
-    robot = urdf_robot(tmp_path, urdf, {**values, "coulomb_slope": 50.0})
-    constants = np.array([10.0, 12.0, 9.0, 30.0, 8.0, 7.0])
-    for name, machine, seed in (("free", robot, 1), ("loaded", loaded, 2)):
-        run = fourier(seed, 6, 8.0, 0.02).run(machine, 0.02 * coloured(seed, (400, 6), 5.0))
-        write_log(tmp_path / f"{name}.csv", replace(run, torque=run.torque / constants))
-    text = f"""[machine]
-type = "urdf_robot"
-urdf = "robot.urdf"
-joints = {json.dumps(list(JOINTS))}
-drive_inertia = 0.3
-viscous_friction = 2.0
-coulomb_friction = 1.0
-coulomb_slope = 50.0
-"""
-    (tmp_path / "machine.toml").write_text(text + channels_of(6, "[9.0, 9.0, 9.0, 9.0, 9.0, 9.0]"), encoding="utf-8")
-    command_line = ["identify", tmp_path / "free.csv", "-m", tmp_path / "machine.toml", "-o", tmp_path / "new.toml"]
-    payload = ["--loaded-logs", tmp_path / "loaded.csv", "--payload", "3kg:0.15,0.05,0.08"]
-    done = command(*command_line, *payload)
-    assert done.status == 0, done.err
-    found = tomllib.loads((tmp_path / "new.toml").read_text(encoding="utf-8"))["channels"]["torque"]["scale"]
-    known = [joint for joint in range(6) if f"{JOINTS[joint]}: not identifiable: torque constant" not in done.out]
-    assert len(known) >= 4
-    assert [found[joint] for joint in known] == pytest.approx([constants[joint] for joint in known], rel=0.05)
-
-
-@pytest.mark.parametrize(
-    ("payload", "message"),
-    [
-        ("0.7kg@hand", "hand"),
-        ("0.7kg:0,0,0.1", "off the link's axis"),
-    ],
-)
-def test_a_payload_that_does_not_fit_is_one_line_and_nothing_is_written(
-    tmp_path: Path, payload: str, message: str
-) -> None:
-    arguments = [*currents(tmp_path), "--payload", payload, "-o", tmp_path / "new.toml"]
-    done = command(*arguments)
-    assert done.status != 0
-    assert len(done.err.strip().splitlines()) == 1
-    assert message in done.err
-    assert not (tmp_path / "new.toml").exists()

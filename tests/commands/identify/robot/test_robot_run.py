@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cdtool.base.arrays import FloatArray
-from cdtool.base.errors import RecordingError
 from cdtool.base.findings import Finding
 from cdtool.commands.identify.robot.robot_run import central_derivative, robot_run
 from cdtool.recordings.recording import Recording, Series
@@ -65,10 +64,3 @@ def test_the_central_derivative_is_exact_for_cubics_and_leaves_gaps_open() -> No
     assert not known[:5].any()
     assert not known[55:66, 0].any()
     assert known[5:-5, 1].all()
-
-
-@pytest.mark.parametrize(("missing", "message"), [("position", "no position"), ("torque", "no torque")])
-def test_a_robot_needs_torque_and_pose(missing: str, message: str) -> None:
-    with pytest.raises(RecordingError, match=message) as caught:
-        robot_run(recording(**{missing: True}))
-    assert "\n" not in str(caught.value)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import cdtool
 from cdtool.recordings.units import find_unit
-from tests.commands.init.drafts import RPM, drafted, drafted_columns, stroke, write
-from tests.data_folder import data, needs_data
+from tests.commands.init.drafts import RPM, drafted, drafted_columns, stroke
 
 LEAD = 1.5e-3  # travel per motor angle [m/rad]
 
@@ -35,24 +35,21 @@ def test_a_counter_gets_a_rate_and_a_mark_not_a_unit_of_time(tmp_path):
     assert "placeholder" in alone.said("time") and alone.checked("time")
 
 
-@pytest.mark.parametrize("column", ["t", "Zeit", "timestamp"])
-def test_a_clock_without_a_unit_is_marked_even_where_the_guess_is_right(tmp_path, column):
+@pytest.mark.parametrize(
+    ("column", "factor", "checked"),
+    [
+        *((name, 1.0, True) for name in ("t", "Zeit", "timestamp")),  # no unit is stated, though the guess is right
+        *((name, 1.0, False) for name in ("time_s", "t [s]")),
+        *((name, 1e3, True) for name in ("time [s]", "时间(s)")),  # it counts milliseconds
+    ],
+)
+def test_a_clock_is_marked_where_its_unit_is_not_stated_or_does_not_fit_the_motion(tmp_path, column, factor, checked):
     run = stroke()
-    draft = drafted_columns(tmp_path, {column: run.time, "n": run.speed * 100.0})
-    assert draft.channels["time"]["unit"] == "s" and draft.checked("time")
-
-
-@pytest.mark.parametrize("column", ["time_s", "t [s]"])
-def test_a_clock_whose_header_names_the_unit_is_not_marked(tmp_path, column):
-    run = stroke()
-    draft = drafted_columns(tmp_path, {column: run.time, "pos [m]": run.travel, "vel [m/s]": run.speed})
-    assert draft.channels["time"]["unit"] == "s" and not draft.checked("time")
-
-
-def test_a_clock_whose_name_contradicts_the_ratio_is_marked(tmp_path):
-    run = stroke(0.05, 40.0)
-    draft = drafted_columns(tmp_path, {"time_ms": run.time, "pos [m]": run.travel, "vel [m/s]": run.speed})
-    assert draft.checked("time") and "ms" in draft.said("time")
+    draft = drafted_columns(
+        tmp_path, {column: factor * run.time, "pos [mm]": 1e3 * run.travel, "vel [mm/s]": 1e3 * run.speed}
+    )
+    assert draft.channels["time"]["unit"] == "s" and draft.checked("time") is checked
+    assert ("ms with mm, mm/s fits the ratio, s does not" in draft.said("time")) is (factor > 1.0)
 
 
 def test_names_on_both_sides_of_a_gear_give_the_ratio_with_a_mark(tmp_path):
@@ -67,14 +64,6 @@ def test_names_on_both_sides_of_a_gear_give_the_ratio_with_a_mark(tmp_path):
     assert draft.machine["transmission_ratio"] == pytest.approx(LEAD, rel=2e-3)
     assert (draft.unit("position"), draft.unit("speed"), draft.channels["time"]["unit"]) == ("mm", "rpm", "ms")
     assert all(draft.checked(key) for key in ("position", "speed", "torque", "force", "transmission_ratio"))
-
-
-def test_a_motors_angle_and_the_speed_of_its_load_give_the_ratio(tmp_path):
-    run = stroke()
-    columns = {"t [s]": run.time, "motor_angle [rad]": run.travel / LEAD, "leaf_speed [mm/s]": run.speed * 1e3}
-    draft = drafted_columns(tmp_path, columns)
-    assert draft.machine["transmission_ratio"] == pytest.approx(LEAD, rel=2e-3)
-    assert draft.unit("position") == "rad" and draft.unit("speed") == "mm/s"
 
 
 @settings(max_examples=12, deadline=None)
@@ -98,26 +87,11 @@ def test_the_ratio_of_a_gear_is_that_of_the_motion_in_any_units(tmp_path_factory
     assert draft.channels["time"]["unit"] == clock and not draft.checked("position") and not draft.checked("speed")
 
 
-def test_a_torque_in_the_header_is_never_drafted_as_a_force(tmp_path):
-    run = stroke()
-    columns = {"t [ms]": run.time * 1e3, "pos [mm]": run.travel * 1e3, "vel [mm/s]": run.speed * 1e3}
-    draft = drafted_columns(tmp_path, {**columns, "torque [mNm]": run.torque * 1e3})
-    assert draft.unit("torque") == "mNm" and draft.machine["coordinates"] == "motor"
-
-
 def test_header_units_that_the_ratio_contradicts_are_marked(tmp_path):
     run = stroke()
     columns = {"t [s]": run.time, "pos [mm]": run.travel * 1e3, "vel [m/s]": run.speed * 0.8}
     draft = drafted_columns(tmp_path, columns)
     assert draft.unit("speed") == "m/s" and "1.25 of the speed, not 1" in draft.said("speed")
-
-
-def test_a_ratio_near_that_of_units_does_not_match_them(tmp_path):
-    run = stroke()
-    counts = np.round(run.travel * 1.024e4)
-    draft = drafted_columns(tmp_path, {"t": run.time, "speed_percent": run.speed * 10.0, "pos_count": counts})
-    assert (draft.unit("position"), draft.unit("speed")) == ("count", "%")
-    assert draft.checked("position") and draft.checked("speed")
 
 
 @pytest.mark.parametrize(
@@ -131,44 +105,6 @@ def test_a_ratio_is_certain_only_if_names_and_clock_agree(tmp_path, clock, posit
     draft = drafted_columns(tmp_path, {clock: time, position: run.travel, speed: run.speed * RPM})
     assert (draft.unit("position"), draft.unit("speed")) == ("rad", "rpm")
     assert draft.checked("position") is not certain and draft.checked("speed") is not certain
-
-
-@pytest.mark.parametrize(
-    ("names", "factors"),
-    [(("travel", "velocity"), (7.0, 420.0)), (("angle", "angular velocity"), (9.0, 540.0)), (("Weg", "v"), (9e3, 9.0))],
-    ids=["mm and mm/min, or m and m/min", "deg and deg/min, or rev and rpm", "um and mm/s, or mm and m/s"],
-)
-def test_a_ratio_of_units_of_any_size_is_not_certain(tmp_path, names, factors):
-    run = stroke()
-    columns = {"t [s]": run.time, names[0]: factors[0] * run.travel, names[1]: factors[1] * run.speed}
-    draft = drafted_columns(tmp_path, columns)
-    assert draft.checked("position") and draft.checked("speed")
-
-
-@needs_data("ur3e/L1L2.csv")
-def test_a_complete_clock_is_taken_rather_than_a_counter_with_empty_cells(tmp_path):
-    draft = drafted(data("ur3e/L1L2.csv"), tmp_path)
-    assert draft.channels["time"] == {"column": "timestamp", "unit": "s"}
-    assert "nan" not in draft.text and draft.unit("position") == "rad"
-
-
-def test_a_clock_with_empty_cells_gives_way_to_a_complete_one(tmp_path):
-    run = stroke()
-    path = write(tmp_path / "log.csv", {"time": np.arange(4000.0), "timestamp": run.time, "n": run.speed * 100.0})
-    lines = path.read_text().splitlines()
-    lines[2000] = "," + lines[2000].split(",", 1)[1]
-    path.write_text("\n".join(lines) + "\n")
-    assert drafted(path, tmp_path).channels["time"]["column"] == "timestamp"
-
-
-@pytest.mark.parametrize("column", ["time [s]", "时间(s)"])
-def test_a_clock_whose_header_states_seconds_but_counts_milliseconds_is_marked(tmp_path, column):
-    run = stroke()
-    draft = drafted_columns(
-        tmp_path, {column: 1e3 * run.time, "pos [mm]": 1e3 * run.travel, "vel [mm/s]": 1e3 * run.speed}
-    )
-    assert draft.channels["time"]["unit"] == "s" and draft.checked("time")
-    assert "ms with mm, mm/s fits the ratio, s does not" in draft.said("time")
 
 
 @pytest.mark.parametrize(("step", "doubted"), [(20.0, True), (1.0, True), (0.02, False)])
@@ -187,3 +123,44 @@ def test_a_force_in_a_guessed_unit_is_not_confirmed(tmp_path, name, confirmed):
     run = stroke()
     draft = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": run.travel, name: 100.0 * np.abs(run.speed)})
     assert draft.channels["force"].get("unit_confirmed") is confirmed
+
+
+@pytest.mark.parametrize(("jitter", "unit"), [(0.0, "ms"), (0.1, "s")])
+def test_a_clock_that_jitters_is_not_that_of_a_fast_drive(tmp_path, jitter, unit):
+    """Steps of 0.1: 10 kHz in ms, or 10 Hz in s, without a speed that would decide."""
+    run, noise = stroke(), np.random.default_rng(5)
+    time = np.cumsum(0.1 * (1.0 + jitter * noise.uniform(-1.0, 1.0, len(run.time))))
+    draft = drafted_columns(tmp_path, {"time": time, "pos": run.travel})
+    assert draft.channels["time"]["unit"] == unit and draft.checked("time")
+
+
+@pytest.mark.parametrize(
+    ("whole", "rest"),
+    [
+        ("time_sec", "time_nsec"),
+        ("sec", "nsec"),
+        ("secs", "nsecs"),
+        ("stamp_sec", "stamp_nanosec"),
+        ("header.stamp.sec", "header.stamp.nanosec"),
+        ("t_seconds", "t_nanoseconds"),
+    ],
+)
+@pytest.mark.parametrize("since", [0.3, 1_764_380_000.3])
+def test_seconds_and_nanoseconds_of_a_stamp_are_one_clock(tmp_path, whole, rest, since):
+    """With a jittering clock: the nanoseconds alone start again 2 or 3 times in the log."""
+    run = stroke()
+    jitter = np.random.default_rng(2).uniform(-1e-4, 1e-4, len(run.time))
+    parts = [divmod(int(1e9 * (step + 0.3)), 10**9) for step in run.time + jitter]
+    columns = {
+        whole: np.array([float(int(since) + part[0]) for part in parts]),
+        rest: np.array([float(part[1]) for part in parts]),
+        "pos [m]": run.travel,
+        "vel [m/s]": run.speed,
+    }
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack(list(columns.values())), "%.12g", ",", header=",".join(columns), comments="")
+    draft = drafted(log, tmp_path)
+    assert draft.channels["time"] == {"column": whole, "unit": "s", "nanoseconds": rest}
+    recording = cdtool.read(log, tmp_path / "machine.toml")
+    expected = run.time + jitter - (run.time + jitter)[0]
+    assert recording["position"].time - recording["position"].time[0] == pytest.approx(expected, abs=2e-9)

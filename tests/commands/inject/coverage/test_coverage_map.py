@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import html
+import json
 import math
+import re
+from typing import Any
 
 import pytest
 
+from cdtool.base.plain_text import plain
 from cdtool.commands.inject.coverage.coverage_map import (
     CellKey,
     CoverageMap,
@@ -15,8 +22,11 @@ from cdtool.commands.inject.coverage.coverage_map import (
     coverage_map,
     speed_classes,
 )
+from cdtool.commands.inject.coverage.page import coverage_html
 from cdtool.results.limits import LimitRule
 from cdtool.results.results import ContactResult
+from tests.report.hostile import HOSTILE
+from tests.report.html.coverage_case import coverage_case
 
 NEAR, FAR = CellKey(0.5, 1e4), CellKey(1.0, 1e4)
 
@@ -97,3 +107,43 @@ def test_brackets_further_apart_than_the_scatter_are_the_reason() -> None:
     names = {"a": (NEAR, "frozen"), "b": (NEAR, "frozen"), "c": (NEAR, "stiff"), "d": (NEAR, "stiff")}
     found = made([row("a", 50.0), row("b", 52.0), row("c", 90.0), row("d", 92.0)], names)
     assert [item.reason for item in found.most_telling()] == [TellingReason.ASSUMPTIONS]
+
+
+def traces_of(text: str) -> list[dict[str, Any]]:
+    return [json.loads(item) for item in re.findall(r'json" class="trace">(.*?)</script>', text, re.DOTALL)]
+
+
+def test_the_list_of_tests_has_commands_that_exist() -> None:
+    text = coverage_html(coverage_case())
+    table = text[text.index('id="telling-table"') : text.index('id="contacts"')]
+    lines = re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL)
+    rows = [re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", line) for line in lines[1:]]
+    assert rows[0][:2] == ["slow", "0.500"] and rows[0][-1] == "cdtool plan --missed-at-most 5%"
+    assert rows[-1][-1].startswith("cdtool plan --difference-ms ")
+    from tests.command import cdtool as command
+
+    for row in (rows[0], rows[-1]):
+        assert command(*row[-1].split()[1:]).status == 0
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_names_from_files_are_text(kind: str) -> None:
+    case = coverage_case(lambda name: f"{HOSTILE[kind]}{name}")
+    text = coverage_html(case)
+    assert "<script>alert" not in text
+    assert all(letter.isprintable() or letter == "\n" for letter in text)
+    assert plain(f"{HOSTILE[kind]}lost.csv") in html.unescape(text)
+    assert len(traces_of(text)) == len(case.traces)
+
+
+def test_the_policy_allows_only_this_script_and_this_style() -> None:
+    text = coverage_html(coverage_case())
+    policy = html.unescape(re.search(r'Policy" content="(.*?)">', text)[1])  # type: ignore[index]
+    scripts = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+    styles = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    assert len(scripts) == len(styles) == 1
+    for kind, content in (("script", scripts[0]), ("style", styles[0])):
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        assert f"{kind}-src 'sha256-{digest}'" in policy
+    assert not re.search(r'\b(src|href)="(?!#)', text)
+    assert 'style="' not in text

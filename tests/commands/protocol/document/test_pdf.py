@@ -10,12 +10,9 @@ from typing import Any
 import pytest
 
 from cdtool.base.errors import UsageError
-from cdtool.commands.protocol.assessment.protocol import Protocol
-from cdtool.commands.protocol.assessment.reasons import ProtocolVerdict, Reason
-from cdtool.commands.protocol.document.blocks import HeadedTable, Items
+from cdtool.commands.protocol.document.blocks import HeadedTable
 from cdtool.commands.protocol.document.document import protocol_document
 from cdtool.commands.protocol.document.pdf import to_pdf
-from cdtool.commands.protocol.document.words import words_of
 from tests.report.hostile import HOSTILE
 
 CASES = ["pass", "fail", "incomplete", "pressure_en", "pressure_de"]
@@ -25,13 +22,6 @@ CASES = ["pass", "fail", "incomplete", "pressure_en", "pressure_de"]
 def pypdf() -> Any:
     pytest.importorskip("typst", reason="needs the extra pdf")
     return pytest.importorskip("pypdf")
-
-
-def many(protocol: Protocol, times: int) -> Protocol:
-    """Return a protocol with many points: its tables and curves run over several pages."""
-    (point,) = protocol.points
-    points = [replace(point, point=replace(point.point, name=f"edge {number}")) for number in range(times)]
-    return replace(protocol, plan=replace(protocol.plan, points=tuple(p.point for p in points)), points=tuple(points))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -67,28 +57,6 @@ def test_the_text_holds_every_cell_of_the_document(name, documents, pypdf):
     cells = [cell for block in document.blocks if isinstance(block, HeadedTable) for row in block.rows for cell in row]
     assert len(cells) > 60
     assert [cell for cell in cells if squeezed(cell) not in text] == []
-
-
-@pytest.mark.parametrize("name", ["fail", "incomplete"])
-def test_the_first_page_has_the_notices_and_the_first_of_many_reasons(name, protocols, pypdf):
-    long = "Nebenschließkante {number}, 300 mm über dem Boden, bei geöffnetem Flügel, von der Straße aus gesehen"
-    made = many(protocols[name], 25)
-    points = tuple(
-        replace(point, point=replace(point.point, name=long.format(number=number)), repetitions=())
-        for number, point in enumerate(made.points)
-    )
-    reasons = tuple(
-        Reason(item.kind, {**item.values, "point": point.point.name}, item.cause)
-        for point in points
-        for item in point.reasons
-    )
-    plan = replace(made.plan, language="en", points=tuple(item.point for item in points))
-    document = protocol_document(replace(made, plan=plan, points=points, verdict=ProtocolVerdict(reasons)))
-    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages]
-    notices, first_reasons, *_ = (item.items for item in document.blocks if isinstance(item, Items))
-    assert all(squeezed(sentence) in squeezed(pages[0]) for sentence in (*notices, *first_reasons[:3]))
-    everything = squeezed("".join(pages))
-    assert all(squeezed(words_of("en").reason(item)) in everything for item in reasons)
 
 
 def test_hostile_names_are_text_and_the_same_document_gives_the_same_bytes(protocols, pypdf):

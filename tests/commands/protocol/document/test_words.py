@@ -61,6 +61,14 @@ def test_every_reason_and_every_cause_has_a_sentence(language):
     }
 
 
+@given(st.floats(-2000.0, 2000.0), st.sampled_from([25.0, 150.0, 400.0, 1234.5, 399.98]))
+def test_a_value_beside_its_limit_is_on_the_same_side_as_it_is_shown(value, limit):
+    words = words_of("en")
+    shown, shown_limit = (float(text.replace("−", "-")) for text in (words.beside(value, limit), words.limit(limit)))
+    assert shown_limit == limit and (shown > limit) == (value > limit)
+    assert shown == pytest.approx(value, rel=1e-3)
+
+
 def test_no_value_of_a_reason_is_rounded_across_its_limit():
     words = words_of("de")
     exceeds = {"point": "edge", "step": "dynamic", "limit": 400.0, "count": 3, "averaged": "mean"}
@@ -74,11 +82,3 @@ def test_no_value_of_a_reason_is_rounded_across_its_limit():
     cause = StepCause("may_exceed", {"missing_ms": 3.0, "most": 150.004, "limit": 150.0})
     assert "150,004 N" in words.reason(Reason("not_assessable", about, cause))
     assert "150.004 N" in cause.sentence()
-
-
-@given(st.floats(-2000.0, 2000.0), st.sampled_from([25.0, 150.0, 400.0, 1234.5, 399.98]))
-def test_a_value_beside_its_limit_is_on_the_same_side_as_it_is_shown(value, limit):
-    words = words_of("en")
-    shown, shown_limit = (float(text.replace("−", "-")) for text in (words.beside(value, limit), words.limit(limit)))
-    assert shown_limit == limit and (shown > limit) == (value > limit)
-    assert shown == pytest.approx(value, rel=1e-3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from cdtool.commands.tune.search.candidate import Candidate, Measured
 from cdtool.commands.tune.search.grid import rules_to_try
@@ -102,3 +103,33 @@ def test_rules_are_tried_with_their_settings_where_their_channels_exist():
     assert len([rule for rule in rules if rule.name == "cusum"]) == 8  # the default is one of the grid
     assert [rule.order for rule in rules if rule.name == "glr"] == [7, 4, 12]
     assert rules_to_try([Cusum(), Limit()], ["torque"]) == [Limit()]
+
+
+FIVE = tuning_recordings(contacts=5)
+
+
+def latencies(stiff: float, soft: float) -> np.ndarray:
+    return np.repeat([stiff, soft], 5)
+
+
+def test_the_score_is_the_mean_of_the_logarithms_of_the_groups():
+    objective = Objective(Goal.LATENCY, FIVE)
+    costs = objective.costs(measured(FIVE, latencies(0.01, 0.09)), 0, 0)
+    assert costs == pytest.approx([0.01, 0.09])
+    assert math.exp(objective.score(costs)) == pytest.approx(0.03)
+
+
+def test_no_group_may_get_much_worse_than_by_default():
+    objective = Objective(Goal.LATENCY, FIVE)
+    default = np.array([0.03, 0.07])
+    assert objective.is_acceptable(np.array([0.01, 0.0769]), default)
+    assert not objective.is_acceptable(np.array([0.01, 0.0771]), default)
+    assert Objective(Goal.LATENCY, FIVE, worse_at_most=1.0).is_acceptable(np.array([0.01, 0.139]), default)
+    assert objective.is_acceptable(np.array([0.5, 0.5]), np.array([np.nan, np.nan]))
+
+
+def test_the_95th_percentile_and_the_force_are_other_goals():
+    values = np.concatenate((np.linspace(0.01, 0.05, 5), np.full(5, 0.1)))
+    made = measured(FIVE, values)
+    assert Objective(Goal.P95, FIVE).costs(made, 0, 0) == pytest.approx([0.048, 0.1])
+    assert Objective(Goal.FORCE, FIVE).costs(made, 0, 0) == pytest.approx([30.0, 100.0])
