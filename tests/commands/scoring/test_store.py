@@ -285,7 +285,7 @@ def test_a_detector_refused_in_a_group_is_not_found_under_the_key_of_one_that_is
     groups = {name: replace(item, refused={"momentum": "no stiffness"}) for name, item in setup.impacts.items()}
     one, other = (Determinants(each, teaching.learned, {}, {}) for each in (setup, replace(setup, impacts=groups)))
     group, item = next(iter(setup.impacts.items()))
-    assert one.log_key(group, item.logs[0], ()) != other.log_key(group, item.logs[0], ())
+    assert one.key(group, item.logs[0], ()) != other.key(group, item.logs[0], ())
 
 
 def test_a_renamed_part_of_a_log_is_another_log(tmp_path):
