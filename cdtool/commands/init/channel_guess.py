@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from cdtool.commands.init import motion_evidence as motion
-from cdtool.commands.init.column_blocks import of_blocks
+from cdtool.commands.init.column_blocks import of_blocks, on_circle
 from cdtool.commands.init.confirmation import confirm
 from cdtool.commands.init.names.name_evidence import BY_UNIT, Named, full_name, is_other, named, named_force, sides
 from cdtool.commands.init.names.units_in_names import label, may_be, pressure_unit
@@ -37,16 +37,15 @@ _REFERENCED = ("position", "speed", "torque")
 def guess_channels(streams: list[Stream], topics: bool) -> Channels:
     """Guess the channels of a log by values and names; offline, not used for detection."""
     if streams and not topics and all(stream.name.isdigit() for stream in streams):
-        blocks = of_blocks(streams)  # a table without a header
-        channels = Channels(blocks[0].width if blocks else 1, streams)
-        channels.free = blocks or channels.free
+        channels = _without_names(streams)
     else:
         joints = _joint_count(streams)
         if joints == 1 and topics:
             streams = [part for stream in streams for part in stream.elements()]
         channels = Channels(joints, list(streams))
-    _motion(channels)
-    _drive(channels)
+    if not channels.found:
+        _motion(channels)
+        _drive(channels)
     _acceleration(channels)
     for quantity in _REFERENCED:
         _reference(channels, quantity)
@@ -77,6 +76,24 @@ def _joint_count(streams: Iterable[Stream]) -> int:
 
 def _strong(quantity: str, stream: Stream) -> bool:
     return named(quantity, stream).strength >= BOUND and not says("reference", stream.name)
+
+
+def _without_names(streams: list[Stream]) -> Channels:
+    """Return the channels of a table without a header: an angle and its drive by a circle, or blocks of columns."""
+    blocks, circle = of_blocks(streams), on_circle(streams)
+    # With three joints or more related blocks are better evidence than the circle of a tool.
+    if circle is None or (blocks and blocks[0].width >= 3):
+        channels = Channels(blocks[0].width if blocks else 1, streams)
+        channels.free = blocks or channels.free
+        return channels
+    channels = Channels(1, streams)
+    angle, places, drives = circle
+    channels.take("position", angle, f"columns {' and '.join(places)} move on a circle of this angle", BY_VALUES)
+    if drives:
+        others = "".join(f"; or column {other.name}?" for other in drives[1:3])
+        channels.take("torque", drives[0], "moves like the force of a drive", BY_VALUES + others)
+    channels.free = []  # other columns without names are not guessed
+    return channels
 
 
 def _motion(channels: Channels) -> None:

@@ -1,12 +1,18 @@
-"""Find the channels of a table without names: blocks of J columns, one per joint, related by derivatives."""
+"""Find the channels of a table without names: blocks of J columns, one per joint, related by derivatives.
+
+Without speeds, an angle is known by the circle on which it moves a tool.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 from cdtool.commands.init import motion_evidence as motion
 from cdtool.commands.init.stream import Stream, joined
+from cdtool.machines.plausibility.drive import explained
 
 # Columns that are compared, each with each: the time grows with their square.
 _MOST = 48
@@ -33,6 +39,36 @@ def of_blocks(streams: list[Stream]) -> list[Stream]:
     if joints % 2 == 0 and motion.same_values(_block(streams, first, half), _block(streams, first + half, half)):
         joints = half
     return [_block(streams, start, joints) for start in range(first % joints, len(streams) - joints + 1, joints)]
+
+
+def on_circle(streams: list[Stream]) -> tuple[Stream, tuple[str, ...], list[Stream]] | None:
+    """Return the column that is an angle in degrees, the coordinates on its circle, and what moves like its drive.
+
+    x = c + r cos(q + phi): the first column q of which two others are such functions. None without.
+    """
+    moving = [stream for stream in streams[:_MOST] if stream.moves]
+    for angle in moving:
+        q = angle.values
+        circle, parabola = np.hstack([np.cos(np.radians(q)), np.sin(np.radians(q))]), np.hstack([q, q**2])
+        others = [stream for stream in moving if stream is not angle]
+        places = tuple(
+            stream.name
+            for stream in others
+            # A circle leaves at most a hundredth of what a parabola leaves of a coordinate.
+            if 1.0 - explained(circle, stream.values[:, 0]) < 0.01 * (1.0 - explained(parabola, stream.values[:, 0]))
+        )
+        if len(places) > 1:
+            speed, place = motion.derived(angle), np.hstack([q, q**2, q**3])
+            drives = [
+                stream
+                for stream in others
+                # Friction and inertia change an effort by more, and it is not a function of the place.
+                if stream.reach * 0.05 < np.ptp(stream.values)
+                and explained(place, stream.values[:, 0]) < 0.9
+                and motion.drive_fit(stream, speed) > motion.DRIVES
+            ]
+            return replace(angle, unit="deg"), places[:2], drives
+    return None
 
 
 def _fits(streams: list[Stream]) -> FloatArray:

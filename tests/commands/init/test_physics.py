@@ -104,6 +104,16 @@ def test_a_sign_that_the_first_log_does_not_show_is_found_in_the_others(tmp_path
     assert "scale = -1.0" in (tmp_path / "study" / "machine.toml").read_text(encoding="utf-8")
 
 
+@needs_data("ur_collisions/onsets.csv")
+@pytest.mark.parametrize("name", ["Drift00_NF_1", "Drift00_WF_1", "Drift60_NF_3"])
+def test_an_angle_without_a_name_is_known_by_the_circle_of_its_tool(tmp_path, name):
+    """Column 8, a coordinate of the tool, is nearly the derivative of column 7; neither is that of a joint."""
+    draft = drafted(data(f"ur_collisions/{name}.csv"), tmp_path)
+    assert draft.channels["position"] == {"column": 1, "unit": "deg"} and draft.checked("position")
+    assert draft.channels["torque"]["column"] == 13 and draft.checked("torque")
+    assert draft.machine["type"] == "rotary_axis" and not {"speed", "force"} & draft.channels.keys()
+
+
 @needs_data("cnc_mill/experiment_01.csv")
 def test_row_numbers_are_no_clock_in_milliseconds(tmp_path):
     """Steps of 0.1 s follow from position and speed; neither states its unit."""

@@ -83,6 +83,8 @@ class Evidence:
 
     def _told(self, channel: str, told: Stated) -> Logged:
         accepted = self.side.accepted(channel)
+        if self.channels.found[channel].stream.name.isdigit():  # a table without names states no unit
+            return Logged(told.unit, "by the circle")
         why = "stated in the log" if told.by == "log" else "from its name"
         if told.si in RAW_UNITS:
             return self._raw(told.unit, accepted[0], why)
