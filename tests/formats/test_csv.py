@@ -56,7 +56,7 @@ def test_only_the_wanted_columns_are_read(log, machine):
     assert source.names[:4] == ("t", "note", "i_motor", "n_motor") and len(source.names) == 6
 
 
-def test_thousands_are_read_beside_decimal_commas(log, machine):
+def test_thousands_are_read_in_numbers_with_decimal_commas(log, machine):
     source = Csv().columns(log("t;i_motor;n_motor\n0;1,5;0\n1;1.234,5;0\n2;1,5;0\n"), machine().columns)
     assert values(source, "i_motor") == [1.5, 1234.5, 1.5]
 

@@ -89,13 +89,12 @@ def test_every_command_reads_a_compressed_log(tmp_path):
     packed = tmp_path / "03.csv.gz"
     packed.write_bytes(gzip.compress(log.read_bytes()))
     machine = GATE / "machine.toml"
-    plain_alarms = json.loads(
-        command("detect", log, "-m", machine, "-d", "gm", "--set=threshold.limits=400", "--json").out
-    )
-    alarms = json.loads(
-        command("detect", packed, "-m", machine, "-d", "gm", "--set=threshold.limits=400", "--json").out
-    )
-    assert alarms[0]["alarms"] == plain_alarms[0]["alarms"] and alarms[0]["alarms"]
+    alarms = [
+        json.loads(command("detect", file, "-m", machine, "-d", "gm", "--set=threshold.limits=400", "--json").out)
+        for file in (log, packed)
+    ]
+    for key in ("time_s", "statistic", "contact_onset_s"):
+        assert len({run["alarms"][0][key] for (run,) in alarms}) == 1
     done = command("info", packed, "-m", machine)
     assert done.status == 0 and "csv" in done.out
     assert command("convert", packed, tmp_path / "03.mcap", "-m", machine).status == 0

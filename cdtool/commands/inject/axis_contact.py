@@ -30,7 +30,7 @@ _SHORTEST_REST = 0.2
 _STIFF_SHARE = 0.2
 # The speed is compared with the log's during the last time before the contact [s].
 _COMPARED_TIME = 0.1
-# It may differ by these shares: a contact at another speed has another force, and further off the model is not the log's.
+# It may differ by these shares: another speed is another force, and further off the model is not the log's.
 _DOUBTFUL_DEVIATION, _LARGEST_DEVIATION = 0.05, 0.2
 # Correlation of the measured torque and the model's during the approach below which one has the opposite sign.
 _OPPOSITE = -0.3

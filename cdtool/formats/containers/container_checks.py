@@ -37,7 +37,7 @@ def check_size(path: Path, values: int) -> None:
 
 
 def check_chunks(path: Path, name: str, dataset: Any) -> None:
-    """Raise RecordingError if an HDF5 dataset is compressed twice, lacks chunks, or has some far larger than its file.
+    """Raise RecordingError if an HDF5 dataset is compressed twice, or has chunks that are lost or too large.
 
     HDF5 decompresses whole chunks even if only a part is read, and each compression may shrink zeros to a thousandth.
     In place of a chunk whose address is lost, or that was never written, it reads zeros.

@@ -56,7 +56,7 @@ def test_on_other_contacts_the_probability_is_that_of_one_division_in_all(n_old,
     ],
     ids=["two against two others", "hardly anything was detected", "one is still detected"],
 )
-def test_what_is_no_complete_change_is_inconclusive(old, new, others):
+def test_a_change_that_is_not_complete_is_inconclusive(old, new, others):
     question = asked(compare(single(old), single(new, **others)), "missed")
     assert math.isnan(question.complete_change_p) and question.outcome == "inconclusive"
 
