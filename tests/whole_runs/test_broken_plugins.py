@@ -146,7 +146,7 @@ def test_two_packages_with_one_name_are_both_named(install):
         ("torque.values.copy()", "torque.values[:, 0].copy()", "samples by joints"),
         ("torque.values.copy()", "np.hstack((torque.values, torque.values))", "samples by joints"),
         ("torque.time, values", "torque.time[1:], values", "samples by joints"),
-        ("dtype=np.uint8", "dtype=int", "float64 and uint8 are needed"),
+        ("dtype=np.uint8", "dtype=int", "and a uint8 status are needed"),
         ("torque.time, values", "torque.time[::-1], values", "times that do not strictly increase"),
         ("torque.values.copy()", "np.where(torque.values > 0, np.nan, 0.0)", "valid but not finite"),
         ('status, "N")', 'status, "N", lost=np.zeros(3, dtype=bool))', "marks of lost samples"),
