@@ -140,10 +140,14 @@ class ContactSearch:
             first = self._first_held(begin, beyond)
             if first is None:
                 return None
-            burst = self._end_of_burst(begin, first, over)
-            if burst is None:
-                return self._rise(begin, first, float(beyond[first - begin]))
-            begin = burst
+            after = self._end_of_burst(begin, first, over)
+            if after is None:
+                others = np.flatnonzero(beyond[first - begin :] != beyond[first - begin])
+                after = first + int(others[0]) if len(others) else len(self.time)
+                rise = self._rise(begin, first, after, float(beyond[first - begin]))
+                if rise is not None:
+                    return rise
+            begin = after
         return None
 
     def _first_held(self, begin: int, beyond: FloatArray) -> int | None:
@@ -180,8 +184,12 @@ class ContactSearch:
             return None
         return since + int(large[-1]) + 1
 
-    def _rise(self, begin: int, high: int, sign: float) -> _Rise:
-        """Follow the force back to the lower level, over the rest level just before the onset."""
+    def _rise(self, begin: int, high: int, after: int, sign: float) -> _Rise | None:
+        """Follow the force back to the lower level, over the rest level just before the onset.
+
+        None if it is nowhere above the upper level over that one, from `high` to before `after`: the rest level of
+        0.3 s ago was too far off.
+        """
         line = self.rest.line(float(self.time[high]))
         onset = self._followed_back(begin, high, sign, line)
         for _ in range(3):
@@ -189,9 +197,9 @@ class ContactSearch:
             before, onset = onset, self._followed_back(begin, high, sign, line)
             if onset == before:
                 break
-        over = sign * (self.force[onset : high + 1] - line.value(self.time[onset : high + 1]))
+        over = sign * (self.force[onset:after] - line.value(self.time[onset:after]))
         above = np.flatnonzero(over > self.above)
-        return _Rise(onset, onset + int(above[0]) if len(above) else high, sign, line)
+        return _Rise(onset, onset + int(above[0]), sign, line) if len(above) else None
 
     def _followed_back(self, begin: int, high: int, sign: float, line: RestLine) -> int:
         """Return the sample after the last one, before `high`, at or below the lower level; otherwise `begin`."""

@@ -80,4 +80,4 @@ def test_limits_are_learned_on_the_prediction_and_not_on_the_signal():
     wide = PredictedLimit(order=2, forgetting=0.9, ahead=40.0).fit(pairs)
     narrow = PredictedLimit(order=1, forgetting=0.95, ahead=0.0).fit(pairs)
     ratio = (wide.limit.greatest[0] - 100.0) / (narrow.limit.greatest[0] - 100.0)
-    assert ratio == pytest.approx(3.39 / 0.25, rel=0.15)
+    assert ratio == pytest.approx(3.39 / 0.25, rel=0.3)

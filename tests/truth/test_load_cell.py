@@ -46,14 +46,20 @@ DRIFTS = {
 
 @pytest.mark.parametrize("rule", [GATE, OnsetRule()], ids=["levels by hand", "levels from the noise"])
 @pytest.mark.parametrize("drift", DRIFTS)
-def test_no_drift_moves_the_onset_by_more_than_a_sample(drift, rule):
+def test_no_drift_moves_the_onset_by_more_than_three_samples(drift, rule):
     cell = noise(T, 2.0 if rule.above else 3.0)
     clean = contacts(T, pulse(T, 6.0) + cell, rule)
     found = contacts(T, pulse(T, 6.0) + cell + DRIFTS[drift], rule)
-    assert [item.start for item in found] == pytest.approx([clean[0].start], abs=1.01e-3)
+    assert [item.start for item in found] == pytest.approx([clean[0].start], abs=3.01e-3)
     assert found[0].peak_force == pytest.approx(clean[0].peak_force, abs=5.0)
     assert found[0].rest == pytest.approx(DRIFTS[drift][6000], abs=2.5)
-    assert found[0].shift == pytest.approx(DRIFTS[drift][6000] - DRIFTS[drift][0], abs=3.0)
+    assert found[0].shift == pytest.approx(DRIFTS[drift][6000] - DRIFTS[drift][0], abs=5.0)
+
+
+@pytest.mark.parametrize("rate", [25.0, 40.0, 62.5])
+def test_the_few_readings_of_a_slow_cell_are_no_slope_that_makes_noise_a_contact(rate):
+    for seed in range(300):
+        assert contacts(clock(rate), noise(clock(rate), 3.0, seed)) == []
 
 
 @pytest.mark.parametrize("drift", DRIFTS)
@@ -134,7 +140,7 @@ def test_three_samples_at_1_khz_are_a_contact_and_one_is_not():
 
 
 def test_missing_samples_and_gaps_are_skipped_and_a_hole_before_the_onset_is_in_the_uncertainty():
-    force = pulse(T, 6.0) + noise(T)
+    force = pulse(T, 6.0) + noise(T, 1.0)
     force[np.random.default_rng(3).random(len(T)) < 0.1] = np.nan
     force[(T > 2.0) & (T < 3.5)] = np.nan
     (found,) = contacts(T, force)

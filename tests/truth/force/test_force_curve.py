@@ -140,7 +140,7 @@ def test_four_equal_readings_or_repeated_readings_are_not_a_stop():
 def test_the_top_of_a_smooth_peak_in_whole_newtons_is_not_a_stop_but_a_stop_in_whole_newtons_is(peak):
     random = np.random.default_rng(1)
     since = np.maximum(TIME - ONSET, 0.0)
-    push = peak * np.sin(np.minimum(since / 0.3, 1.0) * np.pi) + random.normal(0.0, 0.1, len(TIME))
+    push = peak * np.sin(np.minimum(since / 0.3, 1.0) * np.pi) + random.normal(0.0, 0.03, len(TIME))
     contact = Contact(ONSET, ONSET + 0.3, 5e-4)
     assert not force_time_curve(recording(np.round(push)), contact).saturated
     assert force_time_curve(recording(np.round(np.minimum(push, 280.0))), contact).saturated
