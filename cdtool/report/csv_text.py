@@ -33,6 +33,8 @@ def _cell(value: object) -> object:
         return "true" if value else "false"
     if isinstance(value, str):
         return _RUN_BY_SPREADSHEETS.sub(r"\1\2'", plain(value))
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+    if isinstance(value, float):
+        # What arithmetic leaves behind the digits of a measurement, as in 60.00000000000006 ms, is not written.
+        tidy = round(value, 9) if abs(value) >= 1.0 else float(f"{value:.12g}")
+        return tidy if math.isfinite(value) else None
     return value

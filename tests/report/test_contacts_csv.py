@@ -1,4 +1,4 @@
-"""Contacts and forces as CSV: unchanged numbers, and nothing that a spreadsheet or a terminal would run."""
+"""Contacts and forces as CSV: numbers with the digits of a measurement, and nothing that a spreadsheet or a terminal would run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read(text: str, delimiter: str = ",") -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter))
 
 
-def test_the_csv_holds_every_contact_with_untouched_numbers(results):
+def test_the_csv_holds_every_contact(results):
     low = replace(contact("momentum", "stiff", -0.5), onset_s=-1.25, clipped=True, peak_force_n=math.nan)
     found = read(contacts_csv(replace(results, contacts=(*results.contacts, low))))
     assert len(found) == len(results.contacts) + 1
@@ -39,6 +39,23 @@ def test_the_csv_holds_every_contact_with_untouched_numbers(results):
     assert found[0]["force_at_alarm_n"] == ""
     assert (found[-1]["onset_s"], found[-1]["latency_ms"], found[-1]["clipped"]) == ("-1.25", "-0.5", "true")
     assert found[-1]["peak_force_n"] == ""
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (60.00000000000006, "60.0"),
+        (932.9999999999998, "933.0"),
+        (0.0005000000000000004, "0.0005"),
+        (1700000000.1234567, "1700000000.1234567"),
+        (-1.25e-9, "-1.25e-09"),
+        (1e300, "1e+300"),
+    ],
+)
+def test_digits_that_arithmetic_left_behind_are_not_written(results, value, text):
+    late = replace(contact("momentum", "stiff", 1.0), onset_s=value)
+    (found,) = read(contacts_csv(replace(results, contacts=(late,))))
+    assert found["onset_s"] == text and float(text) == pytest.approx(value, rel=1e-12)
 
 
 @pytest.mark.parametrize("start", [*RUN, " =", "\t=", "\r=", "\n="])
