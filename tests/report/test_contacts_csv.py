@@ -1,4 +1,4 @@
-"""Contacts and forces as CSV: numbers with the digits of a measurement, and nothing that a spreadsheet or a terminal would run."""
+"""Contacts and forces as CSV: the digits of a measurement, and nothing that a spreadsheet or terminal would run."""
 
 from __future__ import annotations
 
