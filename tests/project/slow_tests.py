@@ -1,6 +1,6 @@
 """Compare the measured slow tests with the list in tests/slow_tests.txt.
 
-`python -m pytest -n auto --junitxml times.xml`, on an otherwise idle machine, measures. Then `python -m
+`python -m pytest --junitxml times.xml`, on an otherwise idle machine, measures. Then `python -m
 tests.project.slow_tests times.xml` prints the tests missing from the list, those listed without need and those that no
 longer exist, and exits with status 1 if a test is missing. `--write` corrects the list.
 

@@ -60,7 +60,7 @@ def test_what_the_recipes_add_passes_the_contract_tests_and_its_own(folder):
     chosen = [recipe.name for recipe in RECIPES] + ["registered_in_a_module_of_its_name", "same_colour"]
     done = subprocess.run(
         [
-            *(sys.executable, "-m", "pytest", "-q", "-rN", "-p", "no:cacheprovider", "-p", "no:xdist"),
+            *(sys.executable, "-m", "pytest", "-q", "-rN", "-p", "no:cacheprovider", "-n0"),
             *("-c", ROOT / "pyproject.toml", "-p", "tests.project.recipes", "-k", " or ".join(chosen)),
             *("tests/contracts", "tests/project/test_docstrings.py", folder / "tests"),
         ],
