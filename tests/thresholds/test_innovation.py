@@ -36,8 +36,8 @@ def fitted():
 def test_burg_finds_the_model_from_many_short_sections():
     rng = np.random.default_rng(1)
     coefficients, spread = burg([3.0 * coloured(rng, 700)[200:] for _ in range(100)], 4)
-    assert coefficients == pytest.approx((*MODEL, 0.0, 0.0), abs=0.02)
-    assert spread == pytest.approx(3.0, rel=0.02)
+    assert coefficients == pytest.approx((*MODEL, 0.0, 0.0), abs=0.03)
+    assert spread == pytest.approx(3.0, rel=0.03)
 
 
 def test_burg_finds_a_pure_tone_exactly():

@@ -56,10 +56,12 @@ def test_no_drift_moves_the_onset_by_more_than_three_samples(drift, rule):
     assert found[0].shift == pytest.approx(DRIFTS[drift][6000] - DRIFTS[drift][0], abs=5.0)
 
 
-@pytest.mark.parametrize("rate", [25.0, 40.0, 62.5])
-def test_the_few_readings_of_a_slow_cell_are_no_slope_that_makes_noise_a_contact(rate):
-    for seed in range(300):
-        assert contacts(clock(rate), noise(clock(rate), 3.0, seed)) == []
+@pytest.mark.parametrize("seed", [140, 1307])
+def test_the_few_readings_of_a_slow_cell_are_no_slope_that_makes_noise_a_contact(seed):
+    """Two of 2,000 logs of noise at 40 Hz, in which the level extended from the first readings is far off."""
+    time = clock(40.0)
+    force = np.random.Generator(np.random.PCG64(seed)).normal(0.0, 3.0, len(time))
+    assert contacts(time, force) == []
 
 
 @pytest.mark.parametrize("drift", DRIFTS)

@@ -310,6 +310,7 @@ def _put_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
                 except OSError:  # a file system without hard links, or a folder
                     target.rename(old[target])
             part.replace(target)
+        _temporaries.update(old.values())  # a signal from now on ends the process without them
     except BaseException:
         for part, target in reversed(pairs):
             with suppress(OSError):
