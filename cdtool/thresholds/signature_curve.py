@@ -142,7 +142,7 @@ class Curve(SendsFields):
         alike = count.ndim == 2 and count.size and count.shape == mean.shape == squares.shape
         if not (alike and np.isfinite((count, mean, squares)).all() and min(count.min(), squares.min()) >= 0.0):
             raise ValueError(f"a curve of counts {count.shape}, means {mean.shape} and squares {squares.shape}")
-        if not 0.0 < step <= window <= 1e6 * step:  # a window of more steps is no curve that was learned
+        if not 0.0 < step <= window <= 1e6 * step:  # nothing was learned with a window of more steps
             raise ValueError(f"a curve with step {step:g} and window {window:g}")
         return cls(step, window, count, mean, squares)
 
