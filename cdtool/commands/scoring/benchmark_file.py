@@ -18,6 +18,7 @@ from cdtool.base.plain_text import counted, digits
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import Place, Positive, read, setting, tables_of
+from cdtool.base.version import __version__
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.named_logs import (
     LogList,
@@ -264,9 +265,16 @@ class BenchmarkFile:
 
     @property
     def scoring(self) -> dict[str, Any]:
-        """Return the settings that determine the results, for provenance; only results with equal settings compare."""
+        """Return the files and the settings that determine the results, for provenance."""
         reduction = self.machine_file.force_reduction
         return {
+            "tool": "cdtool",
+            "tool_version": __version__,
+            "benchmark_sha256": self.digest,
+            **({"settings": dict(self.settings)} if self.settings else {}),
+            "machine": self.machine_file.machine.name,
+            "machine_sha256": self.machine_file.digest,
+            **({"simulated": True} if self.machine_file.simulated else {}),
             "onset": self.onset.described if self.machine_file.maps("force") else "as labelled",
             **({"force": reduction} if reduction else {}),
             "separation_s": self.onset.separation,
