@@ -146,7 +146,7 @@ def _about(results: Results, item: Summary) -> dict[str, Any]:
         "detector": results.detectors.index(item.detector),
         "median": [short(value) for value in shown_ends],
         "open": (short(least[0]), least[1]) if least else None,
-        "words": f"median {with_interval(median)} ms",
+        "words": f"median {with_interval(median, item.resolution_ms)} ms",
         "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
     }
 

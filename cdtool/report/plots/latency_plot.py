@@ -207,7 +207,9 @@ def _write_open_end(axes: Axes, height: float, ends: tuple[float, float], words:
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_free: Sequence[str]) -> None:
     cells, loud = count_cells(row)
     alarmed = (not cell.startswith(("0 ", NOTHING)) for cell in impact_free)
-    table.write_row(axes, place, (with_interval(row.median), *cells, *impact_free), (False, *loud, *alarmed))
+    table.write_row(
+        axes, place, (with_interval(row.median, row.resolution_ms), *cells, *impact_free), (False, *loud, *alarmed)
+    )
 
 
 def _count(item: Summary) -> str:
