@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from cdtool.base.plain_text import LISTED, counted
 from cdtool.report.html.page_tables import PageTable, classes
 from cdtool.report.html.plots import plot_data, traces_of
-from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json
+from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json, style_sheet
 from cdtool.report.html.traces import plot_height, trace_data
 from cdtool.report.model import NO_CERTIFICATE, TITLES, TITLES_OF_MANY
 from cdtool.report.table import Log
@@ -36,7 +36,7 @@ _TABLES = (
     *("recordings", "cases"),
     *("not_assessable", "skipped", "damaged", "findings", "calibration"),
 )
-_TEMPLATE, _STYLE = "report.html.j2", "report.css"
+_TEMPLATE = "report.html.j2"
 # In the order in which they use one another.
 _SCRIPTS = (
     *("scales.js", "chart.js", "legend.js", "plots.js", "histogram.js", "forces.js", "trace.js", "print.js"),
@@ -49,7 +49,7 @@ def to_html(report: Report) -> str:
     from markupsafe import Markup
 
     model, results, traces = report.model, report.evaluated.results, report.traces
-    style, script = page_part(_STYLE), "\n".join(page_part(name) for name in _SCRIPTS)
+    style, script = style_sheet(), "\n".join(page_part(name) for name in _SCRIPTS)
     of_logs, numbers = traces_of(traces), {name: i for i, name in enumerate(results.detectors)}
     tables = {name: PageTable(model.tables[name], of_logs) if name in model.tables else None for name in _TABLES}
     plots = plot_data(report)

@@ -17,8 +17,9 @@ from cdtool.report.html.traces import HEIGHTS
 from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.model import AXES
 from cdtool.report.number_text import number, spoken, with_interval
+from cdtool.report.plots.figures import unit_label
 from cdtool.report.plots.latency_axis import FLOOR_MS
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import page_look
 from cdtool.report.table import Log
 from cdtool.report.table import shown as named
 from cdtool.report.tables.results import part_of
@@ -62,16 +63,8 @@ def plot_data(report: Report) -> dict[str, Any]:
 
 
 def _detector(results: Results, name: str) -> dict[str, str]:
-    look = look_of(name)
     unit = part_of(results.provenance, "units").get(name, "")
-    return {"name": shown(name), "unit": plain(unit), "colour": css_colour(look.colour), "marker": look.marker}
-
-
-def css_colour(colour: str) -> str:
-    """Return a colour of the figures in CSS; the figures also name greys by their lightness, as "0.35"."""
-    if colour.startswith("#"):
-        return colour
-    return f"#{round(255.0 * float(colour)):02x}" + 2 * f"{round(255.0 * float(colour)):02x}"
+    return {"name": shown(name), "unit": unit_label(unit), **page_look(name)}
 
 
 def traces_of(traces: Sequence[Trace]) -> dict[Log, list[int]]:
@@ -153,7 +146,7 @@ def _about(results: Results, item: Summary) -> dict[str, Any]:
         "detector": results.detectors.index(item.detector),
         "median": [short(value) for value in shown_ends],
         "open": (short(least[0]), least[1]) if least else None,
-        "words": f"median {with_interval(median)} ms",
+        "words": f"median {with_interval(median, item.resolution_ms)} ms",
         "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
     }
 

@@ -17,6 +17,7 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.files.strict_json import finite
 from cdtool.base.files.typed_json import plain as values_of
 from cdtool.base.plain_text import plain
+from cdtool.report.plots.figures import unit_label
 from cdtool.results.traces.trace import LEVELS, TIME_DECIMALS, Panel, Trace
 
 ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
@@ -54,7 +55,8 @@ def _panel(panel: Panel, detector: int, time: Mapping[str, Any]) -> dict[str, An
     course = panel.course
     scale = _scale(course.value, course.lower, course.upper)
     return {
-        **{key: plain(getattr(panel, key)) for key in ("unit", "joint", "verdict", "reason")},
+        **{key: plain(getattr(panel, key)) for key in ("joint", "verdict", "reason")},
+        "unit": unit_label(panel.unit),
         "detector": detector,
         "seen": [{**values_of(seen), "reason": plain(seen.reason)} for seen in panel.seen],
         "alarms": panel.alarms,

@@ -140,7 +140,7 @@ def _of_contacts(items: Sequence[Summary]) -> list[tuple[Heading, Callable[[Summ
     fields: list[tuple[Heading, Callable[[Summary], Cell]]] = []
     if any(item.contacts for item in items):
         fields += [
-            *((Heading(f"{name} [ms]", numeric=True), partial(_latency, name)) for name in latency_columns(items)),
+            *((Heading(f"{name} [ms]", numeric=True), partial(latency_cell, name)) for name in latency_columns(items)),
             (Heading("contacts detected", numeric=True), _detected),
             (Heading("missed", numeric=True), _missed),
             (Heading("not assessable", numeric=True), _not_assessable),
@@ -230,20 +230,20 @@ def calibration_table(results: Results) -> Table:
     return tabulate("calibration", "False-alarm budget", fields, results.calibration, "calibration")
 
 
-def _latency(column: LatencyColumn, item: Summary) -> Cell:
+def latency_cell(column: LatencyColumn, item: Summary) -> Cell:
     """Return a column of the latency; the range is sorted by its longer end."""
     if column != "range":
         interval = latency_interval(item, column)
-        return empty_cell() if interval is None else interval_cell(interval)
-    ends = dict.fromkeys((number(item.min_ms), number(item.max_ms)))
+        return empty_cell() if interval is None else interval_cell(interval, item.resolution_ms)
+    ends = dict.fromkeys(number(end, error=item.resolution_ms) for end in (item.min_ms, item.max_ms))
     return Cell(" to ".join(ends), key=key_of(item.max_ms))
 
 
 def _short_median(item: Summary) -> Cell:
     """Return the median; its interval only if there is one."""
     if math.isnan(item.median.low) or math.isnan(item.median.high):
-        return number_cell(item.median.value)
-    return interval_cell(item.median)
+        return number_cell(item.median.value, item.resolution_ms)
+    return interval_cell(item.median, item.resolution_ms)
 
 
 def _short_missed(item: Summary) -> Cell:

@@ -28,14 +28,13 @@ from cdtool.commands.inject.coverage.coverage_map import (
 from cdtool.commands.inject.coverage.coverage_map import MapCell as MapCell
 from cdtool.detectors.detection import REASONS
 from cdtool.report.html.page_tables import classes, visible
-from cdtool.report.html.plots import css_colour
 from cdtool.report.html.sections_page import left_out_sections
-from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json
+from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json, style_sheet
 from cdtool.report.html.traces import HEIGHTS, trace_data
 from cdtool.report.model import AXES, NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number, spoken
 from cdtool.report.plots.latency_axis import FLOOR_MS
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import page_look
 from cdtool.report.table import Cell, Heading, Table, count_cell, name_cell, number_cell, tabulate
 from cdtool.results.traces.trace import Trace
 
@@ -101,7 +100,7 @@ def coverage_html(done: Coverage) -> str:
     made = done.map
     scale, numbers = _Scale.of(made), _numbers(made)
     traces = _traces(done)
-    style, script = page_part("report.css") + page_part("coverage.css"), "\n".join(page_part(name) for name in _SCRIPTS)
+    style, script = style_sheet(page_part("coverage.css")), "\n".join(page_part(name) for name in _SCRIPTS)
     missed, telling = made.missed(), made.most_telling(20)
     return page_template("coverage.html.j2").render(
         policy=content_policy(style, script),
@@ -340,7 +339,7 @@ def _data(made: CoverageMap, traced: Sequence[str]) -> dict[str, Any]:
     items = [(name, key, cell) for name, cells in made.cells.items() for key, cell in cells.items()]
     worst = [(name, key) for name, key, _ in made.missed()] + [(i.detector, i.key) for i in made.most_telling(1)]
     return {
-        "detectors": [_detector(name) for name in made.cells],
+        "detectors": [{"name": visible(name), **page_look(name)} for name in made.cells],
         "heights": HEIGHTS,
         "axes": AXES,
         "reasons": REASONS,
@@ -354,11 +353,6 @@ def _data(made: CoverageMap, traced: Sequence[str]) -> dict[str, Any]:
         ],
         "first": _numbers(made)[worst[0]] if worst else 0,
     }
-
-
-def _detector(name: str) -> dict[str, str]:
-    look = look_of(name)
-    return {"name": visible(name), "colour": css_colour(look.colour), "marker": look.marker}
 
 
 def _title(made: CoverageMap, name: str, key: CellKey) -> str:
