@@ -106,11 +106,11 @@ def _made(file: ProtocolFile, setup: BenchmarkFile, results: Results | None, com
     return Protocol(file.plan, points, verdict, files, excluded, detectors, __version__, shown)
 
 
-def _latencies(results: Results) -> dict[tuple[str, str, int], dict[str, float | None]]:
-    """Return the latency of each detector [ms] by group, recording and contact."""
-    found: dict[tuple[str, str, int], dict[str, float | None]] = {}
+def _latencies(results: Results) -> dict[tuple[str, str, int], dict[str, tuple[float | None, float | None]]]:
+    """Return the latency of each detector, and how fine it is [ms], by group, recording and contact."""
+    found: dict[tuple[str, str, int], dict[str, tuple[float | None, float | None]]] = {}
     for row in results.contacts:
-        found.setdefault((row.group, row.recording, row.contact), {})[row.detector] = row.latency_ms
+        found.setdefault((row.group, row.recording, row.contact), {})[row.detector] = row.latency_ms, row.resolution_ms
     return found
 
 

@@ -275,11 +275,12 @@ def _latencies(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield Paragraph(words("text.latencies", nothing=words("document.nothing")), "note")
     detectors = protocol.detectors
     columns = [words("column.point"), words("column.repetition"), *(name.replace("_", " ") for name in detectors)]
-    rows = [
-        (point.point.name, str(number), *(words.number(item.latencies_ms.get(name)) for name in detectors))
-        for point in protocol.points
-        for number, item in enumerate(point.repetitions, 1)
-    ]
+    rows = []
+    for point in protocol.points:
+        for number, item in enumerate(point.repetitions, 1):
+            latencies = [item.latencies_ms.get(name, (None, None)) for name in detectors]
+            cells = [words.number(latency, error=error) for latency, error in latencies]
+            rows.append((point.point.name, str(number), *cells))
     yield _table(columns, rows, numeric=range(1, len(columns)))
 
 

@@ -75,11 +75,11 @@ class Words:
             return self._date(value)
         return self.limit(value) if isinstance(value, float) else str(value)
 
-    def number(self, value: float | None, digits: int = _DIGITS) -> str:
-        """Return a measured number with so many significant digits; a dash without a finite value."""
+    def number(self, value: float | None, digits: int = _DIGITS, error: float | None = None) -> str:
+        """Return a measured number with so many significant digits, none finer than its error; a dash without one."""
         if value is None or not math.isfinite(value):
             return self("document.nothing")
-        return self._spelt(number(value, digits))
+        return self._spelt(number(value, digits, error))
 
     def beside(self, value: float | None, limit: float | None) -> str:
         """Return a number with the digits that show on which side of a limit it is."""
