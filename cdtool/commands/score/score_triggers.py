@@ -16,7 +16,6 @@ from cdtool.base.findings import Finding
 from cdtool.base.plain_text import counted, first_of
 from cdtool.base.registry import plugin_packages
 from cdtool.base.remote.remote_path import location
-from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import shown_path, to_be_seen
 from cdtool.commands.scoring.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.commands.scoring.benchmark_result import BenchmarkResult
@@ -252,12 +251,7 @@ def _released(alarms: Sequence[Alarm], crossings: Sequence[Alarm]) -> tuple[floa
 
 def _provenance(setup: BenchmarkFile, given: TriggerFile) -> dict[str, Any]:
     return {
-        "tool": "cdtool",
-        "tool_version": __version__,
-        "benchmark_sha256": setup.digest,
-        **({"settings": dict(setup.settings)} if setup.settings else {}),
-        "machine": setup.machine_file.machine.name,
-        "machine_sha256": setup.machine_file.digest,
+        **setup.identity,
         "triggers_sha256": given.digest,
         "trigger_clock": setup.triggers.clock,
         **setup.scoring,

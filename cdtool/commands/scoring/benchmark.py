@@ -12,7 +12,6 @@ from typing import Any
 
 from cdtool.base.arrays import FloatArray
 from cdtool.base.registry import plugin_packages
-from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import to_be_seen
 from cdtool.commands.judging.settings_table import detectors_of
 from cdtool.commands.learning.normal_runs import normals_for
@@ -249,12 +248,7 @@ def _provenance(
 ) -> dict[str, Any]:
     injected = {name: dict(group.injected) for name, group in setup.impacts.items() if group.injected}
     return {
-        "tool": "cdtool",
-        "tool_version": __version__,
-        "benchmark_sha256": setup.digest,
-        **({"settings": dict(setup.settings)} if setup.settings else {}),
-        "machine": setup.machine_file.machine.name,
-        "machine_sha256": setup.machine_file.digest,
+        **setup.identity,
         "gains": {detector.name: asdict(detector) for detector in detectors},
         "threshold": setup.rule.name,
         "threshold_rule": asdict(setup.rule),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +18,7 @@ from cdtool.base.plain_text import counted, digits
 from cdtool.base.registry import Registry
 from cdtool.base.remote.remote_path import joined, location
 from cdtool.base.settings import Place, Positive, read, setting, tables_of
+from cdtool.base.version import __version__
 from cdtool.commands.judging.log_groups import Split
 from cdtool.commands.judging.named_logs import (
     LogList,
@@ -35,6 +36,7 @@ from cdtool.commands.judging.settings_table import (
     ForceTable,
     JudgingTable,
     LearnPart,
+    ReportTable,
     TriggersTable,
     apply_settings,
     full_keys,
@@ -131,6 +133,7 @@ _READ_BY: Mapping[str, tuple[str, ...]] = {
     "false_alarm_budget": ("benchmark", "inject", "detect", "explain"),
     "inject": ("benchmark", "tune", "inject"),
     "triggers": ("score",),
+    "report": ("benchmark", "score"),
     "tune": ("tune",),
     "protocol": (),
 }
@@ -251,6 +254,7 @@ class BenchmarkFile:
     settings: Mapping[str, Any] = field(default_factory=dict)
     tune: Any = None
     triggers: TriggersTable = field(default_factory=TriggersTable)
+    report: ReportTable = field(default_factory=ReportTable)
     execution: Execution = field(default_factory=Execution)
 
     def with_made(self, workers: Workers) -> BenchmarkFile:
@@ -261,6 +265,19 @@ class BenchmarkFile:
     def limits_by_hand(self) -> tuple[float, ...]:
         """Return the limits of the signal that were set by hand; empty if they are learned."""
         return tuple(getattr(self.rule, "limits", ()))
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return what identifies the benchmark, for provenance, and how its tables are written if it says so."""
+        return {
+            "tool": "cdtool",
+            "tool_version": __version__,
+            "benchmark_sha256": self.digest,
+            **({"settings": dict(self.settings)} if self.settings else {}),
+            **({"report": asdict(self.report)} if self.report != ReportTable() else {}),
+            "machine": self.machine_file.machine.name,
+            "machine_sha256": self.machine_file.digest,
+        }
 
     @property
     def scoring(self) -> dict[str, Any]:
@@ -534,6 +551,7 @@ def _resolved(
         settings=settings,
         tune=None if table.tune is None else read(SECTIONS.load("tune").table, table.tune, place.below("tune")),
         triggers=table.triggers,
+        report=table.report,
         execution=table.execution,
     )
     table.check_joints(place, machine)
